@@ -1,0 +1,109 @@
+//! Small mathematics with the same bits on every machine: IEEE operations in a fixed order, no fused multiply-add, no
+//! host `sin`, and no `f32::max` (its result for -0.0 and 0.0 differs between build profiles).
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+
+/// A rotation in the plane: the cosine and the sine of its angle.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Rot {
+    /// Cosine of the angle.
+    pub c: f32,
+    /// Sine of the angle.
+    pub s: f32,
+}
+
+impl Default for Rot {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl Rot {
+    /// No rotation.
+    pub const IDENTITY: Self = Self { c: 1.0, s: 0.0 };
+
+    /// The rotation by `angle` radians, counter-clockwise.
+    pub fn from_angle(angle: f32) -> Self {
+        Self { c: libm::cosf(angle), s: libm::sinf(angle) }
+    }
+
+    /// The angle in radians, in (-pi, pi].
+    pub fn angle(self) -> f32 {
+        libm::atan2f(self.s, self.c)
+    }
+
+    /// Turns a vector from the rotated frame to the world.
+    #[inline(always)]
+    pub fn rotate(self, v: Vec2) -> Vec2 {
+        Vec2::new(self.c * v.x - self.s * v.y, self.s * v.x + self.c * v.y)
+    }
+
+    /// Turns a vector from the world to the rotated frame.
+    #[inline(always)]
+    pub fn unrotate(self, v: Vec2) -> Vec2 {
+        Vec2::new(self.c * v.x + self.s * v.y, self.c * v.y - self.s * v.x)
+    }
+
+    /// First `other`, then `self`.
+    #[inline(always)]
+    pub fn after(self, other: Self) -> Self {
+        Self { c: self.c * other.c - self.s * other.s, s: self.s * other.c + self.c * other.s }
+    }
+
+    /// The rotation that leads from `self` to `other`.
+    #[inline(always)]
+    pub fn to(self, other: Self) -> Self {
+        Self { c: self.c * other.c + self.s * other.s, s: self.c * other.s - self.s * other.c }
+    }
+
+    /// The same direction at length one.
+    #[inline(always)]
+    pub fn normalized(self) -> Self {
+        let scale = 1.0 / (self.c * self.c + self.s * self.s).sqrt();
+        Self { c: self.c * scale, s: self.s * scale }
+    }
+}
+
+/// The z component of the cross product of two vectors.
+#[inline(always)]
+pub(crate) fn cross(a: Vec2, b: Vec2) -> f32 {
+    a.x * b.y - a.y * b.x
+}
+
+/// The inner product.
+#[inline(always)]
+pub(crate) fn dot(a: Vec2, b: Vec2) -> f32 {
+    a.x * b.x + a.y * b.y
+}
+
+/// The velocity of a point at `r` from the center of a body that turns with `omega`.
+#[inline(always)]
+pub(crate) fn turn(omega: f32, r: Vec2) -> Vec2 {
+    Vec2::new(-omega * r.y, omega * r.x)
+}
+
+/// `v` turned by a quarter clockwise: the tangent that belongs to a normal.
+#[inline(always)]
+pub(crate) fn right_perp(v: Vec2) -> Vec2 {
+    Vec2::new(v.y, -v.x)
+}
+
+/// The greater of two; the second where they compare equal or not at all.
+#[inline(always)]
+pub(crate) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The lesser of two; the second where they compare equal or not at all.
+#[inline(always)]
+pub(crate) fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// `x` held within `[low, high]`.
+#[inline(always)]
+pub(crate) fn clamp(x: f32, low: f32, high: f32) -> f32 {
+    min(max(x, low), high)
+}

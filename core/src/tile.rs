@@ -1,0 +1,102 @@
+//! A tile: a rectangle of the domain, the bodies it owns, and what it remembers of their contacts.
+
+use crate::body::Bodies;
+use crate::contact::{ContactCache, PairKey, Slot, Strays};
+use crate::halo::Unseen;
+use crate::hash::Hashes;
+use crate::id::{GlobalId, TileId};
+use crate::partition::Region;
+use crate::setup::Setup;
+use glam::DVec2;
+
+/// The unit of physics: one step of a tile is a function of its state and of the messages it received.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    pub(crate) id: TileId,
+    pub(crate) region: Region,
+    /// Bodies in here are nobody else's business.
+    pub(crate) interior: Region,
+    /// Local coordinates, where single precision will do, count from here.
+    pub(crate) corner: DVec2,
+    /// Owned bodies, then ghosts, then statics.
+    pub(crate) bodies: Bodies,
+    pub(crate) owned: usize,
+    /// Owned bodies from here on came in this step.
+    pub(crate) arrived: usize,
+    /// One per ghost: the impulse it is given in every substep.
+    pub(crate) unseen: Vec<Unseen>,
+    /// One per ghost, ascending.
+    pub(crate) ghost_owners: Vec<TileId>,
+    /// Rows of the setup's statics.
+    pub(crate) statics: Vec<u32>,
+    /// What was solved last. Between the two halves of the first sync point: only contacts of bodies that stay owned
+    /// here, or of those and statics.
+    pub(crate) contacts: ContactCache,
+    /// The other remembered contacts, filled in the first sync point.
+    pub(crate) strays: Strays,
+    /// What happened in the step under way.
+    pub(crate) counts: TileCounts,
+}
+
+/// What a tile counts in a step.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct TileCounts {
+    pub(crate) contacts: u64,
+    pub(crate) border_contacts: u64,
+    pub(crate) migrations: u64,
+    pub(crate) islands: u64,
+    pub(crate) largest_island: u64,
+    /// The lowest owned body whose state is no longer finite.
+    pub(crate) not_finite: Option<GlobalId>,
+    /// A message spoke of a body that is not known here.
+    pub(crate) protocol_broken: bool,
+}
+
+impl Tile {
+    pub(crate) fn new(id: TileId, setup: &Setup) -> Self {
+        let region = setup.grid.region(id);
+        Self {
+            id,
+            region,
+            interior: region.shrunk(setup.inset),
+            corner: setup.grid.corner(id),
+            bodies: Bodies::default(),
+            owned: 0,
+            arrived: 0,
+            unseen: Vec::new(),
+            ghost_owners: Vec::new(),
+            statics: setup.statics_of(id),
+            contacts: ContactCache::default(),
+            strays: Strays::default(),
+            counts: TileCounts::default(),
+        }
+    }
+
+    pub(crate) fn ghosts(&self) -> usize {
+        self.unseen.len()
+    }
+
+    /// Index into [`Tile::bodies`] of a slot.
+    #[inline(always)]
+    pub(crate) fn index(&self, slot: Slot) -> usize {
+        slot.index(self.owned, self.ghosts())
+    }
+
+    /// The names of a contact's bodies, the lower first, and whether the slot order is the other way round.
+    #[inline(always)]
+    pub(crate) fn pair_of(&self, key: PairKey) -> (GlobalId, GlobalId) {
+        let (a, b) = (self.bodies.id[self.index(key.low())], self.bodies.id[self.index(key.high())]);
+        if a < b { (a, b) } else { (b, a) }
+    }
+
+    pub(crate) fn hashes(&self) -> Hashes {
+        let mut hashes = Hashes::default();
+        for index in 0..self.owned {
+            hashes.add_body(&self.bodies.get(index));
+        }
+        for (key, contact) in self.contacts.iter() {
+            hashes.add_contact(self.id, self.pair_of(key), contact);
+        }
+        hashes
+    }
+}

@@ -1,0 +1,182 @@
+//! Which rank holds which tiles: contiguous runs along a Hilbert curve, of about equal weight.
+//!
+//! A run of the curve is compact, so a rank's tiles mostly border each other and few bytes leave the rank. Only integers
+//! are compared, so every rank computes the same assignment from the same weights. The assignment decides how a world
+//! is computed and never what comes out.
+
+use atoll_core::{TileGrid, TileId};
+
+/// A rank for every tile.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Assignment {
+    /// By tile.
+    rank_of: Vec<u32>,
+    ranks: usize,
+}
+
+impl Assignment {
+    /// Cuts the tiles into `ranks` runs. `weights` gives the cost of each tile, by tile id: the bodies it starts with.
+    ///
+    /// Every rank gets at least one tile while there are as many tiles as ranks; with fewer tiles, the last ranks get
+    /// none.
+    ///
+    /// # Panics
+    /// If there is not one weight per tile, or if there are no ranks.
+    pub fn balanced(grid: &TileGrid, weights: &[u64], ranks: usize) -> Self {
+        assert_eq!(weights.len(), grid.tiles(), "one weight per tile");
+        assert!(ranks > 0, "a run has ranks");
+        let curve = hilbert_order(grid.columns(), grid.rows());
+        // An empty tile costs a little too, and so the total is never zero.
+        let weight = |tile: usize| u128::from(weights[tile]) + 1;
+        let total: u128 = (0..weights.len()).map(weight).sum();
+        let busy = ranks.min(curve.len());
+
+        let mut rank_of = vec![0; curve.len()];
+        let (mut next, mut assigned) = (0, 0_u128);
+        for rank in 0..busy {
+            let goal = total * (rank as u128 + 1) / busy as u128;
+            let last = curve.len() - (busy - rank - 1);
+            let first = next;
+            // The next tile is taken while that brings the sum nearer to the goal.
+            while next < last && (next == first || 2 * assigned + weight(curve[next]) <= 2 * goal) {
+                assigned += weight(curve[next]);
+                rank_of[curve[next]] = rank as u32;
+                next += 1;
+            }
+        }
+        Self { rank_of, ranks }
+    }
+
+    /// The rank that holds a tile.
+    pub fn rank_of(&self, tile: TileId) -> usize {
+        self.rank_of[tile.0 as usize] as usize
+    }
+
+    /// The tiles of a rank, ascending. None for an idle rank.
+    pub fn tiles_of(&self, rank: usize) -> Vec<TileId> {
+        let of_rank = |&(_, &holder): &(u32, &u32)| holder as usize == rank;
+        (0..).zip(&self.rank_of).filter(of_rank).map(|(tile, _)| TileId(tile)).collect()
+    }
+
+    /// How many ranks there are.
+    pub fn ranks(&self) -> usize {
+        self.ranks
+    }
+
+    /// Ranks without a tile.
+    pub fn idle_ranks(&self) -> usize {
+        self.ranks.saturating_sub(self.rank_of.len())
+    }
+}
+
+/// All tiles (row * columns + column) in the order in which the Hilbert curve over the smallest power-of-two square
+/// around the grid visits them.
+fn hilbert_order(columns: usize, rows: usize) -> Vec<usize> {
+    let side = columns.max(rows).next_power_of_two();
+    let mut tiles: Vec<usize> = (0..columns * rows).collect();
+    tiles.sort_by_cached_key(|tile| hilbert_index(side, tile % columns, tile / columns));
+    tiles
+}
+
+/// Distance along the Hilbert curve through a square of `side` (a power of two) cells a side, at cell (x, y).
+fn hilbert_index(side: usize, mut x: usize, mut y: usize) -> u64 {
+    let mut index = 0;
+    let mut half = side / 2;
+    while half > 0 {
+        let (right, upper) = (x & half != 0, y & half != 0);
+        let quadrant: u64 = match (right, upper) {
+            (false, false) => 0,
+            (false, true) => 1,
+            (true, true) => 2,
+            (true, false) => 3,
+        };
+        index += quadrant * (half as u64) * (half as u64);
+        x &= half - 1;
+        y &= half - 1;
+        // The curve enters the lower quadrants turned by a quarter and mirrored.
+        if !upper {
+            if right {
+                (x, y) = (half - 1 - x, half - 1 - y);
+            }
+            (x, y) = (y, x);
+        }
+        half /= 2;
+    }
+    index
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    fn grid(columns: u32, rows: u32) -> TileGrid {
+        TileGrid::new(DVec2::ZERO, DVec2::new(f64::from(columns), f64::from(rows)), columns, rows).unwrap()
+    }
+
+    fn loads(assignment: &Assignment, weights: &[u64]) -> Vec<u64> {
+        let load = |rank| assignment.tiles_of(rank).iter().map(|tile| weights[tile.0 as usize]).sum();
+        (0..assignment.ranks()).map(load).collect()
+    }
+
+    #[test]
+    fn the_curve_visits_every_cell_of_a_square_in_unit_steps() {
+        for side in [1_usize, 2, 4, 8, 32] {
+            let order = hilbert_order(side, side);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..side * side));
+            assert_eq!(order[0], 0);
+            for pair in order.windows(2) {
+                let (dx, dy) = ((pair[0] % side).abs_diff(pair[1] % side), (pair[0] / side).abs_diff(pair[1] / side));
+                assert_eq!(dx + dy, 1, "side {side}: {pair:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_tile_has_one_rank_and_every_rank_a_run_of_the_curve() {
+        for (columns, rows) in [(1, 1), (3, 2), (8, 8), (17, 17), (1, 40)] {
+            let grid = grid(columns, rows);
+            let weights: Vec<u64> = (0..grid.tiles() as u64).map(|tile| tile * 7919 % 1000).collect();
+            for ranks in [1, 2, 3, 4, 7, 64] {
+                let assignment = Assignment::balanced(&grid, &weights, ranks);
+                assert_eq!(assignment, Assignment::balanced(&grid, &weights, ranks));
+                let along: Vec<usize> = hilbert_order(grid.columns(), grid.rows())
+                    .into_iter()
+                    .map(|tile| assignment.rank_of(TileId(tile as u32)))
+                    .collect();
+                assert!(along.windows(2).all(|pair| pair[1] == pair[0] || pair[1] == pair[0] + 1));
+                assert_eq!(along.first(), Some(&0));
+                assert_eq!(along.last(), Some(&(ranks.min(grid.tiles()) - 1)));
+                let listed: usize = (0..ranks).map(|rank| assignment.tiles_of(rank).len()).sum();
+                assert_eq!(listed, grid.tiles());
+                assert_eq!(assignment.idle_ranks(), ranks.saturating_sub(grid.tiles()));
+            }
+        }
+    }
+
+    #[test]
+    fn loads_differ_by_no_more_than_a_tile() {
+        let grid = grid(17, 17);
+        let even = vec![2422; grid.tiles()];
+        for ranks in [2, 4, 7, 16] {
+            let loads = loads(&Assignment::balanced(&grid, &even, ranks), &even);
+            let (least, most) = (loads.iter().min().unwrap(), loads.iter().max().unwrap());
+            assert!(most - least <= 2422, "{loads:?}");
+        }
+        // A corner ten times as dense: an equal number of tiles each would load one rank with most of it.
+        let skewed: Vec<u64> =
+            (0..grid.tiles()).map(|tile| if tile % 17 < 8 && tile / 17 < 8 { 5000 } else { 500 }).collect();
+        let loads = loads(&Assignment::balanced(&grid, &skewed, 4), &skewed);
+        let mean = skewed.iter().sum::<u64>() / 4;
+        assert!(loads.iter().all(|&load| load.abs_diff(mean) <= 5000), "{loads:?}");
+    }
+
+    #[test]
+    fn worlds_without_bodies_are_cut_as_well() {
+        let grid = grid(4, 4);
+        let assignment = Assignment::balanced(&grid, &[0; 16], 5);
+        assert!((0..5).all(|rank| !assignment.tiles_of(rank).is_empty()));
+    }
+}

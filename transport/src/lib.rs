@@ -1,0 +1,146 @@
+//! Bytes between the ranks of a run.
+//!
+//! A run has `size` ranks, threads or processes, that advance in rounds. In each round every rank sends one message,
+//! possibly empty, to every rank and receives one from each. [`Transport`] is that round; what the bytes mean is the
+//! caller's business.
+//!
+//! ```
+//! use atoll_transport::channel::{self, ChannelOptions};
+//! use atoll_transport::{Collective, Incoming, Transport};
+//!
+//! let results = channel::run(3, ChannelOptions::default(), |mut endpoint| {
+//!     let mut incoming = Incoming::default();
+//!     for round in 0..10 {
+//!         // One byte to every rank, written where the backend wants it.
+//!         let outgoing = endpoint.prepare(&[1, 1, 1])?;
+//!         for (to, buffer) in outgoing.iter_mut() {
+//!             buffer[0] = round + to.0 as u8;
+//!         }
+//!         endpoint.exchange(&mut incoming)?;
+//!         for (_from, message) in incoming.iter() {
+//!             assert_eq!(message, [round + endpoint.rank().0 as u8]);
+//!         }
+//!     }
+//!     endpoint.all_sum_u64(1)
+//! });
+//! for result in results {
+//!     assert_eq!(result.expect("no rank panics")?, 3);
+//! }
+//! # Ok::<(), atoll_transport::TransportError>(())
+//! ```
+//!
+//! # The contract
+//!
+//! What every backend promises, and [`conformance`] tests:
+//!
+//! 1. **Identity.** [`rank`](Transport::rank) and [`size`](Transport::size) never change; the ranks are `0 .. size`.
+//! 2. **A round** is one [`prepare`](Transport::prepare), giving the length of every message and returning buffers of
+//!    exactly these lengths, and one [`exchange`](Transport::exchange), which sends them and returns when the
+//!    message of every rank has arrived. A message to oneself is allowed and costs at most one copy. An empty message
+//!    is a message. Nothing is lost, duplicated, truncated or reordered, and a message of one round is never seen in
+//!    another, however much faster one rank is than the next.
+//! 3. **Lockstep.** Every rank makes the same sequence of exchanges. A rank can therefore be at most one round ahead of
+//!    a peer, so *at most two messages are ever unread between two ranks*, and a backend needs no more room than that
+//!    to send without waiting.
+//! 4. **Memory.** Both sides of a round lie in memory of the backend: [`Outgoing`] is encoded into in place, and
+//!    [`Incoming`] is read in place until the next exchange that is given the same value, which returns that memory
+//!    first. At least three such values may hold messages at once. With one, after the first rounds, an exchange of
+//!    messages no longer than before allocates no memory for them. Neither type says what the memory is: a buffer moved
+//!    from thread to thread, a loaned slice of shared memory, or a part of one flat buffer that a message-passing
+//!    library scatters and gathers.
+//! 5. **Misuse** is answered with [`TransportError::Usage`]: a wrong number of lengths, or an exchange without a
+//!    prepare. Nothing is sent and the endpoint stays usable. A prepare that fails, like one that succeeds, discards
+//!    what was prepared before.
+//! 6. **Lost ranks.** When a rank panics, aborts or leaves, every other rank that still needs something from it fails
+//!    with [`TransportError::PeerLost`], and one that stays silent for the peer timeout gives
+//!    [`TransportError::Timeout`]. No rank waits for ever. The error names the rank *where it began*: if rank 1
+//!    gives up because rank 2 is gone, rank 0 hears of rank 2. What a rank had sent before it left still arrives, so
+//!    ranks may end a run at different times. After such an error every call gives the same error again.
+//! 7. **Abort.** [`abort`](Transport::abort) tells the other ranks why and never returns. Where ranks are threads,
+//!    it unwinds the calling one with an [`Aborted`] payload and leaves the process alone.
+//!
+//! # Backends
+//!
+//! | module | ranks are | for |
+//! |---|---|---|
+//! | [`local`] | the calling thread, alone | one rank |
+//! | [`channel`] | threads of one process | one machine, and emulating any other run |
+//!
+//! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
+
+#![forbid(unsafe_code)]
+
+pub mod channel;
+mod collective;
+pub mod conformance;
+mod error;
+mod frame;
+pub mod local;
+mod rank;
+mod stats;
+
+pub use collective::Collective;
+pub use error::{Aborted, RankFailure, TransportError};
+pub use frame::{Incoming, Outgoing};
+pub use rank::Rank;
+pub use stats::{Counting, Stats};
+
+/// One rank's end of a run. The [crate page](crate) states the contract that implementations keep.
+pub trait Transport {
+    /// The rank this endpoint belongs to.
+    fn rank(&self) -> Rank;
+
+    /// The number of ranks.
+    fn size(&self) -> usize;
+
+    /// Starts a round in which `lengths[r]` bytes go to rank `r`, this rank included, and returns the backend's own
+    /// memory to write them into. Its contents are arbitrary until written.
+    ///
+    /// Preparing again before the exchange starts over.
+    ///
+    /// # Errors
+    /// [`Usage`](TransportError::Usage) if there is not one length per rank. Otherwise the error that ended the run.
+    fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError>;
+
+    /// Sends what was prepared and receives exactly one message, possibly empty, from every rank, this one included.
+    ///
+    /// The messages that `incoming` held are given back first. After an error it holds nothing to rely on.
+    ///
+    /// # Errors
+    /// [`Usage`](TransportError::Usage) if nothing was prepared; [`PeerLost`](TransportError::PeerLost) or
+    /// [`Timeout`](TransportError::Timeout) if a message cannot arrive or does not.
+    fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError>;
+
+    /// Ends this rank and lets every other rank know why.
+    ///
+    /// Where ranks are threads, this unwinds the calling one with an [`Aborted`] payload and never ends the process.
+    fn abort(&mut self, reason: &str) -> !;
+}
+
+macro_rules! forward_transport {
+    ($($pointer:ty),*) => {$(
+        impl<T: Transport + ?Sized> Transport for $pointer {
+            fn rank(&self) -> Rank {
+                (**self).rank()
+            }
+
+            fn size(&self) -> usize {
+                (**self).size()
+            }
+
+            fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
+                (**self).prepare(lengths)
+            }
+
+            fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
+                (**self).exchange(incoming)
+            }
+
+            fn abort(&mut self, reason: &str) -> ! {
+                (**self).abort(reason)
+            }
+        }
+    )*};
+}
+
+forward_transport!(&mut T, Box<T>);

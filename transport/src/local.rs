@@ -1,0 +1,61 @@
+//! One rank alone: messages to oneself, in memory.
+
+use crate::error::Aborted;
+use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
+
+/// The only rank of a run of size 1.
+///
+/// ```
+/// use atoll_transport::{Incoming, Rank, Transport, local::Local};
+///
+/// let mut local = Local::new();
+/// local.prepare(&[5])?.to(Rank(0)).copy_from_slice(b"atoll");
+/// let mut incoming = Incoming::default();
+/// local.exchange(&mut incoming)?;
+/// assert_eq!(incoming.from(Rank(0)), b"atoll");
+/// # Ok::<(), atoll_transport::TransportError>(())
+/// ```
+#[derive(Debug)]
+pub struct Local {
+    outgoing: Outgoing,
+}
+
+impl Local {
+    /// The endpoint of a run of one rank.
+    pub fn new() -> Local {
+        Local { outgoing: Outgoing::new(1) }
+    }
+}
+
+impl Default for Local {
+    fn default() -> Local {
+        Local::new()
+    }
+}
+
+impl Transport for Local {
+    fn rank(&self) -> Rank {
+        Rank(0)
+    }
+
+    fn size(&self) -> usize {
+        1
+    }
+
+    fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
+        self.outgoing.prepare(self.rank(), lengths)?;
+        Ok(&mut self.outgoing)
+    }
+
+    fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
+        self.outgoing.begin_exchange(self.rank())?;
+        incoming.resize(1);
+        let old = incoming.take(Rank(0));
+        incoming.put(Rank(0), self.outgoing.replace(Rank(0), old));
+        Ok(())
+    }
+
+    fn abort(&mut self, reason: &str) -> ! {
+        Aborted::unwind(self.rank(), reason)
+    }
+}
