@@ -93,7 +93,7 @@ impl Border {
             for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
                 let SlotKind::Owned(body) = body.kind() else { continue };
                 let owner = owner_of(tile, partner);
-                let upon_a = contacts.bodies[contact as usize].0 == body as u32;
+                let upon_a = contacts.bodies[contact as usize][0] == body as u32;
                 let (first, end) = self.sends_of[body];
                 for send in (first..end).filter(|&send| owner != Some(self.sends[send as usize].peer)) {
                     self.feeds.push(Feed { send, contact, upon_a });

@@ -55,7 +55,7 @@ impl TileFacts {
         for (i, (key, contact)) in contacts.cache.iter().enumerate() {
             // Both owners of a border contact see it; the one with body A counts it.
             let border = crate::border::is_border(key);
-            if border && contacts.bodies[i].0 as usize >= tile.owned {
+            if border && contacts.bodies[i][0] as usize >= tile.owned {
                 continue;
             }
             let separations = &contacts.separation[i][..contact.point_count()];

@@ -6,7 +6,7 @@
 
 use crate::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::halo::{ContactRecord, GhostRecord, Mailbag, Unseen};
-use crate::id::TileId;
+use crate::id::{GlobalId, TileId};
 use crate::setup::Setup;
 use crate::tile::Tile;
 
@@ -19,7 +19,8 @@ pub(crate) struct MigrateWork {
     sends: Vec<Send>,
     departures: Vec<u32>,
     arrivals: Vec<crate::Body>,
-    ghosts: Vec<(TileId, GhostRecord)>,
+    /// Owner, name, and where the record lies: message, place.
+    ghosts: Vec<(TileId, GlobalId, u32, u32)>,
 }
 
 /// An owned body that may concern other tiles.
@@ -70,6 +71,7 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
 }
 
 /// Finds the bodies near or beyond the tile's border, their owners, and who needs a ghost of them.
+#[inline(never)]
 fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
     if work.mark.len() < tile.owned {
         work.mark.resize(tile.owned, 0);
@@ -79,8 +81,12 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
         if tile.interior.contains(position) {
             continue;
         }
-        let owner = grid.locate(position);
         let half = setup.grown_half_extents(bodies.kind[i], bodies.rotation[i], bodies.velocity[i]);
+        let reach = half.as_dvec2() + glam::DVec2::splat(setup.halo_width);
+        if tile.region.contains(position - reach) & tile.region.contains(position + reach) {
+            continue;
+        }
+        let owner = grid.locate(position);
         let first_send = work.sends.len() as u32;
         for target in grid.reached(position, half, setup.halo_width).filter(|&target| target != owner) {
             work.sends.push(Send { body: i as u32, target, unseen: Unseen::default() });
@@ -95,8 +101,10 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
 
 /// One pass over the contacts of the last step: sums unseen impulses, sends the contacts of departing bodies, and
 /// moves those that cannot be found by slot any more to the strays.
+#[inline(never)]
 fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork) {
     tile.strays.clear();
+    tile.corrections.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
         let key = tile.contacts.keys[i];
@@ -128,6 +136,12 @@ fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork)
                             send.unseen.add(linear, on_b);
                         }
                     }
+                }
+                // The partner's owner, who decides what is unseen, does not know yet that this body leaves.
+                if border.owner != tile.id && partner.is_some() {
+                    let partner = if is_a { pair.1 } else { pair.0 };
+                    let (linear, angular) = if is_a { (linear, on_b) } else { (-linear, on_a) };
+                    tile.corrections.push((partner, Unseen { linear, angular }));
                 }
                 // Both bodies may leave for one tile: one record is enough.
                 if border.owner != tile.id && border.owner != heir {
@@ -171,6 +185,7 @@ fn close_gaps(keys: &mut [PairKey], gone: &[u32]) {
 }
 
 /// Takes in what other tiles sent: arrivals, ghosts, contacts. Sorts the bodies by place when it is time to.
+#[inline(never)]
 pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, setup: &Setup, step: u64) {
     tile.arrived = tile.owned;
     for message in bag.messages() {
@@ -185,6 +200,10 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
                 if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
             let pair = (record.low, record.high);
             tile.strays.push(Stray { pair, authority, contact: record.contact });
+            // One of the two is here now, so this tile solves the contact; who sent the other did not know that.
+            let (linear, on_a, on_b) = record.contact.impulse();
+            tile.corrections.push((record.low, Unseen { linear, angular: -on_a }));
+            tile.corrections.push((record.high, Unseen { linear: -linear, angular: -on_b }));
         }
     }
     tile.owned = tile.bodies.len();
@@ -195,17 +214,36 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
     }
 
     work.ghosts.clear();
-    for message in bag.messages() {
-        work.ghosts.extend(message.ghosts.iter().map(|ghost| (setup.grid.locate(ghost.body.position), *ghost)));
+    for (m, message) in (0..).zip(bag.messages()) {
+        let owner = |ghost: &GhostRecord| setup.grid.locate(ghost.body.position);
+        work.ghosts.extend((0..).zip(&message.ghosts).map(|(g, ghost)| (owner(ghost), ghost.body.id, m, g)));
     }
-    work.ghosts.sort_unstable_by_key(|(owner, ghost)| (*owner, ghost.body.id));
-    for (owner, ghost) in &work.ghosts {
+    work.ghosts.sort_unstable();
+    for &(owner, _, m, g) in &work.ghosts {
+        let ghost = &bag.messages()[m as usize].ghosts[g as usize];
         tile.bodies.push(ghost.body);
         tile.unseen.push(ghost.unseen);
-        tile.ghost_owners.push(*owner);
+        tile.ghost_owners.push(owner);
     }
+    correct_unseen(tile);
     for &row in &tile.statics {
         tile.bodies.push(setup.statics[row as usize]);
+    }
+}
+
+/// What is unseen was decided by the owners of the step before. Where a body changed owner at this very sync point, its
+/// partners' ghosts lack the impulse of a contact that is no longer solved here, or have that of one that now is: a
+/// ghost in a pile would be shot out of it.
+fn correct_unseen(tile: &mut Tile) {
+    if tile.corrections.is_empty() {
+        return;
+    }
+    let mut ghosts: Vec<_> = tile.bodies.id[tile.owned..].iter().copied().zip(0..).collect();
+    ghosts.sort_unstable();
+    for (id, by) in tile.corrections.drain(..) {
+        if let Ok(found) = ghosts.binary_search_by_key(&id, |&(id, _)| id) {
+            tile.unseen[ghosts[found].1].add(by.linear, by.angular);
+        }
     }
 }
 

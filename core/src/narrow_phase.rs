@@ -7,7 +7,7 @@ use crate::math::{Rot, dot, turn};
 use crate::setup::Setup;
 use crate::shape::{KindRow, Shape};
 use crate::tile::Tile;
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 
 /// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
 const RECYCLE_COSINE: f32 = 0.98;
@@ -21,6 +21,7 @@ pub(crate) struct Contacts {
     pub(crate) separation: Vec<[f32; 2]>,
     /// For each contact the indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
+    movers: Vec<Mover>,
     near: Vec<Pair>,
     sorted: Vec<Pair>,
     /// Per owned body where its pairs begin in `sorted`.
@@ -38,7 +39,7 @@ impl Contacts {
         let ghosts = tile.ghosts();
         let mut old = 0;
         for i in 0..self.sorted.len() {
-            let (low, high) = self.sorted[i];
+            let [low, high] = self.sorted[i];
             let key = PairKey::new(
                 Slot::from_index(low as usize, tile.owned, ghosts),
                 Slot::from_index(high as usize, tile.owned, ghosts),
@@ -54,10 +55,10 @@ impl Contacts {
             let is_ghost = (tile.owned..tile.owned + ghosts).contains(&(high as usize));
             let strange = is_ghost || low as usize >= tile.arrived || (high as usize) < tile.owned && high as usize >= tile.arrived;
             let stray = if strange { tile.strays.find(pair) } else { None };
-            if let Some((contact, separation)) = touch(tile, (a, b), stray.or(known), setup) {
+            if let Some((contact, separation)) = touch(tile, [a, b], stray.or(known), setup) {
                 self.cache.push(key, contact);
                 self.separation.push(separation);
-                self.bodies.push((a, b));
+                self.bodies.push([a, b]);
             }
         }
     }
@@ -65,7 +66,7 @@ impl Contacts {
     /// Contacts, and border contacts, of which body A is owned: so that each is counted by one tile.
     pub(crate) fn count(&self, owned: usize) -> (u64, u64) {
         let (mut all, mut border) = (0, 0);
-        for (&(a, _), &key) in self.bodies.iter().zip(&self.cache.keys) {
+        for (&[a, _], &key) in self.bodies.iter().zip(&self.cache.keys) {
             let is_border = crate::border::is_border(key);
             let counts = !is_border || (a as usize) < owned;
             all += u64::from(counts);
@@ -74,29 +75,29 @@ impl Contacts {
         (all, border)
     }
 
-    /// Keeps the pairs whose bounding circles may touch within the step.
+    /// Keeps the pairs whose bounding circles may touch within the step. Every candidate is written down and counted or
+    /// not: a branch here would be a coin toss.
     fn cull(&mut self, tile: &Tile, proxies: &Proxies, pairs: &[Pair], setup: &Setup) {
-        let bodies = &tile.bodies;
+        self.movers.clear();
+        self.movers.extend((0..tile.bodies.len()).map(|i| Mover::new(tile, i, setup)));
         self.start.clear();
         self.start.resize(tile.owned + 2, 0);
         self.near.clear();
+        self.near.resize(pairs.len(), [0, 0]);
+        let mut kept = 0;
         for &pair in pairs {
-            if !proxies.overlap(bodies, pair) {
-                continue;
-            }
-            let (a, b) = (pair.0 as usize, pair.1 as usize);
-            let (kind_a, kind_b) = (setup.kind(bodies.kind[a]), setup.kind(bodies.kind[b]));
-            let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
-            // A large box's bounding circle tells nothing, and a static's is not worth its square root.
-            let within = kind_a.bounding_radius + kind_b.bounding_radius + reach(tile, pair, setup);
-            if dot(offset, offset) < within * within {
-                self.near.push(pair);
-                self.start[a + 2] += 1;
-            }
+            let (a, b) = (&self.movers[pair[0] as usize], &self.movers[pair[1] as usize]);
+            let offset = (b.position - a.position).as_vec2();
+            let near = proxies.overlap(offset, pair) & a.may_touch(b, offset, setup);
+            self.near[kept] = pair;
+            kept += usize::from(near);
+            self.start[pair[0] as usize + 2] += u32::from(near);
         }
+        self.near.truncate(kept);
     }
 
     /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
+    #[inline(never)]
     fn sort(&mut self, owned: usize) {
         let mut sum = 0;
         for start in &mut self.start {
@@ -104,9 +105,9 @@ impl Contacts {
             *start = sum;
         }
         self.sorted.clear();
-        self.sorted.resize(self.near.len(), (0, 0));
+        self.sorted.resize(self.near.len(), [0, 0]);
         for &pair in &self.near {
-            let place = &mut self.start[pair.0 as usize + 1];
+            let place = &mut self.start[pair[0] as usize + 1];
             self.sorted[*place as usize] = pair;
             *place += 1;
         }
@@ -119,17 +120,51 @@ impl Contacts {
     }
 }
 
-/// No contact can be made beyond this distance of two bodies' surfaces, in meters.
-#[inline(always)]
-fn reach(tile: &Tile, (a, b): Pair, setup: &Setup) -> f32 {
-    let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
-    let between = bodies.velocity[b] - bodies.velocity[a];
-    // Turning brings only the corners of a box nearer.
-    let spin = |i: usize| {
+/// What the cull reads of a body, in one cache line.
+#[derive(Debug)]
+struct Mover {
+    position: DVec2,
+    velocity: Vec2,
+    bounding_radius: f32,
+    /// Speed of the corners by rotation, in m/s; turning brings no point of a circle nearer.
+    spin: f32,
+    is_box: f32,
+}
+
+impl Mover {
+    #[inline(always)]
+    fn new(tile: &Tile, i: usize, setup: &Setup) -> Self {
+        let bodies = &tile.bodies;
         let kind = setup.kind(bodies.kind[i]);
-        (kind.bounding_radius - kind.radius) * bodies.angular_velocity[i].abs()
-    };
-    setup.params.speculative_distance + setup.params.dt * (dot(between, between).sqrt() + spin(a) + spin(b))
+        let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
+        Self {
+            position: bodies.position[i],
+            velocity: bodies.velocity[i],
+            bounding_radius: kind.bounding_radius,
+            spin: is_box * kind.bounding_radius * bodies.angular_velocity[i].abs(),
+            is_box,
+        }
+    }
+
+    /// No contact of the two can be made beyond this distance of their surfaces, in meters: the contact rule, with the
+    /// greatest closing speed there can be. Of two circles that is known, of others only that it is no more than their
+    /// relative speed.
+    #[inline(always)]
+    fn reach(&self, other: &Self, offset: Vec2, distance: f32, setup: &Setup) -> f32 {
+        let between = other.velocity - self.velocity;
+        let along = crate::math::max(-dot(between, offset) / distance, 0.0);
+        let speed = dot(between, between).sqrt();
+        let closing = if self.is_box + other.is_box > 0.0 { speed } else { along };
+        setup.params.speculative_distance + setup.params.dt * (closing + (self.spin + other.spin))
+    }
+
+    #[inline(always)]
+    fn may_touch(&self, other: &Self, offset: Vec2, setup: &Setup) -> bool {
+        let distance = dot(offset, offset).sqrt();
+        // Rounding must not cull what the contact rule keeps. Circles upon one another have no direction: NaN, kept.
+        let within = (self.bounding_radius + other.bounding_radius + self.reach(other, offset, distance, setup)) * 1.0001;
+        !(distance >= within)
+    }
 }
 
 /// One side of a contact.
@@ -165,7 +200,7 @@ impl<'a> Side<'a> {
 
 /// The contact of bodies A and B, if there is one, and the separation of its points.
 #[inline(always)]
-fn touch(tile: &Tile, (a, b): Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+fn touch(tile: &Tile, [a, b]: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
     let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
     let (side_a, side_b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
     // The contact rule: separation < speculative distance + closing speed x dt.
@@ -185,7 +220,10 @@ fn touch(tile: &Tile, (a, b): Pair, known: Option<&Contact>, setup: &Setup) -> O
         }
     }
     let manifold = {
-        let reach = reach(tile, (a, b), setup);
+        let between = side_b.velocity - side_a.velocity;
+        let spin = |side: &Side<'_>| side.kind.bounding_radius * side.angular_velocity.abs();
+        let speed = dot(between, between).sqrt() + spin(&side_a) + spin(&side_b);
+        let reach = setup.params.speculative_distance + setup.params.dt * speed;
         collide(side_a.kind, side_a.rotation, side_b.kind, side_b.rotation, offset, reach)
     };
     let mut kept = Manifold { normal: manifold.normal, ..Manifold::EMPTY };

@@ -34,6 +34,8 @@ pub(crate) struct Tile {
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
     pub(crate) strays: Strays,
+    /// Filled in the first sync point: changes to the unseen impulses of bodies, if they come as ghosts.
+    pub(crate) corrections: Vec<(GlobalId, Unseen)>,
     /// What happened in the step under way.
     pub(crate) counts: TileCounts,
 }
@@ -68,6 +70,7 @@ impl Tile {
             statics: setup.statics_of(id),
             contacts: ContactCache::default(),
             strays: Strays::default(),
+            corrections: Vec::new(),
             counts: TileCounts::default(),
         }
     }

@@ -1,1 +1,56 @@
-//! x
+//! The program `atoll`: runs the scenes of `configs/` on any number of ranks and threads, with the same bits.
+//!
+//! The physics is in `atoll_core`, the bytes between ranks in `atoll_transport`; here they meet. [`run`] does without
+//! a terminal what `atoll run` does with one:
+//!
+//! ```
+//! let text = "[scene]\nkind = \"rooms\"\nbodies = 500\n[run]\nsteps = 3\ntiles = [2, 2]\n";
+//! let one = atoll::run(&atoll::Config::from_toml_str("example", text, &[])?)?;
+//! let two = atoll::run(&atoll::Config::from_toml_str("example", text, &[("ranks", "2")])?)?;
+//! assert_eq!(one.state_hash, two.state_hash);
+//! assert_eq!(one.bodies_lost, 0);
+//! # Ok::<(), atoll::RunError>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub mod args;
+pub mod assignment;
+pub mod backend;
+pub mod cmd;
+pub mod config;
+pub mod drive;
+pub mod error;
+pub mod exchange;
+pub mod interrupt;
+pub mod output;
+pub mod plan;
+pub mod progress;
+pub mod scene;
+pub mod summary;
+pub mod telemetry;
+pub mod tiles;
+
+pub use config::Config;
+pub use error::RunError;
+pub use summary::Summary;
+
+use drive::Observer;
+use plan::Plan;
+
+/// Runs a configuration from start to end in this process and returns its summary. Prints nothing.
+///
+/// # Errors
+/// If the configuration makes no world, a rank is lost, or the physics ends in a state that is not finite. Bodies lost
+/// are no error here: the summary counts them.
+pub fn run(config: &Config) -> Result<Summary, RunError> {
+    run_with(config, &Observer::default())
+}
+
+/// As [`run`], with progress shown and a way to stop early.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(config: &Config, observer: &Observer) -> Result<Summary, RunError> {
+    backend::run(&Plan::new(config)?, observer)
+}

@@ -5,14 +5,14 @@
 //! coordinates, so two tiles that both see a pair agree on it.
 
 pub(crate) mod grid;
+mod search;
 
-use crate::body::Bodies;
 use crate::setup::Setup;
 use crate::tile::Tile;
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 
 /// A pair of indices into owned, ghosts and statics; the lower first.
-pub(crate) type Pair = (u32, u32);
+pub(crate) type Pair = [u32; 2];
 
 /// What the broad phase knows of every body of a tile: its grown AABB in coordinates local to the tile.
 #[derive(Default, Debug)]
@@ -35,6 +35,7 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies.
+    #[inline(never)]
     pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup) {
         let bodies = &tile.bodies;
         let dynamic = tile.owned + tile.ghosts();
@@ -67,9 +68,8 @@ impl Proxies {
 
     /// Whether the grown AABBs of two bodies overlap: the definition of a pair.
     #[inline(always)]
-    pub(crate) fn overlap(&self, bodies: &Bodies, (a, b): Pair) -> bool {
-        let (a, b) = (a as usize, b as usize);
-        let d = (bodies.position[b] - bodies.position[a]).as_vec2().abs();
+    pub(crate) fn overlap(&self, offset: Vec2, [a, b]: Pair) -> bool {
+        let (a, b, d) = (a as usize, b as usize, offset.abs());
         (d.x <= self.half_x[a] + self.half_x[b]) & (d.y <= self.half_y[a] + self.half_y[b])
     }
 }

@@ -41,7 +41,7 @@ impl SolverBodies {
         let dynamic = tile.owned + tile.ghosts();
         self.place.clear();
         self.place.resize(bodies.len(), NOT_SOLVED);
-        for &(a, b) in contacts {
+        for &[a, b] in contacts {
             self.place[a as usize] = 0;
             self.place[b as usize] = 0;
         }

@@ -21,7 +21,7 @@ impl Coloring {
         self.taken.clear();
         self.taken.resize(bodies.len(), 0);
         self.color.clear();
-        for &(a, b) in &contacts.bodies {
+        for &[a, b] in &contacts.bodies {
             let (a, b) = (bodies.index_of(a) as usize, bodies.index_of(b) as usize);
             let taken = self.taken[a] | self.taken[b];
             let color = taken.trailing_ones();

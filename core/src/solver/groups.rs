@@ -266,7 +266,7 @@ struct Constraint<'a> {
 impl<'a> Constraint<'a> {
     #[inline(always)]
     fn new(tile: &Tile, contacts: &'a Contacts, index: usize, bodies: &SolverBodies, setup: &'a Setup) -> Self {
-        let (a, b) = contacts.bodies[index];
+        let [a, b] = contacts.bodies[index];
         Self {
             contact: &contacts.cache.contacts[index],
             index,

@@ -1,0 +1,139 @@
+//! Starts the ranks on the transport that was chosen, waits for them, and makes one outcome of theirs.
+
+use crate::config::TransportKind;
+use crate::drive::{self, Observer, RankEnd, RankError};
+use crate::error::RunError;
+use crate::exchange::ExchangeError;
+use crate::plan::Plan;
+use crate::summary::Summary;
+use atoll_core::StepError;
+use atoll_transport::channel::{self, ChannelOptions};
+use atoll_transport::local::Local;
+use atoll_transport::{Rank, RankFailure, Transport, TransportError};
+use std::thread;
+
+type Ends = Vec<Result<RankEnd, RankFailure>>;
+
+/// Runs a plan on its transport.
+///
+/// # Errors
+/// The one that ended the run, whichever and however many ranks it ended.
+pub fn run(plan: &Plan, observer: &Observer) -> Result<Summary, RunError> {
+    let ends = match plan.transport {
+        TransportKind::Local => local(plan, observer),
+        TransportKind::Channel => {
+            let options = ChannelOptions { peer_timeout: plan.config.run.peer_timeout };
+            channel::run(plan.config.run.ranks, options, |endpoint| {
+                // The ranks share one process, and the first reports its memory.
+                let leads_process = endpoint.rank() == Rank(0);
+                drive::drive(endpoint, plan, observer, leads_process)
+            })
+        }
+    };
+    outcome(plan, ends)
+}
+
+/// A thread of its own all the same: it becomes the first of the rank's thread pool, and the caller's thread could not
+/// leave that again.
+fn local(plan: &Plan, observer: &Observer) -> Ends {
+    let end = thread::scope(|scope| {
+        let thread = thread::Builder::new()
+            .name("rank 0".to_owned())
+            .spawn_scoped(scope, || drive::drive(Local::new(), plan, observer, true));
+        match thread {
+            Ok(thread) => thread.join().map_err(|payload| RankFailure::from_panic(Rank(0), payload)),
+            Err(error) => Err(RankFailure::NotStarted { rank: Rank(0), reason: error.to_string() }),
+        }
+    });
+    vec![end]
+}
+
+/// What all ranks together have to say. Most errors reach several ranks; the one nearest to the cause is told.
+fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
+    let steps = plan.config.run.steps;
+    let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(0);
+    let (mut summary, mut errors) = (None, Vec::new());
+    for end in ends {
+        match end.map(|end| end.result) {
+            Ok(Ok(None)) => {}
+            Ok(Ok(Some(made))) => summary = Some(made),
+            Ok(Err(error)) => errors.push(told(error, complete, steps)),
+            Err(failure) => {
+                let (rank, reason) = (failure.rank(), failure.to_string());
+                errors.push(RunError::PeerLost { rank, complete, steps, reason });
+            }
+        }
+    }
+    // Stable: among equals, the lowest rank's.
+    errors.sort_by_key(|error| match error {
+        RunError::NonFinite { .. } | RunError::Protocol { .. } | RunError::Setup(_) | RunError::Threads { .. } => 0,
+        // A rank that says itself how it ended, before those that merely miss it.
+        RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
+        _ => 2,
+    });
+    match (errors.into_iter().next(), summary) {
+        (Some(error), _) => Err(error),
+        (None, Some(summary)) => Ok(*summary),
+        (None, None) => unreachable!("a run without errors has a summary from rank 0"),
+    }
+}
+
+/// A rank's error as the program tells it.
+fn told(error: RankError, complete: u64, steps: u64) -> RunError {
+    let transport = |error: TransportError| match error {
+        TransportError::PeerLost { rank, reason } => RunError::PeerLost { rank, complete, steps, reason },
+        TransportError::Timeout { rank, waited } => {
+            let reason = format!("no answer for {waited:.1?}; if it is only slow, raise run.peer_timeout");
+            RunError::PeerLost { rank, complete, steps, reason }
+        }
+        TransportError::Usage { message } => RunError::Transport { complete, steps, reason: message },
+    };
+    match error {
+        RankError::Setup(error) => RunError::Setup(error),
+        RankError::Threads { rank, threads, reason } => RunError::Threads { rank, threads, reason },
+        RankError::Transport(error) => transport(error),
+        RankError::Step(StepError::NonFinite { step, id }) => RunError::NonFinite { step, id },
+        RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
+        RankError::Step(StepError::Halo(ExchangeError::Transport(error))) => transport(error),
+        RankError::Step(StepError::Halo(error @ ExchangeError::Frame { from, .. })) => {
+            RunError::PeerLost { rank: from, complete, steps, reason: error.to_string() }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use atoll_core::GlobalId;
+
+    fn plan() -> Plan {
+        let text = "[scene]\nkind = \"rooms\"\nbodies = 100\n[run]\nranks = 3\nsteps = 9\n";
+        Plan::new(&Config::from_toml_str("test", text, &[]).unwrap()).unwrap()
+    }
+
+    fn failed(complete: u64, error: RankError) -> Result<RankEnd, RankFailure> {
+        Ok(RankEnd { complete, result: Err(error) })
+    }
+
+    fn lost(rank: u32) -> RankError {
+        let error = TransportError::PeerLost { rank: Rank(rank), reason: "it panicked".to_owned() };
+        RankError::Step(StepError::Halo(ExchangeError::Transport(error)))
+    }
+
+    #[test]
+    fn a_lost_rank_is_named_with_its_own_words_and_the_last_complete_step() {
+        let panicked = RankFailure::Panicked { rank: Rank(1), message: "boom".to_owned() };
+        let error = outcome(&plan(), vec![failed(4, lost(1)), Err(panicked), failed(3, lost(1))]).unwrap_err();
+        assert_eq!(error.to_string(), "rank 1 was lost after 3 of 9 steps: rank 1 panicked: boom");
+        assert_eq!(error.exit() as u8, 3);
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_is_told_once() {
+        let error = || RankError::Step(StepError::NonFinite { step: 5, id: GlobalId(77) });
+        let told = outcome(&plan(), vec![failed(6, error()), failed(6, error()), failed(5, lost(0))]).unwrap_err();
+        assert!(told.to_string().starts_with("step 5: the state of body 77 is no longer finite"), "{told}");
+        assert_eq!(told.exit() as u8, 4);
+    }
+}

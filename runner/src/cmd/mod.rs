@@ -1,0 +1,41 @@
+//! The verbs of the program, one file each.
+
+pub mod run;
+
+use crate::args::{self, Cli, Command};
+use crate::error::Exit;
+use crate::telemetry;
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::process::ExitCode;
+
+/// Reads the command line and does what it says.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let result = telemetry::init().and_then(|()| match &cli.command {
+        Command::Run(args) => run::run(args),
+    });
+    let exit = result.unwrap_or_else(|error| {
+        eprintln!("atoll: {error}");
+        error.exit()
+    });
+    ExitCode::from(exit as u8)
+}
+
+/// Help and version as they are; complaints on one line.
+fn usage(error: &clap::Error) -> ExitCode {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            // Nobody may be reading; that is no failure.
+            let _ = error.print();
+            ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Done } as u8)
+        }
+        _ => {
+            eprintln!("atoll: {}", args::one_line(error));
+            ExitCode::from(Exit::Usage as u8)
+        }
+    }
+}

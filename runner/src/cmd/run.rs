@@ -1,0 +1,49 @@
+//! `atoll run`: a scene from start to end.
+
+use crate::args::RunArgs;
+use crate::backend;
+use crate::config::Config;
+use crate::drive::Observer;
+use crate::error::{Exit, RunError};
+use crate::interrupt::StopFlag;
+use crate::output::JsonFile;
+use crate::plan::Plan;
+use crate::progress::Show;
+use std::io::{self, ErrorKind, Write};
+use std::path::PathBuf;
+use tracing::warn;
+
+/// Does it, with everything that can be refused refused before anything heavy starts.
+///
+/// # Errors
+/// Whatever ended it without a summary, or with one that fails a check or cannot be written.
+pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
+    let config = Config::load(&args.config, &args.overrides()?)?;
+    let json = args.json.as_deref().map(JsonFile::check).transpose()?;
+    let stop = StopFlag::on_signals().unwrap_or_else(|error| {
+        warn!("interrupts will end the run without a summary: {error}");
+        StopFlag::default()
+    });
+    let plan = Plan::new(&config)?;
+    for note in plan.notes() {
+        eprintln!("atoll: {note}");
+    }
+
+    let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
+    let summary = backend::run(&plan, &Observer { show, stop })?;
+    if let Err(error) = write!(io::stdout(), "{summary}") {
+        // A reader that has seen enough, as in `atoll run ... | head`, is not a failure.
+        if error.kind() != ErrorKind::BrokenPipe {
+            return Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() });
+        }
+    }
+    if let Some(json) = json {
+        json.write(&summary)?;
+    }
+
+    if summary.bodies_lost != 0 {
+        let found = summary.bodies.wrapping_add_signed(-summary.bodies_lost);
+        return Err(RunError::BodiesLost { expected: summary.bodies, found });
+    }
+    Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
+}

@@ -1,0 +1,135 @@
+//! What can be wrong with a configuration: always one line that names the place, the value, and what is allowed.
+
+use std::fmt;
+use thiserror::Error;
+
+/// Where a value came from.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Origin {
+    /// A configuration file, by the name it was given under.
+    File(String),
+    /// `--set`.
+    Set,
+    /// An option of its own, such as `--bodies`.
+    Option(&'static str),
+    /// Nobody gave it.
+    Default,
+}
+
+/// A value and where it came from, as a person would point at it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Place {
+    /// Where from.
+    pub origin: Origin,
+    /// Full path of the key, or what was written in its place.
+    pub key: String,
+    /// The value as it was written.
+    pub value: String,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { origin, key, value } = self;
+        match origin {
+            Origin::File(file) => write!(f, "{file}: {key} = {value}"),
+            Origin::Set => write!(f, "--set {key}={value}"),
+            Origin::Option(option) => write!(f, "{option} {value}"),
+            Origin::Default => write!(f, "{key} = {value} (the default)"),
+        }
+    }
+}
+
+/// A configuration that cannot be used.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{file}: cannot read this configuration: {reason}")]
+    Read {
+        /// Its path.
+        file: String,
+        /// What the system said.
+        reason: String,
+    },
+    /// The file is not TOML.
+    #[error("{file}, line {line}: {message}")]
+    Syntax {
+        /// Its path.
+        file: String,
+        /// Counted from 1.
+        line: usize,
+        /// What the parser said.
+        message: String,
+    },
+    /// There is no such key.
+    #[error("{place}: unknown key{}", did_you_mean(.suggestion))]
+    UnknownKey {
+        /// The key in question.
+        place: Place,
+        /// The nearest key that exists, if any is near.
+        suggestion: Option<String>,
+    },
+    /// There is no such section.
+    #[error("{file}: unknown section [{section}]{}", did_you_mean(.suggestion))]
+    UnknownSection {
+        /// The file.
+        file: String,
+        /// What it called the section.
+        section: String,
+        /// The nearest section that exists, if any is near.
+        suggestion: Option<String>,
+    },
+    /// The last part of more than one key.
+    #[error("{place}: ambiguous, write one of {}", .candidates.join(", "))]
+    AmbiguousKey {
+        /// The key in question.
+        place: Place,
+        /// All that it may mean.
+        candidates: Vec<String>,
+    },
+    /// A `--set` without an equals sign.
+    #[error("--set {text}: write key=value, such as --set physics.substeps=8")]
+    NotAnAssignment {
+        /// What was written.
+        text: String,
+    },
+    /// A key that must be there is not.
+    #[error("{file}: {key} is missing: must be {must}")]
+    Missing {
+        /// The file.
+        file: String,
+        /// The key.
+        key: &'static str,
+        /// What it may be.
+        must: String,
+    },
+    /// A value of the wrong type or out of range.
+    #[error("{place}: must be {must}{}", did_you_mean(.suggestion))]
+    BadValue {
+        /// The value.
+        place: Place,
+        /// What it may be.
+        must: String,
+        /// The nearest allowed word, if any is near.
+        suggestion: Option<String>,
+    },
+    /// A value that a later version brings.
+    #[error("{place}: not built into this version yet; use {instead}")]
+    NotYet {
+        /// The value.
+        place: Place,
+        /// What works today.
+        instead: String,
+    },
+    /// A key that means nothing beside another value.
+    #[error("{place}: {reason}")]
+    Inapplicable {
+        /// The value.
+        place: Place,
+        /// Why it means nothing, and what to do.
+        reason: String,
+    },
+}
+
+fn did_you_mean(suggestion: &Option<String>) -> String {
+    suggestion.as_ref().map(|word| format!("; did you mean {word}?")).unwrap_or_default()
+}

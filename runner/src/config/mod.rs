@@ -1,0 +1,323 @@
+//! What to run: the scene, the physics, and how to spread it. Read from TOML, with the command line winning over it.
+//!
+//! To add a key, name it in `keys.rs` and read it in [`Config::read`]; anything not named there is refused.
+
+mod error;
+mod keys;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+pub use error::{ConfigError, Origin, Place};
+pub use settings::Override;
+
+use crate::scene::rooms;
+use atoll_core::{BroadPhase, Exchange, Params, SetupError, Solver};
+use glam::Vec2;
+use settings::{Settings, one_of};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::Duration;
+
+/// More bodies than this are taken for a slip of the finger.
+const MOST_BODIES: u64 = 10_000_000_000;
+/// More tiles along an axis cannot be named in 32 bits for both.
+const MOST_TILES: u32 = 65_535;
+
+/// Everything a run depends on.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Config {
+    /// What there is at the start.
+    pub scene: SceneConfig,
+    /// How long, and on what.
+    pub run: RunConfig,
+    /// The numbers of a step.
+    pub params: Params,
+    /// How a tile's own work is shared among threads.
+    pub parallel: Parallel,
+}
+
+/// `[scene]`
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SceneConfig {
+    /// Which scene.
+    pub kind: SceneKind,
+    /// How many dynamic bodies.
+    pub bodies: u64,
+    /// Chooses among the random variants of the scene.
+    pub seed: u64,
+}
+
+/// A scene and what only it has.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum SceneKind {
+    /// The reported experiment.
+    Rooms {
+        /// Relative coordinates are raised to this power: above 1, the low corner is denser.
+        power: f64,
+    },
+    /// A heap between two walls.
+    Pile {
+        /// Greatest shift of a body along x at the start, in meters.
+        jitter: f64,
+    },
+}
+
+impl SceneKind {
+    /// As in a configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rooms { .. } => "rooms",
+            Self::Pile { .. } => "pile",
+        }
+    }
+}
+
+/// `[run]`
+#[derive(Clone, PartialEq, Debug)]
+pub struct RunConfig {
+    /// How many steps.
+    pub steps: u64,
+    /// How many ranks share the tiles.
+    pub ranks: usize,
+    /// Threads of each rank.
+    pub threads: usize,
+    /// What carries bytes between ranks; `None` chooses by their number.
+    pub transport: Option<TransportKind>,
+    /// Columns and rows of tiles; `None` chooses by scene and physics, never by ranks or threads.
+    pub tiles: Option<[u32; 2]>,
+    /// A rank that stays silent for so long is given up.
+    pub peer_timeout: Duration,
+}
+
+/// What carries bytes between ranks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TransportKind {
+    /// One rank, alone.
+    Local,
+    /// Ranks are threads of this process.
+    Channel,
+}
+
+impl TransportKind {
+    /// As in a configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Channel => "channel",
+        }
+    }
+}
+
+/// How the work of one tile is shared among threads. Tiles themselves always are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Parallel {
+    /// Not at all.
+    Serial,
+    /// As the state of the tile suggests; in this version, not at all.
+    Auto,
+}
+
+impl Config {
+    /// Reads a configuration file.
+    pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ConfigError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| ConfigError::Read { file: file.clone(), reason: error.to_string() })?;
+        Self::read(&file, &text, overrides)
+    }
+
+    /// Reads a configuration from text. `name` stands for it in errors; `overrides` are keys and values as after
+    /// `--set`.
+    ///
+    /// ```
+    /// let text = "[scene]\nkind = \"rooms\"\nbodies = 1000\n";
+    /// let config = atoll::Config::from_toml_str("example", text, &[("ranks", "2"), ("steps", "10")])?;
+    /// assert_eq!((config.run.ranks, config.run.steps), (2, 10));
+    /// # Ok::<(), atoll::config::ConfigError>(())
+    /// ```
+    pub fn from_toml_str(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Self, ConfigError> {
+        let overrides: Vec<Override> = overrides.iter().map(|(key, value)| Override::set(key, value)).collect();
+        Self::read(name, text, &overrides)
+    }
+
+    /// The keys in the order of the documentation.
+    fn read(name: &str, text: &str, overrides: &[Override]) -> Result<Self, ConfigError> {
+        let mut settings = Settings::new(name, text, overrides)?;
+        let scene = read_scene(&mut settings)?;
+        let run = read_run(&mut settings)?;
+        let params = read_params(&mut settings, scene.kind)?;
+        let parallel = read_parallel(&mut settings)?;
+        settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
+        Ok(Self { scene, run, params, parallel })
+    }
+
+    /// The transport that was chosen, or the one that suits the number of ranks.
+    pub fn transport(&self) -> TransportKind {
+        let suitable = if self.run.ranks == 1 { TransportKind::Local } else { TransportKind::Channel };
+        self.run.transport.unwrap_or(suitable)
+    }
+
+    /// Everything that the result depends on, in a fixed order: not ranks, threads or transport. `tiles` is the grid
+    /// that is really used.
+    pub fn canonical(&self, tiles: [u32; 2]) -> String {
+        let SceneConfig { kind, bodies, seed } = self.scene;
+        // By name, so that a parameter added later cannot be forgotten here.
+        let Params {
+            dt,
+            substeps,
+            gravity,
+            linear_damping,
+            angular_damping,
+            max_linear_speed,
+            max_angular_speed,
+            contact_hertz,
+            contact_damping_ratio,
+            push_out_speed,
+            linear_slop,
+            speculative_distance,
+            recycle_distance,
+            restitution_threshold,
+            margin_floor,
+            margin_cap,
+            sort_interval,
+            exchange,
+            broad_phase,
+            solver,
+        } = &self.params;
+        let mut text = String::new();
+        macro_rules! line {
+            ($($name:ident = $value:expr),* $(,)?) => {
+                $(writeln!(text, "{} = {:?}", stringify!($name), $value).expect("a string takes any text");)*
+            };
+        }
+        line!(kind = kind, bodies = bodies, seed = seed, steps = self.run.steps, tiles = tiles);
+        line!(dt = dt, substeps = substeps, gravity = gravity.to_array());
+        line!(linear_damping = linear_damping, angular_damping = angular_damping);
+        line!(max_linear_speed = max_linear_speed, max_angular_speed = max_angular_speed);
+        line!(contact_hertz = contact_hertz, contact_damping_ratio = contact_damping_ratio);
+        line!(push_out_speed = push_out_speed, linear_slop = linear_slop);
+        line!(speculative_distance = speculative_distance, recycle_distance = recycle_distance);
+        line!(restitution_threshold = restitution_threshold);
+        line!(margin_floor = margin_floor, margin_cap = margin_cap, sort_interval = sort_interval);
+        line!(exchange = exchange, broad_phase = broad_phase, solver = solver, parallel = self.parallel);
+        text
+    }
+
+    /// A fingerprint of [`canonical`](Self::canonical): 32 hexadecimal digits, the same for runs that must agree.
+    pub fn hash(&self, tiles: [u32; 2]) -> String {
+        format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
+    }
+}
+
+fn read_scene(settings: &mut Settings) -> Result<SceneConfig, ConfigError> {
+    #[derive(Clone, Copy)]
+    enum Name {
+        Rooms,
+        Pile,
+    }
+    let names = [("rooms", Some(Name::Rooms)), ("pile", Some(Name::Pile))];
+    let name = settings.choice("scene.kind", &names)?.ok_or_else(|| settings.missing("scene.kind", one_of(&names)))?;
+    let (kind, least, usual) = match name {
+        Name::Rooms => {
+            let power = settings.number("scene.power", 0.1..=10.0, 1.0)?;
+            (SceneKind::Rooms { power }, rooms::LEAST_BODIES, 700_000)
+        }
+        Name::Pile => {
+            let jitter = settings.number("scene.jitter", 0.0..=0.25, 0.01)?;
+            (SceneKind::Pile { jitter }, 1, 100_000)
+        }
+    };
+    let bodies = settings.integer("scene.bodies", least..=MOST_BODIES, usual)?;
+    let seed = settings.integer("scene.seed", 0..=i64::MAX as u64, 1)?;
+    Ok(SceneConfig { kind, bodies, seed })
+}
+
+fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
+    let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
+    let ranks = settings.integer("run.ranks", 1..=4096, 1)? as usize;
+    let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
+    let transports = [
+        ("local", Some(TransportKind::Local)),
+        ("channel", Some(TransportKind::Channel)),
+        ("iceoryx2", None),
+        ("mpi", None),
+    ];
+    let transport = settings.choice("run.transport", &transports)?;
+    if transport == Some(TransportKind::Local) && ranks > 1 {
+        let place = settings.place("run.transport").expect("it was given").clone();
+        let reason = format!("one rank at most, and this run has {ranks}; use transport channel, or ranks 1");
+        return Err(ConfigError::Inapplicable { place, reason });
+    }
+    let tiles = settings.tiles("run.tiles", MOST_TILES)?;
+    let peer_timeout = Duration::from_secs_f64(settings.number("run.peer_timeout", 0.001..=1e6, 60.0)?);
+    Ok(RunConfig { steps, ranks, threads, transport, tiles, peer_timeout })
+}
+
+fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, ConfigError> {
+    let usual = match scene {
+        SceneKind::Rooms { .. } => Params::default(),
+        // Whatever rests needs its borders to converge.
+        SceneKind::Pile { .. } => {
+            Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() }
+        }
+    };
+    let whole = 0..=u64::from(u32::MAX);
+    let params = Params {
+        dt: 1.0 / settings.float("physics.hertz", 60.0)?,
+        substeps: settings.integer("physics.substeps", whole.clone(), usual.substeps.into())? as u32,
+        gravity: settings.pair("physics.gravity", usual.gravity.to_array())?.into(),
+        linear_damping: settings.float("physics.linear_damping", usual.linear_damping)?,
+        angular_damping: settings.float("physics.angular_damping", usual.angular_damping)?,
+        max_linear_speed: settings.float("physics.max_linear_speed", usual.max_linear_speed)?,
+        max_angular_speed: settings.float("physics.max_angular_speed", usual.max_angular_speed)?,
+        contact_hertz: settings.float("physics.contact_hertz", usual.contact_hertz)?,
+        contact_damping_ratio: settings.float("physics.contact_damping_ratio", usual.contact_damping_ratio)?,
+        push_out_speed: settings.float("physics.push_out_speed", usual.push_out_speed)?,
+        linear_slop: settings.float("physics.linear_slop", usual.linear_slop)?,
+        speculative_distance: settings.float("physics.speculative_distance", usual.speculative_distance)?,
+        recycle_distance: settings.float("physics.recycle_distance", usual.recycle_distance)?,
+        restitution_threshold: settings.float("physics.restitution_threshold", usual.restitution_threshold)?,
+        margin_floor: settings.float("physics.margin_floor", usual.margin_floor)?,
+        margin_cap: settings.float("physics.margin_cap", usual.margin_cap)?,
+        sort_interval: settings.integer("physics.sort_interval", whole, usual.sort_interval.into())? as u32,
+        exchange: settings
+            .choice("physics.exchange", &[("step", Some(Exchange::Step)), ("substep", Some(Exchange::Substep))])?
+            .unwrap_or(usual.exchange),
+        broad_phase: settings
+            .choice("physics.broad_phase", &[("grid", Some(BroadPhase::Grid)), ("quadtree", None)])?
+            .unwrap_or(usual.broad_phase),
+        solver: settings
+            .choice("physics.solver", &[("soft-step", Some(Solver::SoftStep)), ("pgs", None)])?
+            .unwrap_or(usual.solver),
+    };
+    settings.choice("physics.ghosts", &[("dynamic", Some(())), ("frozen", None)])?;
+    if settings.flag("physics.sleep", false)? {
+        let place = settings.place("physics.sleep").expect("it was given").clone();
+        return Err(ConfigError::NotYet { place, instead: "false".to_owned() });
+    }
+    params.check().map_err(|error| refused_param(settings, error))?;
+    Ok(params)
+}
+
+fn read_parallel(settings: &mut Settings) -> Result<Parallel, ConfigError> {
+    let words =
+        [("serial", Some(Parallel::Serial)), ("auto", Some(Parallel::Auto)), ("islands", None), ("coloring", None)];
+    Ok(settings.choice("physics.parallel", &words)?.unwrap_or(Parallel::Auto))
+}
+
+/// The core's refusal of a parameter, in terms of the key that gave it.
+fn refused_param(settings: &Settings, error: SetupError) -> ConfigError {
+    let (name, value, must) = match error {
+        SetupError::BadParam { name: "dt", value, must } => ("hertz", 1.0 / value, must),
+        SetupError::BadParam { name, value, must } => (name, value, must),
+        other => unreachable!("parameters are refused as parameters, not with: {other}"),
+    };
+    let key = format!("physics.{name}");
+    if settings.place(&key).is_some() {
+        return settings.refusal(&key, must);
+    }
+    // A default that does not suit something else that was given.
+    let place = Place { origin: Origin::Default, key, value: value.to_string() };
+    ConfigError::BadValue { place, must: must.to_owned(), suggestion: None }
+}

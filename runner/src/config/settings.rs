@@ -1,0 +1,257 @@
+//! What a file and the command line say, key by key, and reading it with types and ranges.
+
+use super::error::{ConfigError, Origin, Place};
+use super::keys::{self, KEYS, SECTIONS};
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use toml::{Table, Value};
+
+/// A value for a key from the command line. It wins over the file, and a later one over an earlier one.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Override {
+    origin: Origin,
+    key: String,
+    value: String,
+}
+
+impl Override {
+    /// From `--set`, already taken apart: the full path of a key or an unambiguous last part, and a TOML value, in
+    /// which strings may go without quotes.
+    pub fn set(key: &str, value: &str) -> Self {
+        Self { origin: Origin::Set, key: key.trim().to_owned(), value: value.trim().to_owned() }
+    }
+
+    /// From the text after `--set`.
+    pub fn parse(text: &str) -> Result<Self, ConfigError> {
+        let (key, value) =
+            text.split_once('=').ok_or_else(|| ConfigError::NotAnAssignment { text: text.to_owned() })?;
+        Ok(Self::set(key, value))
+    }
+
+    /// From an option of its own, which errors will name.
+    pub fn option(option: &'static str, key: &'static str, value: &str) -> Self {
+        Self { origin: Origin::Option(option), key: key.to_owned(), value: value.to_owned() }
+    }
+}
+
+/// One value and where it came from.
+struct Given {
+    value: Value,
+    place: Place,
+    read: bool,
+}
+
+/// Everything that was given.
+pub(super) struct Settings {
+    file: String,
+    given: BTreeMap<&'static str, Given>,
+}
+
+impl Settings {
+    pub(super) fn new(file: &str, text: &str, overrides: &[Override]) -> Result<Self, ConfigError> {
+        let table: Table = text.parse().map_err(|error| syntax_error(file, text, &error))?;
+        let mut settings = Self { file: file.to_owned(), given: BTreeMap::new() };
+        for (section, content) in table {
+            settings.add_section(&section, content)?;
+        }
+        for one in overrides {
+            let key = keys::resolve(KEYS, &one.key, &one.value, one.origin.clone())?;
+            // What is no TOML value is a string without its quotes.
+            let value = one.value.parse().unwrap_or_else(|_| Value::String(one.value.clone()));
+            settings.insert(key, value, one.value.clone(), one.origin.clone());
+        }
+        Ok(settings)
+    }
+
+    fn add_section(&mut self, section: &str, content: Value) -> Result<(), ConfigError> {
+        let file = self.file.clone();
+        let unknown = |key: String, value: &Value| {
+            let suggestion = keys::nearest_key(KEYS, &key);
+            let place = Place { origin: Origin::File(file.clone()), key, value: one_line(value) };
+            ConfigError::UnknownKey { place, suggestion }
+        };
+        let Value::Table(content) = content else { return Err(unknown(section.to_owned(), &content)) };
+        if !SECTIONS.contains(&section) {
+            let suggestion = keys::nearest(SECTIONS.iter().copied(), section).map(|word| format!("[{word}]"));
+            return Err(ConfigError::UnknownSection {
+                file: self.file.clone(),
+                section: section.to_owned(),
+                suggestion,
+            });
+        }
+        for (name, value) in content {
+            let path = format!("{section}.{name}");
+            let key = KEYS.iter().find(|&&key| key == path).ok_or_else(|| unknown(path, &value))?;
+            let written = one_line(&value);
+            self.insert(key, value, written, Origin::File(self.file.clone()));
+        }
+        Ok(())
+    }
+
+    fn insert(&mut self, key: &'static str, value: Value, written: String, origin: Origin) {
+        let place = Place { origin, key: key.to_owned(), value: written };
+        self.given.insert(key, Given { value, place, read: false });
+    }
+
+    /// Refuses whatever was given and never read.
+    pub(super) fn finish(self, reason: impl Fn(&str) -> String) -> Result<(), ConfigError> {
+        match self.given.into_iter().find(|(_, given)| !given.read) {
+            Some((key, given)) => Err(ConfigError::Inapplicable { place: given.place, reason: reason(key) }),
+            None => Ok(()),
+        }
+    }
+
+    /// Where a key was given.
+    pub(super) fn place(&self, key: &str) -> Option<&Place> {
+        self.given.get(key).map(|given| &given.place)
+    }
+
+    /// That the value of `key`, which was given, must be something else.
+    pub(super) fn refusal(&self, key: &str, must: impl Display) -> ConfigError {
+        let place = self.place(key).expect("only values that were given are refused").clone();
+        ConfigError::BadValue { place, must: must.to_string(), suggestion: None }
+    }
+
+    pub(super) fn missing(&self, key: &'static str, must: String) -> ConfigError {
+        ConfigError::Missing { file: self.file.clone(), key, must }
+    }
+
+    fn get<T>(
+        &mut self,
+        key: &'static str,
+        must: impl Display,
+        convert: impl FnOnce(&Value) -> Option<T>,
+    ) -> Result<Option<T>, ConfigError> {
+        debug_assert!(KEYS.contains(&key), "{key} is not in the list of keys");
+        let Some(given) = self.given.get_mut(key) else { return Ok(None) };
+        given.read = true;
+        convert(&given.value).map(Some).ok_or_else(|| self.refusal(key, must))
+    }
+
+    /// A whole number; `1e6` counts as one.
+    pub(super) fn integer(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<u64>,
+        default: u64,
+    ) -> Result<u64, ConfigError> {
+        let must = format!("a whole number within {} to {}", range.start(), range.end());
+        let whole = |value: &Value| value_as_u64(value).filter(|number| range.contains(number));
+        Ok(self.get(key, must, whole)?.unwrap_or(default))
+    }
+
+    /// A number within bounds.
+    pub(super) fn number(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+        default: f64,
+    ) -> Result<f64, ConfigError> {
+        let must = format!("a number within {} to {}", range.start(), range.end());
+        let within = |value: &Value| value_as_f64(value).filter(|number| range.contains(number));
+        Ok(self.get(key, must, within)?.unwrap_or(default))
+    }
+
+    /// A number whose bounds are checked where it is used.
+    pub(super) fn float(&mut self, key: &'static str, default: f32) -> Result<f32, ConfigError> {
+        Ok(self.get(key, "a number of at most 3.4e38", value_as_f32)?.unwrap_or(default))
+    }
+
+    /// Two numbers, `[x, y]`.
+    pub(super) fn pair(&mut self, key: &'static str, default: [f32; 2]) -> Result<[f32; 2], ConfigError> {
+        let pair = |value: &Value| match value.as_array()?.as_slice() {
+            [x, y] => Some([value_as_f32(x)?, value_as_f32(y)?]),
+            _ => None,
+        };
+        Ok(self.get(key, "two numbers, such as [0, -10]", pair)?.unwrap_or(default))
+    }
+
+    /// `"auto"`, `[columns, rows]` or `"COLUMNSxROWS"`; `None` stands for auto.
+    pub(super) fn tiles(&mut self, key: &'static str, most: u32) -> Result<Option<[u32; 2]>, ConfigError> {
+        let count = |number: u64| u32::try_from(number).ok().filter(|number| (1..=most).contains(number));
+        let tiles = |value: &Value| match value {
+            Value::String(text) if text == "auto" => Some(None),
+            Value::String(text) => {
+                let (columns, rows) = text.split_once(['x', 'X'])?;
+                Some(Some([count(columns.parse().ok()?)?, count(rows.parse().ok()?)?]))
+            }
+            Value::Array(pair) => match pair.as_slice() {
+                [columns, rows] => Some(Some([count(value_as_u64(columns)?)?, count(value_as_u64(rows)?)?])),
+                _ => None,
+            },
+            _ => None,
+        };
+        let must = format!("\"auto\", or columns and rows as [17, 17] or \"17x17\", each within 1 to {most}");
+        Ok(self.get(key, must, tiles)?.flatten())
+    }
+
+    /// Yes or no.
+    pub(super) fn flag(&mut self, key: &'static str, default: bool) -> Result<bool, ConfigError> {
+        Ok(self.get(key, "true or false", Value::as_bool)?.unwrap_or(default))
+    }
+
+    /// One of some words. `None` behind a word says that a later version brings it.
+    pub(super) fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        words: &[(&str, Option<T>)],
+    ) -> Result<Option<T>, ConfigError> {
+        let must = one_of(words);
+        let Some(text) = self.get(key, &must, |value| value.as_str().map(str::to_owned))? else { return Ok(None) };
+        let place = || self.given[key].place.clone();
+        match words.iter().find(|(word, _)| *word == text) {
+            Some((_, Some(value))) => Ok(Some(*value)),
+            Some((_, None)) => Err(ConfigError::NotYet { place: place(), instead: must }),
+            None => {
+                let available = words.iter().filter(|(_, value)| value.is_some()).map(|(word, _)| *word);
+                Err(ConfigError::BadValue { place: place(), must, suggestion: keys::nearest(available, &text) })
+            }
+        }
+    }
+}
+
+/// The words that work today.
+pub(super) fn one_of<T>(words: &[(&str, Option<T>)]) -> String {
+    let words: Vec<String> =
+        words.iter().filter(|(_, value)| value.is_some()).map(|(word, _)| format!("\"{word}\"")).collect();
+    words.join(" or ")
+}
+
+fn value_as_u64(value: &Value) -> Option<u64> {
+    match *value {
+        Value::Integer(number) => u64::try_from(number).ok(),
+        // 2^53: up to there every whole number has a float of its own.
+        Value::Float(number) if number.fract() == 0.0 && (0.0..=9_007_199_254_740_992.0).contains(&number) => {
+            Some(number as u64)
+        }
+        _ => None,
+    }
+}
+
+fn value_as_f64(value: &Value) -> Option<f64> {
+    match *value {
+        Value::Integer(number) => Some(number as f64),
+        Value::Float(number) => Some(number),
+        _ => None,
+    }
+}
+
+fn value_as_f32(value: &Value) -> Option<f32> {
+    let wide = value_as_f64(value)?;
+    let narrow = wide as f32;
+    (!(wide.is_finite() && narrow.is_infinite())).then_some(narrow)
+}
+
+/// A value as TOML would write it, on one line.
+fn one_line(value: &Value) -> String {
+    let text: Vec<String> = value.to_string().lines().map(|line| line.trim().to_owned()).collect();
+    text.join(" ")
+}
+
+fn syntax_error(file: &str, text: &str, error: &toml::de::Error) -> ConfigError {
+    let start = error.span().map_or(0, |span| span.start.min(text.len()));
+    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let message = error.message().lines().collect::<Vec<_>>().join(", ");
+    ConfigError::Syntax { file: file.to_owned(), line, message }
+}

@@ -1,0 +1,212 @@
+//! What is accepted, and what is said about everything else.
+
+use super::*;
+
+const ROOMS: &str = "[scene]\nkind = \"rooms\"\n";
+
+fn read(text: &str, overrides: &[(&str, &str)]) -> Result<Config, String> {
+    Config::from_toml_str("test.toml", text, overrides).map_err(|error| {
+        let line = error.to_string();
+        assert!(!line.contains('\n'), "more than one line: {line}");
+        line
+    })
+}
+
+/// With one more key in the file.
+fn with(section: &str, line: &str) -> Result<Config, String> {
+    let text = if section == "scene" { format!("{ROOMS}{line}\n") } else { format!("{ROOMS}[{section}]\n{line}\n") };
+    read(&text, &[])
+}
+
+#[test]
+fn the_kind_of_scene_chooses_the_defaults() {
+    let rooms = read(ROOMS, &[]).unwrap();
+    assert_eq!(rooms.params, Params::default());
+    assert_eq!((rooms.scene.bodies, rooms.scene.seed), (700_000, 1));
+    assert_eq!((rooms.run.steps, rooms.run.ranks, rooms.run.threads, rooms.run.tiles), (600, 1, 1, None));
+    assert_eq!(rooms.transport(), TransportKind::Local);
+
+    let pile = read("[scene]\nkind = \"pile\"", &[]).unwrap();
+    assert_eq!((pile.params.gravity, pile.params.exchange), (Vec2::new(0.0, -10.0), Exchange::Substep));
+    let pile = read("[scene]\nkind = \"pile\"", &[("exchange", "step"), ("gravity", "[1, 2.5]")]).unwrap();
+    assert_eq!((pile.params.gravity, pile.params.exchange), (Vec2::new(1.0, 2.5), Exchange::Step));
+}
+
+#[test]
+fn every_key_can_be_given() {
+    let text = r#"
+        scene = { kind = "rooms", bodies = 1_000, seed = 5, power = 1.2 }
+        [run]
+        steps = 7
+        ranks = 2
+        threads = 3
+        transport = "channel"
+        tiles = [4, 5]
+        peer_timeout = 2.5
+        [physics]
+        hertz = 120
+        substeps = 2
+        gravity = [0, -9.81]
+        linear_damping = 0.1
+        angular_damping = 0.2
+        max_linear_speed = inf
+        max_angular_speed = 100
+        contact_hertz = 20
+        contact_damping_ratio = 5
+        push_out_speed = 2
+        linear_slop = 0.01
+        speculative_distance = 0.03
+        recycle_distance = 0
+        restitution_threshold = 2
+        margin_floor = 0.1
+        margin_cap = 0.4
+        sort_interval = 16
+        broad_phase = "grid"
+        solver = "soft-step"
+        parallel = "serial"
+        exchange = "substep"
+        ghosts = "dynamic"
+        sleep = false
+    "#;
+    let config = read(text, &[]).unwrap();
+    assert_eq!(config.scene, SceneConfig { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
+    assert_eq!((config.run.steps, config.run.ranks, config.run.threads), (7, 2, 3));
+    assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
+    assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
+    assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
+    assert_eq!((config.params.max_linear_speed, config.params.margin_cap), (f32::INFINITY, 0.4));
+    assert_eq!((config.params.sort_interval, config.parallel), (16, Parallel::Serial));
+
+    let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
+    // The scene's four stand on one line, and the jitter belongs to the other kind.
+    assert_eq!(keys + 4 + 1, keys::KEYS.len(), "a key is missing from this test");
+}
+
+#[test]
+fn overrides_win_and_the_last_of_them_most() {
+    let config = read(ROOMS, &[("scene.bodies", "1e3"), ("bodies", "2000"), ("tiles", "3x2")]).unwrap();
+    assert_eq!((config.scene.bodies, config.run.tiles), (2000, Some([3, 2])));
+    let config = read(ROOMS, &[("tiles", "3x2"), ("run.tiles", "auto"), ("kind", "pile")]).unwrap();
+    assert_eq!((config.run.tiles, config.scene.kind.name()), (None, "pile"));
+    assert_eq!(read(ROOMS, &[("kind", "\"pile\"")]).unwrap().scene.kind.name(), "pile");
+    assert_eq!(read(ROOMS, &[("ranks", "3")]).unwrap().transport(), TransportKind::Channel);
+}
+
+#[test]
+fn out_of_range_and_of_the_wrong_type() {
+    for (section, line, expected) in [
+        ("scene", "bodies = 0", "test.toml: scene.bodies = 0: must be a whole number within 100 to 10000000000"),
+        ("scene", "bodies = -5", "test.toml: scene.bodies = -5: must be a whole number within 100"),
+        ("scene", "bodies = 99", "test.toml: scene.bodies = 99: must be a whole number within 100"),
+        ("scene", "bodies = 1000.5", "test.toml: scene.bodies = 1000.5: must be a whole number"),
+        ("scene", "bodies = nan", "test.toml: scene.bodies = nan: must be a whole number"),
+        ("scene", "bodies = \"many\"", "test.toml: scene.bodies = \"many\": must be a whole number"),
+        ("scene", "seed = -1", "test.toml: scene.seed = -1: must be a whole number within 0 to"),
+        ("scene", "power = nan", "test.toml: scene.power = nan: must be a number within 0.1 to 10"),
+        ("scene", "power = true", "test.toml: scene.power = true: must be a number"),
+        ("run", "steps = 0", "test.toml: run.steps = 0: must be a whole number within 1 to"),
+        ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 4096"),
+        ("run", "threads = 0", "test.toml: run.threads = 0: must be a whole number within 1 to 1024"),
+        ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", or columns and rows"),
+        ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
+        ("run", "tiles = \"3by2\"", "test.toml: run.tiles = \"3by2\": must be"),
+        ("run", "peer_timeout = 0", "test.toml: run.peer_timeout = 0: must be a number within 0.001 to"),
+        ("physics", "hertz = 0", "test.toml: physics.hertz = 0: must be positive and finite"),
+        ("physics", "hertz = -60", "test.toml: physics.hertz = -60: must be positive and finite"),
+        ("physics", "hertz = nan", "test.toml: physics.hertz = nan: must be positive and finite"),
+        ("physics", "hertz = inf", "test.toml: physics.hertz = inf: must be positive and finite"),
+        (
+            "physics",
+            "hertz = 1e39",
+            "test.toml: physics.hertz = 1000000000000000000000000000000000000000.0: must be a number of at most",
+        ),
+        ("physics", "substeps = 0", "test.toml: physics.substeps = 0: must be within 1 to 64"),
+        ("physics", "substeps = 65", "test.toml: physics.substeps = 65: must be within 1 to 64"),
+        ("physics", "gravity = -10", "test.toml: physics.gravity = -10: must be two numbers, such as [0, -10]"),
+        ("physics", "gravity = [0, nan]", "test.toml: physics.gravity = [0, nan]: must be finite"),
+        ("physics", "linear_slop = -1", "test.toml: physics.linear_slop = -1: must be at least 0 and finite"),
+        ("physics", "sleep = 1", "test.toml: physics.sleep = 1: must be true or false"),
+        (
+            "physics",
+            "margin_floor = 2",
+            "physics.margin_cap = 0.5 (the default): must be finite and at least margin_floor",
+        ),
+    ] {
+        let error = with(section, line).unwrap_err();
+        assert!(error.starts_with(expected), "{line}\n  says     {error}\n  expected {expected}");
+    }
+}
+
+#[test]
+fn unknown_names_come_with_a_suggestion() {
+    for (text, expected) in [
+        (
+            "[scene]\nkind = \"room\"",
+            "test.toml: scene.kind = \"room\": must be \"rooms\" or \"pile\"; did you mean rooms?",
+        ),
+        ("[scene]\nkind = \"sea\"", "test.toml: scene.kind = \"sea\": must be \"rooms\" or \"pile\""),
+        ("[scene]\nknid = \"rooms\"", "test.toml: scene.knid = \"rooms\": unknown key; did you mean scene.kind?"),
+        ("[sceen]\nkind = \"rooms\"", "test.toml: unknown section [sceen]; did you mean [scene]?"),
+        ("[run]\nsubsteps = 4", "test.toml: run.substeps = 4: unknown key; did you mean physics.substeps?"),
+        ("steps = 4", "test.toml: steps = 4: unknown key; did you mean run.steps?"),
+        ("", "test.toml: scene.kind is missing: must be \"rooms\" or \"pile\""),
+        ("[physics.more]\nx = 1\n[scene]\nkind = \"pile\"", "test.toml: physics.more = { x = 1 }: unknown key"),
+    ] {
+        let error = read(text, &[]).unwrap_err();
+        assert_eq!(error, expected, "{text}");
+    }
+    assert_eq!(
+        read(ROOMS, &[("sovler", "pgs")]).unwrap_err(),
+        "--set sovler=pgs: unknown key; did you mean physics.solver?"
+    );
+}
+
+#[test]
+fn what_a_later_version_brings_is_not_an_unknown_word() {
+    for (key, value, instead) in [
+        ("broad_phase", "quadtree", "\"grid\""),
+        ("solver", "pgs", "\"soft-step\""),
+        ("parallel", "coloring", "\"serial\" or \"auto\""),
+        ("parallel", "islands", "\"serial\" or \"auto\""),
+        ("ghosts", "frozen", "\"dynamic\""),
+        ("sleep", "true", "false"),
+        ("transport", "mpi", "\"local\" or \"channel\""),
+        ("transport", "iceoryx2", "\"local\" or \"channel\""),
+    ] {
+        let error = read(ROOMS, &[(key, value)]).unwrap_err();
+        assert!(error.ends_with(&format!("={value}: not built into this version yet; use {instead}")), "{error}");
+    }
+}
+
+#[test]
+fn keys_that_mean_nothing_here_are_refused() {
+    let error = read(ROOMS, &[("jitter", "0.02")]).unwrap_err();
+    assert_eq!(error, "--set scene.jitter=0.02: scenes of this kind have no scene.jitter; leave it out");
+    let error = read(ROOMS, &[("transport", "local"), ("ranks", "2")]).unwrap_err();
+    assert!(error.starts_with("--set run.transport=local: one rank at most, and this run has 2"), "{error}");
+}
+
+#[test]
+fn what_is_not_toml_is_told_with_its_line() {
+    let error = read("[scene]\nkind = \"rooms\"\nbodies = = 3\n", &[]).unwrap_err();
+    assert!(error.starts_with("test.toml, line 3: "), "{error}");
+    let error = read("[scene]\nkind = \"rooms\"\nkind = \"pile\"\n", &[]).unwrap_err();
+    assert!(error.starts_with("test.toml, line 3: "), "{error}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let error = Config::load(Path::new("no/such/file.toml"), &[]).unwrap_err().to_string();
+    assert!(error.starts_with("no/such/file.toml: cannot read this configuration: "), "{error}");
+}
+
+#[test]
+fn options_are_named_as_they_were_written() {
+    let overrides = [Override::option("--bodies", "scene.bodies", "-5")];
+    let error = Config::read("test.toml", ROOMS, &overrides).unwrap_err().to_string();
+    assert!(error.starts_with("--bodies -5: must be a whole number within 100"), "{error}");
+    assert_eq!(
+        Override::parse("solver").unwrap_err().to_string().split(';').next(),
+        Some("--set solver: write key=value, such as --set physics.substeps=8")
+    );
+}

@@ -1,0 +1,155 @@
+//! One rank of a run, from an empty world to the last figure.
+
+use crate::exchange::{ExchangeError, RankHalo};
+use crate::interrupt::StopFlag;
+use crate::plan::Plan;
+use crate::progress::{Progress, Show};
+use crate::summary::{RankFacts, Summary};
+use atoll_core::{SetupError, StepError, StepReport, TileFacts, World};
+use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
+use rayon::ThreadPoolBuilder;
+use std::time::Instant;
+use tracing::{debug, info, info_span};
+
+/// How a run is watched.
+#[derive(Clone, Default, Debug)]
+pub struct Observer {
+    /// Whether rank 0 shows progress.
+    pub show: Show,
+    /// Ends the run early.
+    pub stop: StopFlag,
+}
+
+/// Why a rank ended early.
+#[derive(Debug)]
+pub enum RankError {
+    /// Its world could not be built.
+    Setup(SetupError),
+    /// Its threads could not be started.
+    Threads {
+        /// Itself.
+        rank: Rank,
+        /// How many it wanted.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+    /// A step failed.
+    Step(StepError<ExchangeError>),
+    /// Outside of a step, the transport failed.
+    Transport(TransportError),
+}
+
+/// How a rank ended.
+#[derive(Debug)]
+pub struct RankEnd {
+    /// Steps it completed.
+    pub complete: u64,
+    /// The summary, of rank 0.
+    pub result: Result<Option<Box<Summary>>, RankError>,
+}
+
+/// Runs one rank, with a pool of threads of its own that this thread becomes part of. `leads_process` is true for one
+/// rank of each process.
+pub fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads_process: bool) -> RankEnd {
+    let (rank, threads) = (transport.rank(), plan.config.run.threads);
+    let _span = info_span!("rank", rank = rank.0).entered();
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(move |thread| format!("rank {rank}, thread {thread}"))
+        // So that a transport bound to its thread can be used inside the pool, and one thread really is one.
+        .use_current_thread()
+        .build();
+    if let Err(error) = pool {
+        let error = RankError::Threads { rank, threads, reason: error.to_string() };
+        return RankEnd { complete: 0, result: Err(error) };
+    }
+    let mut complete = 0;
+    let result = run(transport, plan, observer, leads_process, &mut complete);
+    RankEnd { complete, result }
+}
+
+fn run<T: Transport>(
+    transport: T,
+    plan: &Plan,
+    observer: &Observer,
+    leads_process: bool,
+    complete: &mut u64,
+) -> Result<Option<Box<Summary>>, RankError> {
+    let start = Instant::now();
+    let rank = transport.rank();
+    let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
+    let mut world = build(plan, rank)?;
+    // From here on the clock measures steps, not how long another rank takes to build.
+    halo.transport().barrier().map_err(RankError::Transport)?;
+    let built = Instant::now();
+
+    let show = if rank == Rank(0) { observer.show } else { Show::Nothing };
+    let mut progress = Progress::new(show, plan.config.run.steps);
+    let before = halo.transport().stats();
+    let mut last = StepReport::default();
+    let mut migrations = 0;
+    while world.step_count() < plan.config.run.steps && !last.stopped {
+        if observer.stop.is_requested() {
+            world.request_stop();
+        }
+        last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
+        migrations += last.migrations;
+        *complete = world.step_count();
+        progress.made(*complete);
+        debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
+    }
+    progress.finish();
+    let finished = Instant::now();
+
+    let sent = halo.transport().stats().since(&before);
+    let mut facts = RankFacts::new(&world, &last, &plan.scene);
+    facts.migrations = migrations;
+    (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
+    facts.build_nanos = (built - start).as_nanos() as u64;
+    facts.wall_nanos = (finished - built).as_nanos() as u64;
+    let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
+    if leads_process {
+        facts.peak_rss_bytes = peak_rss_bytes();
+    }
+    gather(halo.transport(), plan, &facts, &tiles).map_err(RankError::Transport)
+}
+
+/// This rank's part of the scene.
+fn build(plan: &Plan, rank: Rank) -> Result<World, RankError> {
+    let tiles = plan.assignment.tiles_of(rank.index());
+    let mut world = World::new(&plan.blueprint, &tiles).map_err(RankError::Setup)?;
+    let mut bodies = 0_u64;
+    if !tiles.is_empty() {
+        for body in plan.scene.iter() {
+            bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
+        }
+    }
+    info!(tiles = tiles.len(), bodies, "built");
+    Ok(world)
+}
+
+/// Brings everything to rank 0, which makes the summary of it.
+fn gather(
+    transport: &mut impl Transport,
+    plan: &Plan,
+    facts: &RankFacts,
+    tiles: &[TileFacts],
+) -> Result<Option<Box<Summary>>, TransportError> {
+    let ranks = transport.gather(Rank(0), bytemuck::bytes_of(facts))?;
+    let tiles = transport.gather(Rank(0), bytemuck::cast_slice(tiles))?;
+    Ok(ranks.zip(tiles).map(|(ranks, tiles)| {
+        let ranks: Vec<RankFacts> = ranks.iter().map(|bytes| bytemuck::pod_read_unaligned(bytes)).collect();
+        let tiles = tiles.iter().flat_map(|bytes| bytes.chunks_exact(size_of::<TileFacts>()));
+        let tiles = tiles.map(bytemuck::pod_read_unaligned::<TileFacts>);
+        Box::new(Summary::new(plan, &ranks, tiles))
+    }))
+}
+
+/// The most memory this process ever held, in bytes; zero where the system does not tell.
+fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kilobytes =
+        status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
+    kilobytes.unwrap_or(0_u64) * 1024
+}

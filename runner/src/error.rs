@@ -1,0 +1,135 @@
+//! Why a run ended early, and with which exit code.
+
+use crate::config::ConfigError;
+use atoll_core::{GlobalId, SetupError, TileId};
+use atoll_transport::Rank;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// What the program's exit code says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Exit {
+    /// All steps were made and every check passed.
+    Done = 0,
+    /// Bad input or usage.
+    Usage = 2,
+    /// A rank was lost.
+    PeerLost = 3,
+    /// The physics failed a check.
+    Physics = 4,
+    /// Output could not be written.
+    Output = 5,
+    /// Interrupted; the summary tells how far it came.
+    Interrupted = 130,
+}
+
+/// A run that has no summary, or could not write it.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The world it describes.
+    #[error("this configuration makes no world: {0}")]
+    Setup(#[from] SetupError),
+    /// `RUST_LOG`.
+    #[error("RUST_LOG = {value}: {reason}; write a level or target=level, such as atoll=debug")]
+    LogFilter {
+        /// Its value.
+        value: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A path to write to, found unusable before the run.
+    #[error("--json {}: {reason}; give a path that can be written", .path.display())]
+    BadOutput {
+        /// The path.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A rank whose threads cannot be had.
+    #[error("rank {rank} cannot start {threads} threads: {reason}; use fewer threads or ranks")]
+    Threads {
+        /// The rank.
+        rank: Rank,
+        /// How many it wanted.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+    /// A rank is gone, or sends what cannot be read.
+    #[error("rank {rank} was lost after {complete} of {steps} steps: {reason}")]
+    PeerLost {
+        /// The rank where the trouble began.
+        rank: Rank,
+        /// Steps that every remaining rank has completed.
+        complete: u64,
+        /// Steps asked for.
+        steps: u64,
+        /// What happened to it.
+        reason: String,
+    },
+    /// The transport was used wrongly.
+    #[error("the transport refused after {complete} of {steps} steps: {reason}")]
+    Transport {
+        /// Steps completed.
+        complete: u64,
+        /// Steps asked for.
+        steps: u64,
+        /// What it said.
+        reason: String,
+    },
+    /// A position or velocity is no longer a number.
+    #[error(
+        "step {step}: the state of body {id} is no longer finite; a higher physics.hertz, or a limit such as \
+         physics.max_linear_speed, may help"
+    )]
+    NonFinite {
+        /// The step, counted from 0.
+        step: u64,
+        /// The lowest such body.
+        id: GlobalId,
+    },
+    /// Two tiles disagree.
+    #[error("step {step}: tile {tile} received state of a body it does not know; please report this")]
+    Protocol {
+        /// The step, counted from 0.
+        step: u64,
+        /// The tile.
+        tile: TileId,
+    },
+    /// Bodies are missing, or there are too many.
+    #[error("the physics failed a check: {found} bodies at the end of a world of {expected}; please report this")]
+    BodiesLost {
+        /// At the start.
+        expected: u64,
+        /// At the end.
+        found: u64,
+    },
+    /// The summary could not be written after the run.
+    #[error("cannot write {}: {reason}", .path.display())]
+    Output {
+        /// The path.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl RunError {
+    /// The exit code that tells of this error.
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Config(_)
+            | Self::Setup(_)
+            | Self::LogFilter { .. }
+            | Self::BadOutput { .. }
+            | Self::Threads { .. } => Exit::Usage,
+            Self::PeerLost { .. } | Self::Transport { .. } => Exit::PeerLost,
+            Self::NonFinite { .. } | Self::Protocol { .. } | Self::BodiesLost { .. } => Exit::Physics,
+            Self::Output { .. } => Exit::Output,
+        }
+    }
+}

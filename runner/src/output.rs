@@ -1,0 +1,77 @@
+//! The summary as a file: whole or not at all.
+
+use crate::error::RunError;
+use crate::summary::Summary;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A path that JSON is to be written to when the run is over.
+#[derive(Debug)]
+pub struct JsonFile {
+    path: PathBuf,
+}
+
+impl JsonFile {
+    /// Makes sure, before anything heavy starts, that the path can be written. Leaves nothing behind.
+    ///
+    /// # Errors
+    /// If it cannot.
+    pub fn check(path: &Path) -> Result<Self, RunError> {
+        let file = Self { path: path.to_owned() };
+        file.probe().map_err(|error| RunError::BadOutput { path: path.to_owned(), reason: error.to_string() })?;
+        Ok(file)
+    }
+
+    /// Writes the summary.
+    ///
+    /// # Errors
+    /// If the path can no longer be written.
+    pub fn write(&self, summary: &Summary) -> Result<(), RunError> {
+        let write = || {
+            let mut text = serde_json::to_vec_pretty(summary)?;
+            text.push(b'\n');
+            if self.is_special() {
+                return File::create(&self.path)?.write_all(&text);
+            }
+            let temporary = self.temporary();
+            let written = File::create(&temporary).and_then(|mut file| {
+                file.write_all(&text)?;
+                file.sync_all()
+            });
+            let renamed = written.and_then(|()| fs::rename(&temporary, &self.path));
+            renamed.inspect_err(|_| drop(fs::remove_file(&temporary)))
+        };
+        write().map_err(|error| RunError::Output { path: self.path.clone(), reason: error.to_string() })
+    }
+
+    fn probe(&self) -> io::Result<()> {
+        if self.path.is_dir() {
+            return Err(io::Error::other("it is a directory"));
+        }
+        if self.path.file_name().is_none() {
+            return Err(io::Error::other("it names no file"));
+        }
+        if self.path.exists() {
+            File::options().append(true).open(&self.path)?;
+        }
+        if !self.is_special() {
+            File::create(self.temporary())?;
+            fs::remove_file(self.temporary())?;
+        }
+        Ok(())
+    }
+
+    /// A device or a pipe: written to as it is, never replaced.
+    fn is_special(&self) -> bool {
+        fs::metadata(&self.path).is_ok_and(|data| !data.is_file())
+    }
+
+    /// Beside the file, so that renaming never crosses file systems.
+    fn temporary(&self) -> PathBuf {
+        let mut name = OsString::from(self.path.file_name().expect("checked to have a name"));
+        name.push(".tmp");
+        self.path.with_file_name(name)
+    }
+}

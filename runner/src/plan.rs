@@ -1,0 +1,109 @@
+//! What every rank of a run must know alike, worked out once before any of them starts.
+
+use crate::assignment::Assignment;
+use crate::config::{Config, TransportKind};
+use crate::error::RunError;
+use crate::scene::Scene;
+use crate::tiles;
+use atoll_core::{Blueprint, TileGrid, World};
+
+/// A configuration, checked and resolved.
+#[derive(Debug)]
+pub struct Plan {
+    /// The configuration itself.
+    pub config: Config,
+    /// The start.
+    pub scene: Scene,
+    /// Everything about the world but its bodies.
+    pub blueprint: Blueprint,
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// Which rank holds which tiles.
+    pub assignment: Assignment,
+    /// What carries the bytes.
+    pub transport: TransportKind,
+}
+
+impl Plan {
+    /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks.
+    ///
+    /// # Errors
+    /// If no world can be made of it.
+    pub fn new(config: &Config) -> Result<Self, RunError> {
+        let scene = Scene::new(&config.scene);
+        let tiles = tiles::tile_counts(config, &scene);
+        let (low, high) = scene.domain();
+        let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
+        let params = config.params.clone();
+        let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
+        // An empty world costs nothing and checks the blueprint for all of them.
+        World::new(&blueprint, &[])?;
+
+        let ranks = config.run.ranks;
+        let mut weights = vec![0; blueprint.grid.tiles()];
+        if ranks > 1 {
+            scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
+        }
+        let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
+        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport: config.transport() })
+    }
+
+    /// What the user may want to know before it starts, a sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.grid.tiles());
+        if idle > 0 {
+            let ranks = self.assignment.ranks();
+            notes.push(format!(
+                "{idle} of {ranks} ranks stay idle: there are only {tiles} tiles; use fewer ranks or more tiles"
+            ));
+        }
+        let halo = tiles::halo_width(&self.blueprint.kinds, &self.blueprint.params);
+        let side = self.blueprint.grid.tile_size().min_element();
+        if tiles > 1 && side < halo {
+            notes.push(format!(
+                "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
+            ));
+        }
+        notes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOMS: &str = "[scene]\nkind = \"rooms\"\nbodies = 2000\n";
+
+    fn plan(overrides: &[(&str, &str)]) -> Plan {
+        Plan::new(&Config::from_toml_str("test", ROOMS, overrides).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn idle_ranks_and_narrow_tiles_are_mentioned() {
+        assert!(plan(&[]).notes().is_empty());
+        let notes = plan(&[("ranks", "7"), ("tiles", "2x2")]).notes();
+        assert_eq!(notes, ["3 of 7 ranks stay idle: there are only 4 tiles; use fewer ranks or more tiles"]);
+        let notes = plan(&[("tiles", "200x200")]).notes();
+        assert!(notes.len() == 1 && notes[0].starts_with("tiles are only 0.323 m wide"), "{notes:?}");
+    }
+
+    #[test]
+    fn the_hash_leaves_out_how_and_keeps_what() {
+        let hash = |overrides: &[(&str, &str)]| {
+            let plan = plan(overrides);
+            plan.config.hash(plan.tiles)
+        };
+        let usual = hash(&[]);
+        assert_eq!(usual.len(), 32);
+        for how in [("ranks", "3"), ("threads", "2"), ("transport", "channel"), ("peer_timeout", "5"), ("tiles", "1x1")]
+        {
+            assert_eq!(hash(&[how]), usual, "{how:?}");
+        }
+        for what in
+            [("seed", "2"), ("steps", "9"), ("bodies", "2001"), ("tiles", "2x1"), ("power", "1.2"), ("hertz", "90")]
+        {
+            assert_ne!(hash(&[what]), usual, "{what:?}");
+        }
+    }
+}

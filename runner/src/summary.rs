@@ -1,0 +1,285 @@
+//! What became of a run: the figures of all ranks joined, as JSON and as a table for people.
+
+use crate::plan::Plan;
+use crate::scene::Scene;
+use atoll_core::{Facts, Hashes, Phase, StepReport, TileFacts, World};
+use bytemuck::{Pod, Zeroable};
+use serde::{Serialize, Serializer};
+use std::fmt;
+
+const PHASES: usize = Phase::ALL.len();
+
+/// What one rank brings to the summary. Plain data, so that it travels as bytes.
+#[derive(Clone, Copy, Default, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct RankFacts {
+    /// Halves of the state hash, the low one first.
+    pub state_hash: [u64; 2],
+    /// Halves of the contact hash, the low one first.
+    pub contact_hash: [u64; 2],
+    /// Steps made.
+    pub steps: u64,
+    /// Whether it was asked to stop early: 0 or 1.
+    pub interrupted: u64,
+    /// Bodies outside of the rectangle they must not leave.
+    pub escaped: u64,
+    /// Ghosts in the last step.
+    pub ghosts: u64,
+    /// Bodies received from other tiles, in the whole run.
+    pub migrations: u64,
+    /// Islands in the last step, each tile's counted apart.
+    pub islands: u64,
+    /// Bodies in the largest of them.
+    pub largest_island: u64,
+    /// Bytes sent to other ranks by steps.
+    pub bytes_sent: u64,
+    /// Messages sent to other ranks by steps.
+    pub messages_sent: u64,
+    /// The most memory of the process, counted by one rank of it.
+    pub peak_rss_bytes: u64,
+    /// Time until the first step.
+    pub build_nanos: u64,
+    /// Time of all steps.
+    pub wall_nanos: u64,
+    /// Time of each phase, in the order of [`Phase::ALL`].
+    pub phase_nanos: [u64; PHASES],
+}
+
+impl RankFacts {
+    /// What the world of a rank and its last step have to say.
+    pub fn new(world: &World, last: &StepReport, scene: &Scene) -> Self {
+        let halves = |hash: u128| [hash as u64, (hash >> 64) as u64];
+        let hashes = world.hashes();
+        Self {
+            state_hash: halves(hashes.state),
+            contact_hash: halves(hashes.contact),
+            steps: world.step_count(),
+            interrupted: u64::from(last.stopped),
+            escaped: world.bodies().filter(|body| scene.has_escaped(body)).count() as u64,
+            ghosts: last.ghosts,
+            islands: last.islands,
+            largest_island: last.largest_island,
+            phase_nanos: Phase::ALL.map(|phase| world.timings().total(phase).as_nanos() as u64),
+            ..Self::default()
+        }
+    }
+
+    fn hashes(&self) -> Hashes {
+        let join = |halves: [u64; 2]| u128::from(halves[0]) | u128::from(halves[1]) << 64;
+        Hashes { state: join(self.state_hash), contact: join(self.contact_hash) }
+    }
+}
+
+/// The time of one phase.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct PhaseTime {
+    /// Per step, mean over ranks, in milliseconds.
+    pub mean_ms: f64,
+    /// Per step, on the rank that took longest, in milliseconds.
+    pub max_rank_ms: f64,
+    /// That rank.
+    pub slowest_rank: usize,
+}
+
+/// What became of a run. The fields are the keys of the JSON file, in its order.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Summary {
+    /// Of the program.
+    pub version: &'static str,
+    /// Kind of scene.
+    pub scene: &'static str,
+    /// Its seed.
+    pub seed: u64,
+    /// Fingerprint of everything in the configuration that the result depends on.
+    pub config_hash: String,
+    /// Dynamic bodies at the start.
+    pub bodies: u64,
+    /// Steps made.
+    pub steps: u64,
+    /// Whether the run was stopped before all steps were made.
+    pub interrupted: bool,
+    /// Ranks.
+    pub ranks: usize,
+    /// Threads of each rank.
+    pub threads: usize,
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// What carried bytes between ranks.
+    pub transport: &'static str,
+    /// Until the first step, in seconds.
+    pub build_s: f64,
+    /// All steps, in seconds.
+    pub wall_s: f64,
+    /// Mean of a step, in milliseconds.
+    pub ms_per_step: f64,
+    /// Fingerprint of all bodies.
+    pub state_hash: String,
+    /// Fingerprint of all contacts.
+    pub contact_hash: String,
+    /// Bodies at the start less bodies at the end; anything but 0 is a bug.
+    pub bodies_lost: i64,
+    /// Bodies outside of the rectangle they must not leave.
+    pub escaped: u64,
+    /// Touching manifolds at the final positions.
+    pub contacts: u64,
+    /// The part of them between bodies of two tiles, 0 to 1.
+    pub border_contact_fraction: f64,
+    /// Copies of bodies held by tiles other than their owner's, in the last step.
+    pub ghosts: u64,
+    /// Changes of owner, in the whole run.
+    pub migrations: u64,
+    /// Groups of bodies in contact in the last step, each tile's counted apart.
+    pub islands: u64,
+    /// Bodies in the largest of them.
+    pub largest_island: u64,
+    /// Bytes sent from rank to rank by steps.
+    pub bytes_sent: u64,
+    /// Messages sent from rank to rank by steps.
+    pub messages_sent: u64,
+    /// In kg.
+    pub mass: f64,
+    /// In J, rotation included.
+    pub kinetic_energy: f64,
+    /// Mean over bodies of v^2 / 2, in m^2/s^2.
+    pub mean_half_v2: f64,
+    /// Mean over bodies of the squared angular velocity, in rad^2/s^2.
+    pub mean_spin2: f64,
+    /// In kg m/s.
+    pub momentum: [f64; 2],
+    /// The deepest overlap, in m.
+    pub max_penetration: f64,
+    /// Mean over overlapping contact points, in m.
+    pub mean_penetration: f64,
+    /// Time of each phase; `other` is what no phase accounts for, such as threads out of work.
+    #[serde(serialize_with = "as_map")]
+    pub phases: Vec<(&'static str, PhaseTime)>,
+    /// The most memory held, summed over processes.
+    pub peak_rss_bytes: u64,
+}
+
+impl Summary {
+    /// Joins what the ranks and the tiles have to say. `ranks` is in rank order.
+    pub fn new(plan: &Plan, ranks: &[RankFacts], tiles: impl IntoIterator<Item = TileFacts>) -> Self {
+        let sum = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).sum::<u64>();
+        let most = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).max().unwrap_or(0);
+        let facts = Facts::total(tiles);
+        let hashes = ranks.iter().map(RankFacts::hashes).fold(Hashes::default(), Hashes::merge);
+        let steps = most(|rank| rank.steps);
+        let wall_s = most(|rank| rank.wall_nanos) as f64 * 1e-9;
+        let fraction = |part: u64, whole: u64| if whole > 0 { part as f64 / whole as f64 } else { 0.0 };
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            scene: plan.config.scene.kind.name(),
+            seed: plan.config.scene.seed,
+            config_hash: plan.config.hash(plan.tiles),
+            bodies: plan.scene.bodies(),
+            steps,
+            interrupted: most(|rank| rank.interrupted) > 0,
+            ranks: ranks.len(),
+            threads: plan.config.run.threads,
+            tiles: plan.tiles,
+            transport: plan.transport.name(),
+            build_s: most(|rank| rank.build_nanos) as f64 * 1e-9,
+            wall_s,
+            ms_per_step: wall_s * 1e3 / steps.max(1) as f64,
+            state_hash: format!("{:032x}", hashes.state),
+            contact_hash: format!("{:032x}", hashes.contact),
+            bodies_lost: plan.scene.bodies() as i64 - facts.bodies as i64,
+            escaped: sum(|rank| rank.escaped),
+            contacts: facts.contacts,
+            border_contact_fraction: fraction(facts.border_contacts, facts.contacts),
+            ghosts: sum(|rank| rank.ghosts),
+            migrations: sum(|rank| rank.migrations),
+            islands: sum(|rank| rank.islands),
+            largest_island: most(|rank| rank.largest_island),
+            bytes_sent: sum(|rank| rank.bytes_sent),
+            messages_sent: sum(|rank| rank.messages_sent),
+            mass: facts.mass,
+            kinetic_energy: facts.kinetic_energy,
+            mean_half_v2: facts.mean_half_v2,
+            mean_spin2: facts.mean_spin2,
+            momentum: facts.momentum,
+            max_penetration: facts.max_penetration,
+            mean_penetration: facts.mean_penetration,
+            phases: phases(ranks, steps),
+            peak_rss_bytes: sum(|rank| rank.peak_rss_bytes),
+        }
+    }
+}
+
+/// The phases of the step, and the rest of each rank's time.
+fn phases(ranks: &[RankFacts], steps: u64) -> Vec<(&'static str, PhaseTime)> {
+    let rest = |rank: &RankFacts| rank.wall_nanos.saturating_sub(rank.phase_nanos.iter().sum());
+    let time = |nanos: &dyn Fn(&RankFacts) -> u64| {
+        let per_step = |nanos: u64| nanos as f64 * 1e-6 / steps.max(1) as f64;
+        let total = ranks.iter().map(nanos).sum::<u64>();
+        let most = ranks.iter().map(nanos).max().unwrap_or(0);
+        let slowest_rank = ranks.iter().position(|rank| nanos(rank) == most).unwrap_or(0);
+        PhaseTime { mean_ms: per_step(total) / ranks.len().max(1) as f64, max_rank_ms: per_step(most), slowest_rank }
+    };
+    let named = Phase::ALL.iter().enumerate().map(|(i, phase)| (phase.name(), time(&|rank| rank.phase_nanos[i])));
+    named.chain([("other", time(&rest))]).collect()
+}
+
+fn as_map<S: Serializer>(phases: &[(&'static str, PhaseTime)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(phases.iter().copied())
+}
+
+/// The closing report.
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [columns, rows] = self.tiles;
+        let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
+        let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
+        writeln!(f, "{}: {} bodies, seed {}, {columns} x {rows} tiles", self.scene, self.bodies, self.seed)?;
+        writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
+        let early = if self.interrupted { ", interrupted" } else { "" };
+        let rate = if self.wall_s > 0.0 { self.steps as f64 / self.wall_s } else { 0.0 };
+        let each = self.ms_per_step;
+        let steps = plural(self.steps, "step");
+        writeln!(f, "{steps} in {:.2} s: {each:.3} ms per step, {rate:.1} steps/s{early}", self.wall_s)?;
+        self.write_phases(f)?;
+        self.write_facts(f)
+    }
+}
+
+impl Summary {
+    fn write_phases(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let total: f64 = self.phases.iter().map(|(_, time)| time.mean_ms).sum();
+        let share = |ms: f64| if total > 0.0 { 100.0 * ms / total } else { 0.0 };
+        writeln!(f)?;
+        writeln!(f, "{:<14}{:>10}{:>9}{:>15}", "phase", "ms/step", "share", "slowest rank")?;
+        for (name, time) in &self.phases {
+            let (mean, slowest) = (time.mean_ms, format!("{:.3} (#{})", time.max_rank_ms, time.slowest_rank));
+            writeln!(f, "{:<14}{mean:>10.3}{:>7.1} %{slowest:>15}", name.replace('_', " "), share(mean))?;
+        }
+        writeln!(f, "{:<14}{total:>10.3}{:>7.1} %", "total", share(total))?;
+        writeln!(f)
+    }
+
+    fn write_facts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = |f: &mut fmt::Formatter<'_>, name: &str, text: fmt::Arguments<'_>| writeln!(f, "{name:<14}{text}");
+        let mega = 1e-6;
+        row(f, "bodies", format_args!("{}, {} lost, {} escaped", self.bodies, self.bodies_lost, self.escaped))?;
+        let border = 100.0 * self.border_contact_fraction;
+        row(f, "contacts", format_args!("{} touching, {border:.2} % across tiles", self.contacts))?;
+        let (mean, most) = (self.mean_penetration, self.max_penetration);
+        row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
+        row(f, "islands", format_args!("{}, the largest of {} bodies", self.islands, self.largest_island))?;
+        let (half_v2, spin2) = (self.mean_half_v2, self.mean_spin2);
+        row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
+        let [x, y] = self.momentum;
+        row(f, "energy", format_args!("{:.6e} J, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
+        row(
+            f,
+            "tiles",
+            format_args!("{} ghosts in the last step, {} migrations in all", self.ghosts, self.migrations),
+        )?;
+        let sent = self.bytes_sent as f64 * mega;
+        row(f, "sent", format_args!("{sent:.1} MB between ranks in {} messages", self.messages_sent))?;
+        row(f, "memory", format_args!("{:.0} MB at most", self.peak_rss_bytes as f64 * mega))?;
+        row(f, "config hash", format_args!("{}", self.config_hash))?;
+        row(f, "state hash", format_args!("{}", self.state_hash))?;
+        row(f, "contact hash", format_args!("{}", self.contact_hash))
+    }
+}

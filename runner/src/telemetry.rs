@@ -1,0 +1,25 @@
+//! Log lines on stderr, as `RUST_LOG` asks for.
+
+use crate::error::RunError;
+use std::env::{self, VarError};
+use tracing_subscriber::EnvFilter;
+
+/// Starts logging: warnings and errors, or what `RUST_LOG` says.
+///
+/// # Errors
+/// If `RUST_LOG` cannot be understood.
+pub fn init() -> Result<(), RunError> {
+    let value = match env::var(EnvFilter::DEFAULT_ENV) {
+        Ok(value) => value,
+        Err(VarError::NotPresent) => "warn".to_owned(),
+        Err(VarError::NotUnicode(value)) => {
+            let reason = "not valid Unicode".to_owned();
+            return Err(RunError::LogFilter { value: value.to_string_lossy().into_owned(), reason });
+        }
+    };
+    let filter =
+        EnvFilter::try_new(&value).map_err(|error| RunError::LogFilter { value, reason: error.to_string() })?;
+    // Fails only where a subscriber is already in place, which then serves as well.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    Ok(())
+}

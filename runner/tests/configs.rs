@@ -1,0 +1,38 @@
+//! The configurations that come with the program can all be run.
+
+use atoll::Config;
+use std::path::{Path, PathBuf};
+
+fn files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(!files.is_empty());
+    files
+}
+
+#[test]
+fn each_runs_a_step_at_a_small_size() {
+    for path in files() {
+        let config = Config::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(config.scene.bodies >= 20_000, "{}", path.display());
+        let text = std::fs::read_to_string(&path).unwrap();
+        let config = Config::from_toml_str("small", &text, &[("bodies", "300"), ("steps", "1")]).unwrap();
+        let summary = atoll::run(&config).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!((summary.bodies, summary.bodies_lost, summary.escaped), (300, 0, 0));
+    }
+}
+
+#[test]
+fn what_the_full_example_comments_out_are_the_defaults() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/normal.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let is_key = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+    let uncommented: Vec<&str> =
+        text.lines().map(|line| line.strip_prefix("# ").filter(|rest| is_key(rest)).unwrap_or(line)).collect();
+    let explicit = Config::from_toml_str("explicit", &uncommented.join("\n"), &[]).unwrap();
+    let mut implicit = Config::from_toml_str("implicit", &text, &[]).unwrap();
+    assert!(uncommented.iter().filter(|line| line.starts_with("margin_cap")).count() == 1);
+    // Spelt out, it says what the default would have chosen.
+    implicit.run.transport = Some(implicit.transport());
+    assert_eq!(explicit, implicit);
+}
