@@ -104,7 +104,6 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
 #[inline(never)]
 fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork) {
     tile.strays.clear();
-    tile.corrections.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
         let key = tile.contacts.keys[i];
@@ -136,12 +135,6 @@ fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork)
                             send.unseen.add(linear, on_b);
                         }
                     }
-                }
-                // The partner's owner, who decides what is unseen, does not know yet that this body leaves.
-                if border.owner != tile.id && partner.is_some() {
-                    let partner = if is_a { pair.1 } else { pair.0 };
-                    let (linear, angular) = if is_a { (linear, on_b) } else { (-linear, on_a) };
-                    tile.corrections.push((partner, Unseen { linear, angular }));
                 }
                 // Both bodies may leave for one tile: one record is enough.
                 if border.owner != tile.id && border.owner != heir {
@@ -200,10 +193,6 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
                 if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
             let pair = (record.low, record.high);
             tile.strays.push(Stray { pair, authority, contact: record.contact });
-            // One of the two is here now, so this tile solves the contact; who sent the other did not know that.
-            let (linear, on_a, on_b) = record.contact.impulse();
-            tile.corrections.push((record.low, Unseen { linear, angular: -on_a }));
-            tile.corrections.push((record.high, Unseen { linear: -linear, angular: -on_b }));
         }
     }
     tile.owned = tile.bodies.len();
@@ -225,25 +214,8 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
         tile.unseen.push(ghost.unseen);
         tile.ghost_owners.push(owner);
     }
-    correct_unseen(tile);
     for &row in &tile.statics {
         tile.bodies.push(setup.statics[row as usize]);
-    }
-}
-
-/// What is unseen was decided by the owners of the step before. Where a body changed owner at this very sync point, its
-/// partners' ghosts lack the impulse of a contact that is no longer solved here, or have that of one that now is: a
-/// ghost in a pile would be shot out of it.
-fn correct_unseen(tile: &mut Tile) {
-    if tile.corrections.is_empty() {
-        return;
-    }
-    let mut ghosts: Vec<_> = tile.bodies.id[tile.owned..].iter().copied().zip(0..).collect();
-    ghosts.sort_unstable();
-    for (id, by) in tile.corrections.drain(..) {
-        if let Ok(found) = ghosts.binary_search_by_key(&id, |&(id, _)| id) {
-            tile.unseen[ghosts[found].1].add(by.linear, by.angular);
-        }
     }
 }
 

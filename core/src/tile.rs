@@ -34,8 +34,6 @@ pub(crate) struct Tile {
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
     pub(crate) strays: Strays,
-    /// Filled in the first sync point: changes to the unseen impulses of bodies, if they come as ghosts.
-    pub(crate) corrections: Vec<(GlobalId, Unseen)>,
     /// What happened in the step under way.
     pub(crate) counts: TileCounts,
 }
@@ -70,7 +68,6 @@ impl Tile {
             statics: setup.statics_of(id),
             contacts: ContactCache::default(),
             strays: Strays::default(),
-            corrections: Vec::new(),
             counts: TileCounts::default(),
         }
     }

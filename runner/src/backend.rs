@@ -106,6 +106,7 @@ mod tests {
     use super::*;
     use crate::config::Config;
     use atoll_core::GlobalId;
+    use atoll_transport::{Incoming, Outgoing};
 
     fn plan() -> Plan {
         let text = "[scene]\nkind = \"rooms\"\nbodies = 100\n[run]\nranks = 3\nsteps = 9\n";
@@ -135,5 +136,58 @@ mod tests {
         let told = outcome(&plan(), vec![failed(6, error()), failed(6, error()), failed(5, lost(0))]).unwrap_err();
         assert!(told.to_string().starts_with("step 5: the state of body 77 is no longer finite"), "{told}");
         assert_eq!(told.exit() as u8, 4);
+    }
+
+    /// Panics in a given round on one rank.
+    struct Dying<T> {
+        inner: T,
+        rounds_left: u32,
+    }
+
+    impl<T: Transport> Transport for Dying<T> {
+        fn rank(&self) -> Rank {
+            self.inner.rank()
+        }
+
+        fn size(&self) -> usize {
+            self.inner.size()
+        }
+
+        fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
+            self.inner.prepare(lengths)
+        }
+
+        fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
+            if self.rank() == Rank(1) {
+                if self.rounds_left == 0 {
+                    std::panic::resume_unwind(Box::new("on purpose"));
+                }
+                self.rounds_left -= 1;
+            }
+            self.inner.exchange(incoming)
+        }
+
+        fn abort(&mut self, reason: &str) -> ! {
+            self.inner.abort(reason)
+        }
+    }
+
+    #[test]
+    fn a_rank_that_dies_in_the_middle_ends_the_run_on_all() {
+        let plan = plan();
+        // One round before the first step, then one a step.
+        let ends = channel::run(3, ChannelOptions::default(), |inner| {
+            drive::drive(Dying { inner, rounds_left: 5 }, &plan, &Observer::default(), false)
+        });
+        let error = outcome(&plan, ends).unwrap_err();
+        assert_eq!(error.to_string(), "rank 1 was lost after 4 of 9 steps: rank 1 panicked: on purpose");
+    }
+
+    #[test]
+    fn a_raised_flag_ends_all_ranks_after_the_same_step() {
+        let observer = Observer::default();
+        observer.stop.request();
+        let summary = run(&plan(), &observer).unwrap();
+        assert_eq!((summary.steps, summary.interrupted, summary.bodies_lost), (1, true, 0));
     }
 }

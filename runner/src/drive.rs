@@ -60,10 +60,14 @@ pub fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads
         // So that a transport bound to its thread can be used inside the pool, and one thread really is one.
         .use_current_thread()
         .build();
-    if let Err(error) = pool {
-        let error = RankError::Threads { rank, threads, reason: error.to_string() };
-        return RankEnd { complete: 0, result: Err(error) };
-    }
+    // From here to its drop, everything parallel on this thread runs in the pool.
+    let _pool = match pool {
+        Ok(pool) => pool,
+        Err(error) => {
+            let error = RankError::Threads { rank, threads, reason: error.to_string() };
+            return RankEnd { complete: 0, result: Err(error) };
+        }
+    };
     let mut complete = 0;
     let result = run(transport, plan, observer, leads_process, &mut complete);
     RankEnd { complete, result }

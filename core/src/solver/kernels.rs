@@ -99,6 +99,22 @@ impl<V: Lanes> Normals<V> {
     }
 }
 
+impl<V: Lanes> Normals<V> {
+    /// Friction at all points, within the cone that the normal impulses of this moment allow. In solve and in relax: with
+    /// friction in relax alone, piles over a tile border jitter a hundred times more.
+    #[inline(always)]
+    fn rub<const N: usize>(&self, points: &mut [PointRows; N], friction: V, a: &mut [V; 4], b: &mut [V; 4]) {
+        for rows in points {
+            let axis = self.tangent(rows);
+            let most = friction.mul(V::load(&rows.normal_impulse));
+            let old = V::load(&rows.tangent_impulse);
+            let wanted = V::load(&rows.tangent_mass).mul(axis.speed(a, b));
+            let new = old.sub(wanted).min(most).max(V::splat(0.0).sub(most));
+            axis.push(accumulate(&mut rows.tangent_impulse, old, new), a, b);
+        }
+    }
+}
+
 /// Adds to an accumulated impulse and returns what was added.
 #[inline(always)]
 fn accumulate<V: Lanes>(row: &mut Row, old: V, new: V) -> V {
@@ -125,7 +141,7 @@ impl Pass for WarmStart {
     }
 }
 
-/// Normal impulses, with the soft push out of overlap.
+/// Normal impulses, with the soft push out of overlap, then friction.
 #[derive(Clone, Copy)]
 pub(super) struct Solve {
     softness: Softness,
@@ -172,6 +188,7 @@ impl Pass for Solve {
             let new = old.sub(wanted).sub(impulse_scale.mul(old)).max(zero);
             axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
         }
+        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
         V::scatter(a, &mut bodies.velocity, &group.a);
         V::scatter(b, &mut bodies.velocity, &group.b);
     }
@@ -216,16 +233,10 @@ impl<const TOTALS: bool> Pass for Relax<TOTALS> {
                 V::load(&rows.total_normal).add(new).store(&mut rows.total_normal);
             }
         }
-        let friction = V::load(&group.friction);
-        for rows in &mut group.points {
-            let axis = normals.tangent(rows);
-            let most = friction.mul(V::load(&rows.normal_impulse));
-            let old = V::load(&rows.tangent_impulse);
-            let wanted = V::load(&rows.tangent_mass).mul(axis.speed(&a, &b));
-            let new = old.sub(wanted).min(most).max(zero.sub(most));
-            axis.push(accumulate(&mut rows.tangent_impulse, old, new), &mut a, &mut b);
-            if TOTALS {
-                V::load(&rows.total_tangent).add(new).store(&mut rows.total_tangent);
+        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
+        if TOTALS {
+            for rows in &mut group.points {
+                V::load(&rows.total_tangent).add(V::load(&rows.tangent_impulse)).store(&mut rows.total_tangent);
             }
         }
         V::scatter(a, &mut bodies.velocity, &group.a);

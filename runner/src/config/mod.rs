@@ -1,6 +1,6 @@
 //! What to run: the scene, the physics, and how to spread it. Read from TOML, with the command line winning over it.
 //!
-//! To add a key, name it in `keys.rs` and read it in [`Config::read`]; anything not named there is refused.
+//! To add a key, name it in `keys.rs` and read it in `Config::read`; anything not named there is refused.
 
 mod error;
 mod keys;

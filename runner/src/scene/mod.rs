@@ -2,7 +2,7 @@
 //!
 //! A scene is a function of its section of the configuration. Random numbers come from [`SplitMix64`]; each body takes
 //! a fixed number of draws, in the order of the ids, so any body can be made without making the ones before it, and
-//! nothing depends on tiles, ranks or threads. To add a scene, implement [`Layout`] in a file of its own and name it in
+//! nothing depends on tiles, ranks or threads. To add a scene, implement `Layout` in a file of its own and name it in
 //! [`SceneKind`] and [`Scene::new`].
 
 mod pile;
