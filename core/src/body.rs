@@ -127,15 +127,12 @@ impl Bodies {
     pub(crate) fn remove_sorted(&mut self, gone: &[u32]) {
         let Some(&first) = gone.first() else { return };
         each_column!(self, column => {
-            let mut next_gone = gone.iter().map(|&g| g as usize).peekable();
+            // What lies between two gaps moves as one block.
             let mut write = first as usize;
-            for read in first as usize..column.len() {
-                if next_gone.peek() == Some(&read) {
-                    next_gone.next();
-                } else {
-                    column[write] = column[read];
-                    write += 1;
-                }
+            for (i, &gap) in gone.iter().enumerate() {
+                let block = gap as usize + 1..gone.get(i + 1).map_or(column.len(), |&next| next as usize);
+                column.copy_within(block.clone(), write);
+                write += block.len();
             }
             column.truncate(write);
         });

@@ -24,9 +24,6 @@ pub struct ContactPoint {
 impl ContactPoint {
     /// The feature of a point that is not there.
     pub const ABSENT: u32 = u32::MAX;
-
-    pub(crate) const NONE: Self =
-        Self { anchor: Vec2::ZERO, separation: 0.0, normal_impulse: 0.0, tangent_impulse: 0.0, feature: Self::ABSENT };
 }
 
 /// A contact of body A, the one with the lower GlobalId, and body B.
@@ -159,6 +156,17 @@ impl ContactCache {
     pub(crate) fn clear(&mut self) {
         self.keys.clear();
         self.contacts.clear();
+    }
+
+    /// Becomes a copy of another. Room is made for little more than is needed: there is one cache per tile.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        if self.keys.capacity() < other.len() {
+            self.keys.reserve_exact(other.len() + other.len() / 8);
+            self.contacts.reserve_exact(other.len() + other.len() / 8);
+        }
+        self.keys.extend_from_slice(&other.keys);
+        self.contacts.extend_from_slice(&other.contacts);
     }
 
     pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {

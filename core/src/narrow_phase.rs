@@ -7,7 +7,7 @@ use crate::math::{Rot, dot, turn};
 use crate::setup::Setup;
 use crate::shape::{KindRow, Shape};
 use crate::tile::Tile;
-use glam::{DVec2, Vec2};
+use glam::Vec2;
 
 /// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
 const RECYCLE_COSINE: f32 = 0.98;
@@ -21,7 +21,6 @@ pub(crate) struct Contacts {
     pub(crate) separation: Vec<[f32; 2]>,
     /// For each contact the indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
-    movers: Vec<Mover>,
     near: Vec<Pair>,
     sorted: Vec<Pair>,
     /// Per owned body where its pairs begin in `sorted`.
@@ -30,8 +29,8 @@ pub(crate) struct Contacts {
 
 impl Contacts {
     /// Finds the contacts of a tile among candidate pairs.
-    pub(crate) fn find(&mut self, tile: &Tile, proxies: &Proxies, pairs: &[Pair], setup: &Setup) {
-        self.cull(tile, proxies, pairs, setup);
+    pub(crate) fn find(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], setup: &Setup) {
+        self.cull(tile, proxies, candidates);
         self.sort(tile.owned);
         self.cache.clear();
         self.separation.clear();
@@ -75,20 +74,18 @@ impl Contacts {
         (all, border)
     }
 
-    /// Keeps the pairs whose bounding circles may touch within the step. Every candidate is written down and counted or
-    /// not: a branch here would be a coin toss.
-    fn cull(&mut self, tile: &Tile, proxies: &Proxies, pairs: &[Pair], setup: &Setup) {
-        self.movers.clear();
-        self.movers.extend((0..tile.bodies.len()).map(|i| Mover::new(tile, i, setup)));
+    /// Keeps the candidates that are pairs. Every one is written down and counted or not: a branch here would be a coin
+    /// toss.
+    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair]) {
+        let position = &tile.bodies.position;
         self.start.clear();
         self.start.resize(tile.owned + 2, 0);
         self.near.clear();
-        self.near.resize(pairs.len(), [0, 0]);
+        self.near.resize(candidates.len(), [0, 0]);
         let mut kept = 0;
-        for &pair in pairs {
-            let (a, b) = (&self.movers[pair[0] as usize], &self.movers[pair[1] as usize]);
-            let offset = (b.position - a.position).as_vec2();
-            let near = proxies.overlap(offset, pair) & a.may_touch(b, offset, setup);
+        for &pair in candidates {
+            let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
+            let near = proxies.is_pair(offset, pair);
             self.near[kept] = pair;
             kept += usize::from(near);
             self.start[pair[0] as usize + 2] += u32::from(near);
@@ -117,53 +114,6 @@ impl Contacts {
                 self.sorted[first..end].sort_unstable();
             }
         }
-    }
-}
-
-/// What the cull reads of a body, in one cache line.
-#[derive(Debug)]
-struct Mover {
-    position: DVec2,
-    velocity: Vec2,
-    bounding_radius: f32,
-    /// Speed of the corners by rotation, in m/s; turning brings no point of a circle nearer.
-    spin: f32,
-    is_box: f32,
-}
-
-impl Mover {
-    #[inline(always)]
-    fn new(tile: &Tile, i: usize, setup: &Setup) -> Self {
-        let bodies = &tile.bodies;
-        let kind = setup.kind(bodies.kind[i]);
-        let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
-        Self {
-            position: bodies.position[i],
-            velocity: bodies.velocity[i],
-            bounding_radius: kind.bounding_radius,
-            spin: is_box * kind.bounding_radius * bodies.angular_velocity[i].abs(),
-            is_box,
-        }
-    }
-
-    /// No contact of the two can be made beyond this distance of their surfaces, in meters: the contact rule, with the
-    /// greatest closing speed there can be. Of two circles that is known, of others only that it is no more than their
-    /// relative speed.
-    #[inline(always)]
-    fn reach(&self, other: &Self, offset: Vec2, distance: f32, setup: &Setup) -> f32 {
-        let between = other.velocity - self.velocity;
-        let along = crate::math::max(-dot(between, offset) / distance, 0.0);
-        let speed = dot(between, between).sqrt();
-        let closing = if self.is_box + other.is_box > 0.0 { speed } else { along };
-        setup.params.speculative_distance + setup.params.dt * (closing + (self.spin + other.spin))
-    }
-
-    #[inline(always)]
-    fn may_touch(&self, other: &Self, offset: Vec2, setup: &Setup) -> bool {
-        let distance = dot(offset, offset).sqrt();
-        // Rounding must not cull what the contact rule keeps. Circles upon one another have no direction: NaN, kept.
-        let within = (self.bounding_radius + other.bounding_radius + self.reach(other, offset, distance, setup)) * 1.0001;
-        !(distance >= within)
     }
 }
 

@@ -98,12 +98,17 @@ impl Setup {
         &self.kinds[kind.0 as usize]
     }
 
-    /// Half extents of a body's AABB, grown by its margin: as far as its surface may come within a step. In meters.
+    /// How much a body's AABB is grown: as far as it may come within a step, within limits. In meters.
+    #[inline(always)]
+    pub(crate) fn margin(&self, velocity: Vec2) -> f32 {
+        let speed = math::dot(velocity, velocity).sqrt();
+        math::clamp(speed * self.params.dt, self.params.margin_floor, self.params.margin_cap)
+    }
+
+    /// Half extents of a dynamic body's AABB, grown by its margin. In meters.
     #[inline(always)]
     pub(crate) fn grown_half_extents(&self, kind: KindId, rotation: Rot, velocity: Vec2) -> Vec2 {
-        let speed = math::dot(velocity, velocity).sqrt();
-        let margin = math::clamp(speed * self.params.dt, self.params.margin_floor, self.params.margin_cap);
-        self.kind(kind).half_extents(rotation) + Vec2::splat(margin)
+        self.kind(kind).half_extents(rotation) + Vec2::splat(self.margin(velocity))
     }
 
     /// The statics that a tile must know: those that reach its region grown by the halo.

@@ -109,11 +109,10 @@ pub(crate) struct KindRow {
     pub(crate) extent: Vec2,
     pub(crate) radius: f32,
     pub(crate) bounding_radius: f32,
-    /// Masses; the inverses are zero for a static kind.
+    /// Masses; zero, and so are the inverses, for a static kind.
     pub(crate) mass: f32,
     pub(crate) inertia: f32,
     pub(crate) inv_mass: f32,
-    pub(crate) inv_inertia: f32,
     /// Square roots of the masses and of their inverses, for mass-weighted velocities.
     pub(crate) root_mass: f32,
     pub(crate) root_inertia: f32,
@@ -134,7 +133,6 @@ impl KindRow {
             mass,
             inertia,
             inv_mass,
-            inv_inertia,
             root_mass: mass.sqrt(),
             root_inertia: inertia.sqrt(),
             root_inv_mass: inv_mass.sqrt(),
@@ -164,7 +162,6 @@ impl KindRow {
             mass: 0.0,
             inertia: 0.0,
             inv_mass: 0.0,
-            inv_inertia: 0.0,
             root_mass: 0.0,
             root_inertia: 0.0,
             root_inv_mass: 0.0,

@@ -158,7 +158,7 @@ fn finalize(bench: &mut Bench<'_>) {
             solver.restitute(b.setup);
         }
         solver.store_impulses(contacts);
-        std::mem::swap(&mut b.tile.contacts, &mut contacts.cache);
+        b.tile.contacts.copy_from(&contacts.cache);
         solver::store(b.tile, &solver.bodies);
         solver::fly(b.tile, &solver.bodies, b.setup);
     });

@@ -76,8 +76,7 @@ impl Layout {
 }
 
 impl Grid {
-    /// Appends every pair of proxies that [`Proxies::overlap`], at least one of them owned; and, where local
-    /// coordinates round, a few that do not.
+    /// Appends every pair, and some that are none (see the contract in [`super`]).
     pub(crate) fn find_pairs(&mut self, proxies: &Proxies, pairs: &mut Vec<Pair>) {
         self.rest.clear();
         self.rest.extend(0..proxies.len() as u32);
@@ -100,10 +99,7 @@ impl Grid {
         }
         for (i, &a) in self.rest.iter().enumerate() {
             for &b in &self.rest[i + 1..] {
-                let (p, q) = (a as usize, b as usize);
-                let apart_x = (proxies.x[p] - proxies.x[q]).abs() - (proxies.half_x[p] + proxies.half_x[q]);
-                let apart_y = (proxies.y[p] - proxies.y[q]).abs() - (proxies.half_y[p] + proxies.half_y[q]);
-                if (apart_x <= proxies.slack) & (apart_y <= proxies.slack) {
+                if proxies.overlap([a, b]) {
                     emit(pairs, proxies.owned, a, b);
                 }
             }
@@ -148,7 +144,7 @@ impl Grid {
 
     #[inline(never)]
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, pairs: &mut Vec<Pair>) {
-        let search = Search { sorted: &self.sorted, slack: proxies.slack, owned: proxies.owned, pairs };
+        let search = Search { sorted: &self.sorted, slack: proxies.slack, dt: proxies.dt, owned: proxies.owned, pairs };
         search.neighbours(&self.start, layout.columns);
     }
 
@@ -156,15 +152,16 @@ impl Grid {
     fn pair_large(&self, layout: &Layout, proxies: &Proxies, limit: f32, pairs: &mut Vec<Pair>) {
         for &body in &self.large {
             let i = body as usize;
-            let [x, y, half_x, half_y] = [proxies.x[i], proxies.y[i], proxies.half_x[i], proxies.half_y[i]];
-            let (reach_x, reach_y) = (half_x + limit + proxies.slack, half_y + limit + proxies.slack);
+            let (x, y) = (proxies.x[i], proxies.y[i]);
+            let reach_x = proxies.half_x[i] + limit + proxies.slack;
+            let reach_y = proxies.half_y[i] + limit + proxies.slack;
             let columns = layout.column(x - reach_x)..=layout.column(x + reach_x);
             for row in layout.row(y - reach_y)..=layout.row(y + reach_y) {
                 let first = self.start[row * layout.columns + columns.start()] as usize;
                 let end = self.start[row * layout.columns + columns.end() + 1] as usize;
-                for other in first..end {
-                    if self.sorted.near([x, y, half_x, half_y], other, proxies.slack) {
-                        emit(pairs, proxies.owned, body, self.sorted.body[other]);
+                for &other in &self.sorted.body[first..end] {
+                    if proxies.overlap([body, other]) {
+                        emit(pairs, proxies.owned, body, other);
                     }
                 }
             }

@@ -1,32 +1,43 @@
 //! Broad phase: which pairs of bodies may touch within this step.
 //!
-//! The contract, whichever structure finds them: exactly the pairs of proxies with at least one owned body whose grown
-//! AABBs overlap, by [`Proxies::overlap`], in any order. That test reads the bodies' own bits, not the tile's local
+//! The contract, whichever structure finds them: every pair with at least one owned body that [`Proxies::is_pair`], in
+//! any order; pairs that are none may be among them. That test reads the bodies' own bits, not the tile's local
 //! coordinates, so two tiles that both see a pair agree on it.
 
 pub(crate) mod grid;
 mod search;
 
+use crate::math::{self, dot};
 use crate::setup::Setup;
 use crate::tile::Tile;
-use glam::{DVec2, Vec2};
+use glam::Vec2;
 
 /// A pair of indices into owned, ghosts and statics; the lower first.
 pub(crate) type Pair = [u32; 2];
 
-/// What the broad phase knows of every body of a tile: its grown AABB in coordinates local to the tile.
+/// What the broad phase knows of every body of a tile, a column for each number.
 #[derive(Default, Debug)]
 pub(crate) struct Proxies {
+    /// Center, in meters from the tile's corner.
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
     /// Half extents of the AABB, grown by the body's margin.
     pub(crate) half_x: Vec<f32>,
     pub(crate) half_y: Vec<f32>,
+    pub(crate) velocity_x: Vec<f32>,
+    pub(crate) velocity_y: Vec<f32>,
+    /// How near a surface at rest may come to the center without touching: bounding radius, what turning may bring
+    /// nearer in the step, half the speculative distance.
+    pub(crate) reach: Vec<f32>,
+    /// One for a box, zero for a circle.
+    pub(crate) boxy: Vec<f32>,
     pub(crate) owned: usize,
     /// Width and height of the tile, in meters.
     pub(crate) size: [f32; 2],
     /// Local coordinates are rounded; comparing them needs this much more room, in meters.
     pub(crate) slack: f32,
+    /// Length of a step, in seconds.
+    pub(crate) dt: f32,
 }
 
 impl Proxies {
@@ -35,41 +46,75 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies.
-    #[inline(never)]
     pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup) {
         let bodies = &tile.bodies;
-        let dynamic = tile.owned + tile.ghosts();
-        self.owned = tile.owned;
-        let total = bodies.len();
-        for column in [&mut self.x, &mut self.y, &mut self.half_x, &mut self.half_y] {
-            column.clear();
+        let (total, dynamic) = (bodies.len(), tile.owned + tile.ghosts());
+        let columns = [
+            &mut self.x,
+            &mut self.y,
+            &mut self.half_x,
+            &mut self.half_y,
+            &mut self.velocity_x,
+            &mut self.velocity_y,
+            &mut self.reach,
+            &mut self.boxy,
+        ];
+        let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy] = columns.map(|column| {
             column.resize(total, 0.0);
-        }
+            &mut column[..total]
+        });
+        let (position, velocity, rotation) =
+            (&bodies.position[..total], &bodies.velocity[..total], &bodies.rotation[..total]);
+        let (angular_velocity, kinds) = (&bodies.angular_velocity[..total], &bodies.kind[..total]);
         let mut farthest = 0.0;
-        let DVec2 { x: corner_x, y: corner_y } = tile.corner;
-        for (i, position) in bodies.position.iter().enumerate() {
-            let (x, y) = ((position.x - corner_x) as f32, (position.y - corner_y) as f32);
-            (self.x[i], self.y[i]) = (x, y);
-            farthest = crate::math::max(crate::math::max(x.abs(), y.abs()), farthest);
+        for i in 0..total {
+            let kind = setup.kind(kinds[i]);
+            let local = (position[i] - tile.corner).as_vec2();
+            (x[i], y[i]) = (local.x, local.y);
+            farthest = math::max(math::max(local.x.abs(), local.y.abs()), farthest);
+            let mut half = kind.half_extents(rotation[i]);
+            if i < dynamic {
+                half += Vec2::splat(setup.margin(velocity[i]));
+            }
+            (half_x[i], half_y[i]) = (half.x, half.y);
+            (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
+            // Turning brings no point of a circle nearer.
+            let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
+            let sweep = is_box * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
+            reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
+            boxy[i] = is_box;
         }
-        let columns = bodies.kind.iter().zip(&bodies.rotation).zip(&bodies.velocity);
-        let halves = self.half_x.iter_mut().zip(&mut self.half_y);
-        for (i, (((&kind, &rotation), &velocity), (half_x, half_y))) in columns.zip(halves).enumerate() {
-            let half = if i < dynamic {
-                setup.grown_half_extents(kind, rotation, velocity)
-            } else {
-                setup.kind(kind).half_extents(rotation)
-            };
-            (*half_x, *half_y) = (half.x, half.y);
-        }
+        self.owned = tile.owned;
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.slack = 4.0 * f32::EPSILON * farthest;
+        self.dt = setup.params.dt;
     }
 
-    /// Whether the grown AABBs of two bodies overlap: the definition of a pair.
+    /// Whether the grown AABBs of two bodies overlap in local coordinates, with room for their rounding.
     #[inline(always)]
-    pub(crate) fn overlap(&self, offset: Vec2, [a, b]: Pair) -> bool {
-        let (a, b, d) = (a as usize, b as usize, offset.abs());
-        (d.x <= self.half_x[a] + self.half_x[b]) & (d.y <= self.half_y[a] + self.half_y[b])
+    fn overlap(&self, [a, b]: Pair) -> bool {
+        let (a, b) = (a as usize, b as usize);
+        let apart_x = (self.x[a] - self.x[b]).abs() - (self.half_x[a] + self.half_x[b]);
+        let apart_y = (self.y[a] - self.y[b]).abs() - (self.half_y[a] + self.half_y[b]);
+        (apart_x <= self.slack) & (apart_y <= self.slack)
+    }
+
+    /// The definition of a pair: the grown AABBs of two bodies overlap, and their bounding circles may touch within the
+    /// step. `offset` leads from the center of the first to that of the second.
+    ///
+    /// Circles touch if distance < reach + closing speed x dt, the contact rule with the greatest closing speed there
+    /// can be. Of two circles that is known, of others only that it is no more than their relative speed. All is
+    /// multiplied by the distance, which saves a division.
+    #[inline(always)]
+    pub(crate) fn is_pair(&self, offset: Vec2, [a, b]: Pair) -> bool {
+        let (a, b, apart) = (a as usize, b as usize, offset.abs());
+        let overlap = (apart.x <= self.half_x[a] + self.half_x[b]) & (apart.y <= self.half_y[a] + self.half_y[b]);
+        let between = Vec2::new(self.velocity_x[b] - self.velocity_x[a], self.velocity_y[b] - self.velocity_y[a]);
+        let square = dot(offset, offset);
+        let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
+        let closing =
+            if self.boxy[a] + self.boxy[b] > 0.0 { speed * distance } else { math::max(-dot(between, offset), 0.0) };
+        let within = (self.reach[a] + self.reach[b]) * distance + self.dt * closing;
+        overlap & (square <= within * 1.0001)
     }
 }

@@ -1,18 +1,19 @@
 //! The inner loop of the grid: each body against the rest of its cell and the next, and three cells of the row above.
 //!
 //! Both are runs of memory of a few bodies. Loops over them would cost more in mispredicted branches than in
-//! comparisons, so with AVX2 each run is compared whole, eight bodies at once, and the hits are packed and stored
-//! without a branch. The pairs found are the same; their order is nobody's business (see the contract in [`super`]).
+//! comparisons, so with AVX2 each run is compared whole, eight bodies at once. Compared are bounding circles and speeds,
+//! a little more generously than [`Proxies::is_pair`] does, which has the last word.
 
 use super::{Pair, Proxies};
 
-/// Bodies in cell order: copies of their proxies, so that the search reads memory in order.
+/// Bodies in cell order: copies of what the search compares, so that it reads memory in order.
 #[derive(Default, Debug)]
 pub(super) struct Sorted {
     x: Vec<f32>,
     y: Vec<f32>,
-    half_x: Vec<f32>,
-    half_y: Vec<f32>,
+    velocity_x: Vec<f32>,
+    velocity_y: Vec<f32>,
+    reach: Vec<f32>,
     pub(super) body: Vec<u32>,
     cell: Vec<u32>,
     len: usize,
@@ -23,7 +24,9 @@ const PADDING: usize = 8;
 
 impl Sorted {
     pub(super) fn resize(&mut self, len: usize) {
-        for column in [&mut self.x, &mut self.y, &mut self.half_x, &mut self.half_y] {
+        for column in
+            [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach]
+        {
             column.resize(len + PADDING, 0.0);
         }
         self.body.resize(len + PADDING, 0);
@@ -36,33 +39,28 @@ impl Sorted {
         let i = body as usize;
         self.x[place] = proxies.x[i];
         self.y[place] = proxies.y[i];
-        self.half_x[place] = proxies.half_x[i];
-        self.half_y[place] = proxies.half_y[i];
+        self.velocity_x[place] = proxies.velocity_x[i];
+        self.velocity_y[place] = proxies.velocity_y[i];
+        self.reach[place] = proxies.reach[i];
         self.body[place] = body;
         self.cell[place] = cell;
-    }
-
-    /// Whether a box meets that of the body at `place`, in local coordinates with room for their rounding.
-    #[inline(always)]
-    pub(super) fn near(&self, [x, y, half_x, half_y]: [f32; 4], place: usize, slack: f32) -> bool {
-        let apart_x = (x - self.x[place]).abs() - (half_x + self.half_x[place]);
-        let apart_y = (y - self.y[place]).abs() - (half_y + self.half_y[place]);
-        (apart_x <= slack) & (apart_y <= slack)
-    }
-
-    fn proxy(&self, place: usize) -> [f32; 4] {
-        [self.x[place], self.y[place], self.half_x[place], self.half_y[place]]
     }
 }
 
 /// A search for the pairs among sorted bodies.
 pub(super) struct Search<'a> {
     pub(super) sorted: &'a Sorted,
-    pub(super) slack: f32,
     /// Pairs of two bodies from here on are not wanted.
     pub(super) owned: usize,
+    /// Length of a step, in seconds.
+    pub(super) dt: f32,
+    /// Room for the rounding of local coordinates, in meters.
+    pub(super) slack: f32,
     pub(super) pairs: &'a mut Vec<Pair>,
 }
+
+/// Room for the rounding of everything that follows from the coordinates.
+const MORE: f32 = 1.001;
 
 /// Where the two runs of a body lie that hold all its neighbours not yet met.
 #[inline(always)]
@@ -81,32 +79,39 @@ impl Search<'_> {
         }
         for place in 0..self.sorted.len {
             for (first, end) in runs(start, columns, self.sorted.cell[place] as usize, place) {
-                self.one_by_one(place, first, end);
+                for other in first..end {
+                    if self.may_touch(place, other) {
+                        self.emit(place, other);
+                    }
+                }
             }
         }
     }
 
-    fn one_by_one(&mut self, place: usize, first: usize, end: usize) {
-        let (proxy, body) = (self.sorted.proxy(place), self.sorted.body[place]);
-        for other in first..end {
-            if self.sorted.near(proxy, other, self.slack) {
-                super::grid::emit(self.pairs, self.owned, body, self.sorted.body[other]);
-            }
-        }
+    #[inline(always)]
+    fn may_touch(&self, a: usize, b: usize) -> bool {
+        let Sorted { x, y, velocity_x, velocity_y, reach, .. } = self.sorted;
+        let length = |x: f32, y: f32| (x * x + y * y).sqrt();
+        let distance = length(x[b] - x[a], y[b] - y[a]);
+        let speed = length(velocity_x[b] - velocity_x[a], velocity_y[b] - velocity_y[a]);
+        distance <= (reach[a] + reach[b] + self.dt * speed) * MORE + 2.0 * self.slack
+    }
+
+    #[inline(always)]
+    fn emit(&mut self, a: usize, b: usize) {
+        super::grid::emit(self.pairs, self.owned, self.sorted.body[a], self.sorted.body[b]);
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,popcnt")]
+    #[target_feature(enable = "avx2")]
     fn neighbours_avx2(mut self, start: &[u32], columns: usize) {
         use std::arch::x86_64::*;
         let sorted = self.sorted;
-        let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-        let sign = _mm256_set1_ps(-0.0);
-        let slack = _mm256_set1_ps(self.slack);
-        let owned = _mm256_set1_epi32(self.owned as i32);
+        let (dt, more, slack) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE), _mm256_set1_ps(2.0 * self.slack));
         for place in 0..sorted.len {
-            let [x, y, half_x, half_y] = sorted.proxy(place).map(|v| _mm256_set1_ps(v));
-            let body = _mm256_set1_epi32(sorted.body[place] as i32);
+            let one = |column: &[f32]| _mm256_set1_ps(column[place]);
+            let (x, y, reach) = (one(&sorted.x), one(&sorted.y), one(&sorted.reach));
+            let (velocity_x, velocity_y) = (one(&sorted.velocity_x), one(&sorted.velocity_y));
             for (first, end) in runs(start, columns, sorted.cell[place] as usize, place) {
                 let mut first = first;
                 loop {
@@ -115,37 +120,23 @@ impl Search<'_> {
                         // SAFETY: the pointer covers eight floats.
                         unsafe { _mm256_loadu_ps(run.as_ptr()) }
                     };
-                    let apart = |a: __m256, b: __m256, half_a: __m256, half_b: __m256| {
-                        _mm256_sub_ps(_mm256_andnot_ps(sign, _mm256_sub_ps(a, b)), _mm256_add_ps(half_a, half_b))
+                    let length = |x: __m256, y: __m256| {
+                        _mm256_sqrt_ps(_mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y)))
                     };
-                    let apart_x = apart(x, eight(&sorted.x), half_x, eight(&sorted.half_x));
-                    let apart_y = apart(y, eight(&sorted.y), half_y, eight(&sorted.half_y));
-                    let hit = _mm256_and_ps(
-                        _mm256_cmp_ps::<_CMP_LE_OQ>(apart_x, slack),
-                        _mm256_cmp_ps::<_CMP_LE_OQ>(apart_y, slack),
+                    let distance = length(_mm256_sub_ps(eight(&sorted.x), x), _mm256_sub_ps(eight(&sorted.y), y));
+                    let speed = length(
+                        _mm256_sub_ps(eight(&sorted.velocity_x), velocity_x),
+                        _mm256_sub_ps(eight(&sorted.velocity_y), velocity_y),
                     );
-                    let bodies: &[u32; 8] = sorted.body[first..first + 8].try_into().expect("eight");
-                    // SAFETY: the pointer covers eight integers.
-                    let other = unsafe { _mm256_loadu_si256(bodies.as_ptr().cast()) };
-                    let (low, high) = (_mm256_min_epu32(body, other), _mm256_max_epu32(body, other));
-                    let left = _mm256_set1_epi32(end as i32 - first as i32);
-                    let wanted = _mm256_and_si256(_mm256_cmpgt_epi32(owned, low), _mm256_cmpgt_epi32(left, lanes));
-                    let mask = _mm256_movemask_ps(_mm256_and_ps(hit, _mm256_castsi256_ps(wanted))) as usize;
-                    // SAFETY: the pointer covers eight integers.
-                    let packing = unsafe { _mm256_loadu_si256(PACKING[mask].as_ptr().cast()) };
-                    let low = _mm256_permutevar8x32_epi32(low, packing);
-                    let high = _mm256_permutevar8x32_epi32(high, packing);
-                    self.pairs.reserve(8);
-                    let length = self.pairs.len();
-                    // Interleaving works within halves of a register: pairs 0 1 4 5 and 2 3 6 7.
-                    let (even, odd) = (_mm256_unpacklo_epi32(low, high), _mm256_unpackhi_epi32(low, high));
-                    // SAFETY: room for eight pairs was made, and the first `count_ones` of them are now written. A pair
-                    // is two `u32` in a row.
-                    unsafe {
-                        let to = self.pairs.as_mut_ptr().add(length).cast::<__m256i>();
-                        _mm256_storeu_si256(to, _mm256_permute2x128_si256::<0x20>(even, odd));
-                        _mm256_storeu_si256(to.add(1), _mm256_permute2x128_si256::<0x31>(even, odd));
-                        self.pairs.set_len(length + mask.count_ones() as usize);
+                    let within = _mm256_add_ps(_mm256_add_ps(reach, eight(&sorted.reach)), _mm256_mul_ps(dt, speed));
+                    let within = _mm256_add_ps(_mm256_mul_ps(within, more), slack);
+                    let hits = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(distance, within)) as u32;
+                    // Lanes behind the end of the run are not meant.
+                    let left = end.saturating_sub(first).min(8) as u32;
+                    let mut hits = hits & ((1 << left) - 1);
+                    while hits != 0 {
+                        self.emit(place, first + hits.trailing_zeros() as usize);
+                        hits &= hits - 1;
                     }
                     first += 8;
                     if first >= end {
@@ -155,24 +146,4 @@ impl Search<'_> {
             }
         }
     }
-}
-
-/// For each set of lanes the permutation that packs them to the front.
-static PACKING: [[u32; 8]; 256] = packing();
-
-const fn packing() -> [[u32; 8]; 256] {
-    let mut table = [[0; 8]; 256];
-    let mut set = 0;
-    while set < 256 {
-        let (mut lane, mut packed) = (0, 0);
-        while lane < 8 {
-            if set >> lane & 1 == 1 {
-                table[set][packed] = lane;
-                packed += 1;
-            }
-            lane += 1;
-        }
-        set += 1;
-    }
-    table
 }

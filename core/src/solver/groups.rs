@@ -333,7 +333,7 @@ impl<const N: usize> Group<N> {
     fn bounce(&mut self, lane: usize, point: usize, speed: f32, bodies: &mut SolverBodies) {
         let (a, b) = (self.a[lane] as usize, self.b[lane] as usize);
         let rows = &mut self.points[point];
-        if !(rows.total_normal[lane] > 0.0) {
+        if rows.total_normal[lane] <= 0.0 {
             return;
         }
         let row_a = [self.normal_ax[lane], self.normal_ay[lane], rows.normal_a[lane]];
