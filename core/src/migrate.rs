@@ -10,6 +10,9 @@ use crate::id::{GlobalId, TileId};
 use crate::setup::Setup;
 use crate::tile::Tile;
 
+#[cfg(test)]
+mod tests;
+
 /// Buffers of [`send`] and [`receive`], shared by all tiles of a thread.
 #[derive(Default, Debug)]
 pub(crate) struct MigrateWork {

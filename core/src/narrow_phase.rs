@@ -224,7 +224,7 @@ fn recycle(known: &Contact, a: &Side<'_>, b: &Side<'_>, offset: Vec2, setup: &Se
         let extent = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { side.kind.bounding_radius } else { 0.0 };
         turned_a.to(turned_b).s.abs() * crate::math::max(extent(a), extent(b))
     };
-    if !(dot(moved, moved).sqrt() + twist < setup.params.recycle_distance) {
+    if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
         return None;
     }
     let shift = offset - known.offset;

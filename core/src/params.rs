@@ -53,8 +53,6 @@ pub struct Params {
     pub contact_damping_ratio: f32,
     /// Greatest speed at which overlap is pushed out, in m/s (3). More resolves overlap sooner, with more energy.
     pub push_out_speed: f32,
-    /// Length below which two surfaces count as one, in m (0.005).
-    pub linear_slop: f32,
     /// A contact is made when separation < this + closing speed x dt, in m (0.02).
     pub speculative_distance: f32,
     /// A contact's normal and anchors stay frozen until this much relative motion, in m (0.05). Zero computes every
@@ -91,7 +89,6 @@ impl Default for Params {
             contact_hertz: 30.0,
             contact_damping_ratio: 10.0,
             push_out_speed: 3.0,
-            linear_slop: 0.005,
             speculative_distance: 0.02,
             recycle_distance: 0.05,
             restitution_threshold: 1.0,
@@ -120,7 +117,6 @@ impl Params {
         positive("contact_hertz", self.contact_hertz)?;
         not_negative("contact_damping_ratio", self.contact_damping_ratio)?;
         not_negative("push_out_speed", self.push_out_speed)?;
-        not_negative("linear_slop", self.linear_slop)?;
         not_negative("speculative_distance", self.speculative_distance)?;
         not_negative("recycle_distance", self.recycle_distance)?;
         not_negative("restitution_threshold", self.restitution_threshold)?;

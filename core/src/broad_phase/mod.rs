@@ -6,6 +6,8 @@
 
 pub(crate) mod grid;
 mod search;
+#[cfg(test)]
+mod tests;
 
 use crate::math::{self, dot};
 use crate::setup::Setup;

@@ -69,11 +69,20 @@ fn runs(start: &[u32], columns: usize, cell: usize, place: usize) -> [(usize, us
     [(place + 1, start[cell + 2] as usize), (start[above - 1] as usize, start[above + 2] as usize)]
 }
 
+/// Whether a test asks for the search without AVX2.
+#[inline(always)]
+fn portable_wanted() -> bool {
+    #[cfg(test)]
+    return super::tests::PORTABLE.get();
+    #[cfg(not(test))]
+    false
+}
+
 impl Search<'_> {
     /// Every pair of neighbours. `start` holds where each cell begins, `columns` how many cells a row has.
     pub(super) fn neighbours(mut self, start: &[u32], columns: usize) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
+        if is_x86_feature_detected!("avx2") && !portable_wanted() {
             // SAFETY: the processor has just said that it has AVX2.
             return unsafe { self.neighbours_avx2(start, columns) };
         }

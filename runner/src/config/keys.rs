@@ -25,7 +25,6 @@ pub(super) const KEYS: &[&str] = &[
     "physics.contact_hertz",
     "physics.contact_damping_ratio",
     "physics.push_out_speed",
-    "physics.linear_slop",
     "physics.speculative_distance",
     "physics.recycle_distance",
     "physics.restitution_threshold",

@@ -174,7 +174,6 @@ impl Config {
             contact_hertz,
             contact_damping_ratio,
             push_out_speed,
-            linear_slop,
             speculative_distance,
             recycle_distance,
             restitution_threshold,
@@ -196,7 +195,7 @@ impl Config {
         line!(linear_damping = linear_damping, angular_damping = angular_damping);
         line!(max_linear_speed = max_linear_speed, max_angular_speed = max_angular_speed);
         line!(contact_hertz = contact_hertz, contact_damping_ratio = contact_damping_ratio);
-        line!(push_out_speed = push_out_speed, linear_slop = linear_slop);
+        line!(push_out_speed = push_out_speed);
         line!(speculative_distance = speculative_distance, recycle_distance = recycle_distance);
         line!(restitution_threshold = restitution_threshold);
         line!(margin_floor = margin_floor, margin_cap = margin_cap, sort_interval = sort_interval);
@@ -250,7 +249,7 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
         return Err(ConfigError::Inapplicable { place, reason });
     }
     let tiles = settings.tiles("run.tiles", MOST_TILES)?;
-    let peer_timeout = Duration::from_secs_f64(settings.number("run.peer_timeout", 0.001..=1e6, 60.0)?);
+    let peer_timeout = Duration::from_secs_f64(settings.number("run.peer_timeout", 0.001..=1e6, 30.0)?);
     Ok(RunConfig { steps, ranks, threads, transport, tiles, peer_timeout })
 }
 
@@ -274,7 +273,6 @@ fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, Conf
         contact_hertz: settings.float("physics.contact_hertz", usual.contact_hertz)?,
         contact_damping_ratio: settings.float("physics.contact_damping_ratio", usual.contact_damping_ratio)?,
         push_out_speed: settings.float("physics.push_out_speed", usual.push_out_speed)?,
-        linear_slop: settings.float("physics.linear_slop", usual.linear_slop)?,
         speculative_distance: settings.float("physics.speculative_distance", usual.speculative_distance)?,
         recycle_distance: settings.float("physics.recycle_distance", usual.recycle_distance)?,
         restitution_threshold: settings.float("physics.restitution_threshold", usual.restitution_threshold)?,

@@ -54,7 +54,6 @@ fn every_key_can_be_given() {
         contact_hertz = 20
         contact_damping_ratio = 5
         push_out_speed = 2
-        linear_slop = 0.01
         speculative_distance = 0.03
         recycle_distance = 0
         restitution_threshold = 2
@@ -124,7 +123,7 @@ fn out_of_range_and_of_the_wrong_type() {
         ("physics", "substeps = 65", "test.toml: physics.substeps = 65: must be within 1 to 64"),
         ("physics", "gravity = -10", "test.toml: physics.gravity = -10: must be two numbers, such as [0, -10]"),
         ("physics", "gravity = [0, nan]", "test.toml: physics.gravity = [0, nan]: must be finite"),
-        ("physics", "linear_slop = -1", "test.toml: physics.linear_slop = -1: must be at least 0 and finite"),
+        ("physics", "push_out_speed = -1", "test.toml: physics.push_out_speed = -1: must be at least 0 and finite"),
         ("physics", "sleep = 1", "test.toml: physics.sleep = 1: must be true or false"),
         (
             "physics",

@@ -1,0 +1,111 @@
+//! What this crate's own tests share.
+
+use crate::halo::{Halo, Inbox, Outbox};
+use crate::math::Rot;
+use crate::shape::{Kind, Material, Shape};
+use glam::{DVec2, Vec2};
+use proptest::prelude::*;
+use std::convert::Infallible;
+
+/// How many cases a property is tried on, unless the environment says `PROPTEST_CASES`.
+pub(crate) fn cases(cases: u32) -> ProptestConfig {
+    let asked = std::env::var_os("PROPTEST_CASES").is_some();
+    if asked { ProptestConfig::default() } else { ProptestConfig::with_cases(cases) }
+}
+
+/// One rank alone.
+pub(crate) struct Loopback;
+
+impl Halo for Loopback {
+    type Error = Infallible;
+
+    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Infallible> {
+        outbox.deliver(inbox);
+        Ok(())
+    }
+}
+
+/// A rough circle.
+pub(crate) fn circle(radius: f32) -> Kind {
+    Kind { shape: Shape::circle(radius), material: Material::default() }
+}
+
+/// A rough box of the given whole sides.
+pub(crate) fn rectangle(width: f32, height: f32) -> Kind {
+    Kind { shape: Shape::rectangle(width, height), material: Material::default() }
+}
+
+/// Circles and boxes, evenly spread over the orders of magnitude between two sizes.
+pub(crate) fn any_kind(least: f32, most: f32) -> impl Strategy<Value = Kind> {
+    let size = move || (least.log10()..most.log10()).prop_map(|exponent| 10.0_f32.powf(exponent));
+    prop_oneof![size().prop_map(circle), (size(), size()).prop_map(|(width, height)| rectangle(width, height))]
+}
+
+/// Any direction; the four straight ones more often than chance would have it.
+pub(crate) fn any_rotation() -> impl Strategy<Value = Rot> {
+    prop_oneof![
+        1 => Just(Rot::IDENTITY),
+        1 => Just(Rot { c: 0.0, s: -1.0 }),
+        4 => (-3.2_f32..3.2).prop_map(Rot::from_angle),
+    ]
+}
+
+/// The outline of a shape in double precision: corners, and how far around them it reaches.
+pub(crate) fn outline(shape: Shape, rotation: Rot, center: DVec2) -> (Vec<DVec2>, f64) {
+    match shape {
+        Shape::Circle { radius } => (vec![center], f64::from(radius)),
+        Shape::Box { half } => {
+            let (c, s) = (f64::from(rotation.c), f64::from(rotation.s));
+            let half = half.as_dvec2();
+            let corner = |x: f64, y: f64| center + DVec2::new(c * x * half.x - s * y * half.y, s * x * half.x + c * y * half.y);
+            (vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0.0)
+        }
+    }
+}
+
+/// Distance of two shapes by trying every edge against every edge; zero or less where they overlap.
+pub(crate) fn distance(a: Shape, rot_a: Rot, b: Shape, rot_b: Rot, offset: Vec2) -> f64 {
+    let (corners_a, round_a) = outline(a, rot_a, DVec2::ZERO);
+    let (corners_b, round_b) = outline(b, rot_b, offset.as_dvec2());
+    if holds(&corners_a, corners_b[0]) || holds(&corners_b, corners_a[0]) {
+        return 0.0;
+    }
+    let edges = |corners: &[DVec2]| -> Vec<(DVec2, DVec2)> {
+        (0..corners.len()).map(|i| (corners[i], corners[(i + 1) % corners.len()])).collect()
+    };
+    let mut least = f64::INFINITY;
+    for (a0, a1) in edges(&corners_a) {
+        for (b0, b1) in edges(&corners_b) {
+            if cross(a1 - a0, b0 - a0) * cross(a1 - a0, b1 - a0) < 0.0
+                && cross(b1 - b0, a0 - b0) * cross(b1 - b0, a1 - b0) < 0.0
+            {
+                return 0.0;
+            }
+            // Edges that do not cross are nearest at an end of one of them.
+            for (point, edge) in [(a0, (b0, b1)), (a1, (b0, b1)), (b0, (a0, a1)), (b1, (a0, a1))] {
+                least = least.min(to_edge(point, edge));
+            }
+        }
+    }
+    least - round_a - round_b
+}
+
+fn cross(a: DVec2, b: DVec2) -> f64 {
+    a.x * b.y - a.y * b.x
+}
+
+/// Whether a point lies in the box of the given corners, counter-clockwise; never in a single point.
+fn holds(corners: &[DVec2], point: DVec2) -> bool {
+    corners.len() > 1
+        && (0..corners.len()).all(|i| {
+            let (from, to) = (corners[i], corners[(i + 1) % corners.len()]);
+            cross(to - from, point - from) >= 0.0
+        })
+}
+
+fn to_edge(point: DVec2, (from, to): (DVec2, DVec2)) -> f64 {
+    let along = to - from;
+    let length = along.dot(along);
+    let part = if length > 0.0 { ((point - from).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (point - from - along * part).length()
+}
