@@ -1,8 +1,8 @@
 //! Two tiles, a halo of one's own, and a disc that flies from one tile into the other.
 
 use atoll_core::{
-    Blueprint, Body, GlobalId, Halo, Inbox, Kind, KindId, Material, Outbox, Params, Rot, Shape, TileGrid, TileId, World,
-    step,
+    Blueprint, Body, GlobalId, Halo, Inbox, Kind, KindId, Material, Outbox, Params, Rot, Shape, TileGrid, TileId,
+    World, step,
 };
 use glam::{DVec2, Vec2};
 use std::convert::Infallible;

@@ -66,12 +66,30 @@ pub struct Bodies {
 
 macro_rules! each_column {
     ($self:ident, $column:ident => $body:expr) => {{
-        { let $column = &mut $self.id; $body; }
-        { let $column = &mut $self.position; $body; }
-        { let $column = &mut $self.rotation; $body; }
-        { let $column = &mut $self.velocity; $body; }
-        { let $column = &mut $self.angular_velocity; $body; }
-        { let $column = &mut $self.kind; $body; }
+        {
+            let $column = &mut $self.id;
+            $body;
+        }
+        {
+            let $column = &mut $self.position;
+            $body;
+        }
+        {
+            let $column = &mut $self.rotation;
+            $body;
+        }
+        {
+            let $column = &mut $self.velocity;
+            $body;
+        }
+        {
+            let $column = &mut $self.angular_velocity;
+            $body;
+        }
+        {
+            let $column = &mut $self.kind;
+            $body;
+        }
     }};
 }
 

@@ -9,7 +9,7 @@ use crate::halo::{BorderImpulse, BorderPoint, GhostRefresh, Mailbag, Unseen};
 use crate::id::{GlobalId, TileId};
 use crate::narrow_phase::Contacts;
 use crate::solver::Solver;
-use crate::tile::Tile;
+use crate::tile::{Fault, Tile};
 
 /// The border contacts of a tile and who must hear of them; made once a step.
 #[derive(Default, Debug)]
@@ -131,11 +131,13 @@ impl Border {
                 let of_peer = |ghost: &&u32| tile.ghost_owners[**ghost as usize] == message.from;
                 match ghosts.next_if(of_peer) {
                     Some(&ghost) => solver.bodies.refresh(tile.owned + ghost as usize, refresh),
-                    None => tile.counts.protocol_broken = true,
+                    None => tile.counts.fault = Some(Fault::Protocol),
                 }
             }
         }
-        tile.counts.protocol_broken |= ghosts.next().is_some();
+        if ghosts.next().is_some() {
+            tile.counts.fault = Some(Fault::Protocol);
+        }
         for border in &self.contacts {
             solver.refresh_separation(border.contact);
         }
@@ -161,7 +163,7 @@ impl Border {
                         solver.move_to_mean(contacts, border.contact, border.owns_a, theirs);
                     }
                 }
-                Err(_) => tile.counts.protocol_broken = true,
+                Err(_) => tile.counts.fault = Some(Fault::Protocol),
             }
         }
     }

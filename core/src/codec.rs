@@ -55,11 +55,26 @@ impl Header {
 /// The five arrays of a message, each as one expression: their order on the wire.
 macro_rules! each_array {
     ($message:expr, $array:ident => $body:expr) => {{
-        { let $array = $message.migrants; $body; }
-        { let $array = $message.contacts; $body; }
-        { let $array = $message.ghosts; $body; }
-        { let $array = $message.refreshes; $body; }
-        { let $array = $message.impulses; $body; }
+        {
+            let $array = $message.migrants;
+            $body;
+        }
+        {
+            let $array = $message.contacts;
+            $body;
+        }
+        {
+            let $array = $message.ghosts;
+            $body;
+        }
+        {
+            let $array = $message.refreshes;
+            $body;
+        }
+        {
+            let $array = $message.impulses;
+            $body;
+        }
     }};
 }
 
@@ -102,13 +117,7 @@ fn message_length(message: &Message) -> usize {
 impl Outbox {
     /// Writes into `lengths`, for each of `size` ranks, how many bytes its frame takes. The own rank gets none: its
     /// messages are for [`Outbox::deliver`].
-    pub fn frame_lengths(
-        &self,
-        size: usize,
-        rank_of: &dyn Fn(TileId) -> usize,
-        own: usize,
-        lengths: &mut Vec<usize>,
-    ) {
+    pub fn frame_lengths(&self, size: usize, rank_of: &dyn Fn(TileId) -> usize, own: usize, lengths: &mut Vec<usize>) {
         lengths.clear();
         lengths.resize(size, Header::of(self, 0).length());
         for message in self.messages() {

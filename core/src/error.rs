@@ -125,6 +125,15 @@ pub enum StepError<E> {
         /// The lowest such body of the whole world.
         id: GlobalId,
     },
+    /// A thread of this rank flushes small numbers to zero or rounds in another direction.
+    #[error(
+        "step {step}: the floating-point mode of a thread was changed (flush-to-zero, or another rounding); results \
+         would differ between ranks: find the library that sets it"
+    )]
+    FloatMode {
+        /// The step.
+        step: u64,
+    },
     /// Two tiles disagree about what was sent: a bug, or memory gone bad.
     #[error("step {step}: tile {tile} received state of a body it does not know")]
     Protocol {

@@ -7,6 +7,9 @@ use bytemuck::{Pod, Zeroable};
 use std::fmt;
 use xxhash_rust::xxh3::xxh3_128;
 
+#[cfg(test)]
+mod tests;
+
 /// Two sums modulo 2^128 of xxh3-128 hashes, one per body and one per contact copy held; sums do not depend on order,
 /// so neither on ranks. Equal both, equal futures.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -21,10 +24,7 @@ impl Hashes {
     /// The hashes of two disjoint parts of a world, joined.
     #[must_use]
     pub fn merge(self, other: Self) -> Self {
-        Self {
-            state: self.state.wrapping_add(other.state),
-            contact: self.contact.wrapping_add(other.contact),
-        }
+        Self { state: self.state.wrapping_add(other.state), contact: self.contact.wrapping_add(other.contact) }
     }
 
     pub(crate) fn add_body(&mut self, body: &Body) {

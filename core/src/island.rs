@@ -4,6 +4,9 @@
 //! unions, so the result is a function of the contacts alone. Source: R. Tarjan and J. van Leeuwen, "Worst-case
 //! analysis of set union algorithms", 1984.
 
+#[cfg(test)]
+mod tests;
+
 /// Disjoint sets of the numbers below some bound.
 #[derive(Default, Debug)]
 pub struct UnionFind {

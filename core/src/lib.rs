@@ -56,6 +56,8 @@
 //! For one tile grid and one set of parameters: the same bits in debug and release builds, on every x86-64 processor,
 //! at any vector width, on any ranks and threads. Other tile grids agree physically, not bitwise.
 
+#![deny(unsafe_code)]
+
 mod body;
 mod border;
 mod broad_phase;

@@ -66,6 +66,16 @@ impl Rot {
     }
 }
 
+/// Whether this thread computes as IEEE 754 has it by default: subnormal numbers kept, rounding to nearest. A library
+/// loaded into the process may have changed that.
+pub(crate) fn float_mode_is_default() -> bool {
+    let hide = std::hint::black_box::<f32>;
+    let keeps_subnormals = hide(f32::MIN_POSITIVE) * hide(0.5) > 0.0;
+    // A quarter of the last place of one vanishes, three quarters of it round up: in no direction but to nearest.
+    let ulp = f32::EPSILON;
+    keeps_subnormals && hide(1.0) + hide(0.25 * ulp) == 1.0 && hide(1.0) + hide(0.75 * ulp) == 1.0 + ulp
+}
+
 /// The z component of the cross product of two vectors.
 #[inline(always)]
 pub(crate) fn cross(a: Vec2, b: Vec2) -> f32 {
@@ -106,4 +116,34 @@ pub(crate) fn min(a: f32, b: f32) -> f32 {
 #[inline(always)]
 pub(crate) fn clamp(x: f32, low: f32, high: f32) -> f32 {
     min(max(x, low), high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_float_mode_is_told_from_others() {
+        assert!(float_mode_is_default());
+        #[cfg(target_arch = "x86_64")]
+        for changed in [0x1F80 | 1 << 15, 0x1F80 | 1 << 13, 0x1F80 | 1 << 14, 0x1F80 | 3 << 13] {
+            // Flush to zero; rounding down, up, towards zero.
+            assert!(!with_mxcsr(changed, float_mode_is_default));
+        }
+        assert!(float_mode_is_default());
+    }
+
+    /// Runs `f` under another control word of the SSE unit.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    fn with_mxcsr<R>(changed: u32, f: impl Fn() -> R) -> R {
+        let set = |word: u32| {
+            // SAFETY: loads a valid control word, all exceptions masked; the caller puts the default back.
+            unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &word) };
+        };
+        set(changed);
+        let result = f();
+        set(0x1F80);
+        result
+    }
 }

@@ -192,8 +192,7 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
             tile.bodies.push(body);
         }
         for record in &message.contacts {
-            let authority =
-                if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
+            let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
             let pair = (record.low, record.high);
             tile.strays.push(Stray { pair, authority, contact: record.contact });
         }

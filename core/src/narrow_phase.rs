@@ -52,7 +52,9 @@ impl Contacts {
             let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
             let (a, b, pair) = if ids.0 < ids.1 { (low, high, ids) } else { (high, low, (ids.1, ids.0)) };
             let is_ghost = (tile.owned..tile.owned + ghosts).contains(&(high as usize));
-            let strange = is_ghost || low as usize >= tile.arrived || (high as usize) < tile.owned && high as usize >= tile.arrived;
+            let strange = is_ghost
+                || low as usize >= tile.arrived
+                || (high as usize) < tile.owned && high as usize >= tile.arrived;
             let stray = if strange { tile.strays.find(pair) } else { None };
             if let Some((contact, separation)) = touch(tile, [a, b], stray.or(known), setup) {
                 self.cache.push(key, contact);
@@ -195,13 +197,8 @@ fn touch(tile: &Tile, [a, b]: Pair, known: Option<&Contact>, setup: &Setup) -> O
             feature: point.feature,
         }
     });
-    let contact = Contact {
-        normal: kept.normal,
-        offset,
-        rotation_a: side_a.rotation,
-        rotation_b: side_b.rotation,
-        points,
-    };
+    let contact =
+        Contact { normal: kept.normal, offset, rotation_a: side_a.rotation, rotation_b: side_b.rotation, points };
     Some((contact, [points[0].separation, points[1].separation]))
 }
 

@@ -106,7 +106,8 @@ impl Params {
     /// Refuses what no step can be made with.
     pub fn check(&self) -> Result<(), SetupError> {
         let positive = |name, value: f32| require(name, value, value > 0.0 && value.is_finite(), "positive and finite");
-        let not_negative = |name, value: f32| require(name, value, value >= 0.0 && value.is_finite(), "at least 0 and finite");
+        let not_negative =
+            |name, value: f32| require(name, value, value >= 0.0 && value.is_finite(), "at least 0 and finite");
         positive("dt", self.dt)?;
         require("substeps", self.substeps as f32, (1..=64).contains(&self.substeps), "within 1 to 64")?;
         require("gravity", self.gravity.length(), self.gravity.is_finite(), "finite")?;

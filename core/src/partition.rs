@@ -5,6 +5,9 @@ use crate::id::TileId;
 use glam::{DVec2, Vec2};
 use std::ops::RangeInclusive;
 
+#[cfg(test)]
+mod tests;
+
 /// The domain cut into columns x rows equal tiles.
 ///
 /// A tile holds the half-open rectangle between its edges; the outermost ones reach to infinity, so that every point of
@@ -129,12 +132,7 @@ impl TileGrid {
     }
 
     #[inline]
-    fn reached_span(
-        &self,
-        center: DVec2,
-        half: Vec2,
-        reach: f64,
-    ) -> (RangeInclusive<usize>, RangeInclusive<usize>) {
+    fn reached_span(&self, center: DVec2, half: Vec2, reach: f64) -> (RangeInclusive<usize>, RangeInclusive<usize>) {
         let (half_x, half_y) = (f64::from(half.x) + reach, f64::from(half.y) + reach);
         (
             self.x.locate(center.x - half_x)..=self.x.locate(center.x + half_x),

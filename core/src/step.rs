@@ -7,6 +7,7 @@ use crate::migrate;
 use crate::params::Exchange;
 use crate::phase::Phase;
 use crate::solver;
+use crate::tile::Fault;
 use crate::world::{Bench, World};
 
 /// What one step of one rank was like. Counts are of this rank's tiles.
@@ -187,8 +188,10 @@ fn average(bench: &mut Bench<'_>) {
 fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E>> {
     let mut report = StepReport { step: world.step, stopped, ..StepReport::default() };
     for tile in world.tile_states() {
-        if tile.counts.protocol_broken {
-            return Err(StepError::Protocol { step: world.step, tile: tile.id });
+        match tile.counts.fault {
+            Some(Fault::Protocol) => return Err(StepError::Protocol { step: world.step, tile: tile.id }),
+            Some(Fault::FloatMode) => return Err(StepError::FloatMode { step: world.step }),
+            None => {}
         }
         report.contacts += tile.counts.contacts;
         report.border_contacts += tile.counts.border_contacts;

@@ -57,7 +57,8 @@ pub(crate) fn outline(shape: Shape, rotation: Rot, center: DVec2) -> (Vec<DVec2>
         Shape::Box { half } => {
             let (c, s) = (f64::from(rotation.c), f64::from(rotation.s));
             let half = half.as_dvec2();
-            let corner = |x: f64, y: f64| center + DVec2::new(c * x * half.x - s * y * half.y, s * x * half.x + c * y * half.y);
+            let corner =
+                |x: f64, y: f64| center + DVec2::new(c * x * half.x - s * y * half.y, s * x * half.x + c * y * half.y);
             (vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0.0)
         }
     }

@@ -48,8 +48,17 @@ pub(crate) struct TileCounts {
     pub(crate) largest_island: u64,
     /// The lowest owned body whose state is no longer finite.
     pub(crate) not_finite: Option<GlobalId>,
+    /// What must never happen, and did.
+    pub(crate) fault: Option<Fault>,
+}
+
+/// What ends a run because its results could not be trusted any more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Fault {
     /// A message spoke of a body that is not known here.
-    pub(crate) protocol_broken: bool,
+    Protocol,
+    /// This thread's floating-point unit does not compute as IEEE 754 has it by default.
+    FloatMode,
 }
 
 impl Tile {

@@ -9,13 +9,14 @@ use crate::halo::{Halo, Inbox, Mailbag, Outbox, Verdict};
 use crate::hash::Hashes;
 use crate::id::TileId;
 use crate::island::Islands;
+use crate::math::float_mode_is_default;
 use crate::migrate::MigrateWork;
 use crate::narrow_phase::Contacts;
 use crate::params::Exchange;
 use crate::phase::{Phase, Stopwatch, Timings};
 use crate::setup::{Blueprint, Setup};
 use crate::solver::Solver;
-use crate::tile::Tile;
+use crate::tile::{Fault, Tile};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -208,9 +209,12 @@ impl World {
         let Self { setup, works, tiles, outbox, inbox, step, .. } = self;
         let (setup, works, step) = (&*setup, &*works, *step);
         let per_tile = setup.params.exchange == Exchange::Substep;
-        let run = |(place, ((tile, outgoing), incoming))| {
+        let run = |(place, ((tile, outgoing), incoming)): (usize, ((&mut Tile, _), _))| {
             let work = if per_tile { place } else { rayon::current_thread_index().unwrap_or(0) };
             let mut work = works[work].lock().expect("no stage panicked");
+            if !float_mode_is_default() {
+                tile.counts.fault = Some(Fault::FloatMode);
+            }
             stage(&mut Bench { tile, work: &mut work, outgoing, incoming, setup, step })
         };
         // One thread, or one tile: no need to hand the work around.

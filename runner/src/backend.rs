@@ -66,7 +66,7 @@ fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
     }
     // Stable: among equals, the lowest rank's.
     errors.sort_by_key(|error| match error {
-        RunError::NonFinite { .. } | RunError::Protocol { .. } | RunError::Setup(_) | RunError::Threads { .. } => 0,
+        RunError::NonFinite { .. } | RunError::Protocol { .. } | RunError::FloatMode { .. } | RunError::Setup(_) | RunError::Threads { .. } => 0,
         // A rank that says itself how it ended, before those that merely miss it.
         RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
         _ => 2,
@@ -94,6 +94,7 @@ fn told(error: RankError, complete: u64, steps: u64) -> RunError {
         RankError::Transport(error) => transport(error),
         RankError::Step(StepError::NonFinite { step, id }) => RunError::NonFinite { step, id },
         RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
+        RankError::Step(StepError::FloatMode { step }) => RunError::FloatMode { step },
         RankError::Step(StepError::Halo(ExchangeError::Transport(error))) => transport(error),
         RankError::Step(StepError::Halo(error @ ExchangeError::Frame { from, .. })) => {
             RunError::PeerLost { rank: from, complete, steps, reason: error.to_string() }

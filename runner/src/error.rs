@@ -100,6 +100,15 @@ pub enum RunError {
         /// The tile.
         tile: TileId,
     },
+    /// A thread's floating-point unit was switched to another mode.
+    #[error(
+        "step {step}: the floating-point mode of a thread was changed (flush-to-zero, or another rounding), so results \
+         would differ between ranks; find the library that sets it"
+    )]
+    FloatMode {
+        /// The step, counted from 0.
+        step: u64,
+    },
     /// Bodies are missing, or there are too many.
     #[error("the physics failed a check: {found} bodies at the end of a world of {expected}; please report this")]
     BodiesLost {
@@ -128,7 +137,9 @@ impl RunError {
             | Self::BadOutput { .. }
             | Self::Threads { .. } => Exit::Usage,
             Self::PeerLost { .. } | Self::Transport { .. } => Exit::PeerLost,
-            Self::NonFinite { .. } | Self::Protocol { .. } | Self::BodiesLost { .. } => Exit::Physics,
+            Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {
+                Exit::Physics
+            }
             Self::Output { .. } => Exit::Output,
         }
     }

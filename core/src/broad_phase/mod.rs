@@ -5,6 +5,7 @@
 //! coordinates, so two tiles that both see a pair agree on it.
 
 pub(crate) mod grid;
+#[allow(unsafe_code)]
 mod search;
 #[cfg(test)]
 mod tests;

@@ -24,9 +24,7 @@ const PADDING: usize = 8;
 
 impl Sorted {
     pub(super) fn resize(&mut self, len: usize) {
-        for column in
-            [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach]
-        {
+        for column in [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach] {
             column.resize(len + PADDING, 0.0);
         }
         self.body.resize(len + PADDING, 0);
@@ -129,9 +127,8 @@ impl Search<'_> {
                         // SAFETY: the pointer covers eight floats.
                         unsafe { _mm256_loadu_ps(run.as_ptr()) }
                     };
-                    let length = |x: __m256, y: __m256| {
-                        _mm256_sqrt_ps(_mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y)))
-                    };
+                    let length =
+                        |x: __m256, y: __m256| _mm256_sqrt_ps(_mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y)));
                     let distance = length(_mm256_sub_ps(eight(&sorted.x), x), _mm256_sub_ps(eight(&sorted.y), y));
                     let speed = length(
                         _mm256_sub_ps(eight(&sorted.velocity_x), velocity_x),

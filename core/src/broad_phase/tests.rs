@@ -141,7 +141,13 @@ fn any_tile(bodies: usize, statics: usize) -> impl Strategy<Value = Stuffed> {
 
 impl std::fmt::Debug for Stuffed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(f, "a tile of {} from {}, {} bodies owned:", self.setup.grid.tile_size(), self.tile.corner, self.tile.owned)?;
+        writeln!(
+            f,
+            "a tile of {} from {}, {} bodies owned:",
+            self.setup.grid.tile_size(),
+            self.tile.corner,
+            self.tile.owned
+        )?;
         let kinds = self.tile.bodies.kind.iter().map(|&kind| self.setup.kind(kind).shape);
         self.tile.bodies.iter().zip(kinds).try_for_each(|(body, shape)| writeln!(f, "{body:?} {shape:?}"))
     }
@@ -247,6 +253,7 @@ fn shapes_know_their_distance() {
     assert_eq!(gap(square, square, Vec2::new(0.1, 0.1)), 0.0);
     assert_eq!(gap(square, disc, Vec2::new(4.0, 5.0)), 4.0);
     assert_eq!(gap(disc, disc, Vec2::new(0.0, 3.0)), 1.0);
-    let turned = distance(square, Rot::from_angle(std::f32::consts::FRAC_PI_4), disc, Rot::IDENTITY, Vec2::new(3.0, 0.0));
+    let turned =
+        distance(square, Rot::from_angle(std::f32::consts::FRAC_PI_4), disc, Rot::IDENTITY, Vec2::new(3.0, 0.0));
     assert!((turned - (2.0 - 2.0_f64.sqrt())).abs() < 1e-6);
 }

@@ -176,7 +176,8 @@ fn check_border_contacts(world: &World) -> usize {
         for (pair, (peer, contact)) in contacts {
             let Some(peer) = peer.filter(|peer| peer != id) else { continue };
             let theirs = &tiles[peer.0 as usize].1;
-            let (back, other) = theirs.get(pair).unwrap_or_else(|| panic!("tile {peer} does not see {pair:?} of tile {id}"));
+            let (back, other) =
+                theirs.get(pair).unwrap_or_else(|| panic!("tile {peer} does not see {pair:?} of tile {id}"));
             assert_eq!(*back, Some(*id));
             let (mut mine, mut other) = (*contact, *other);
             if world.setup.params.exchange == Exchange::Step {

@@ -157,7 +157,11 @@ impl Groups {
                 for point in 0..contact.point_count() {
                     let closing = constraint.closing_speed(tile, point);
                     if closing > setup.params.restitution_threshold {
-                        self.bounces.push(Bounce { contact: i as u32, point: point as u32, speed: restitution * closing });
+                        self.bounces.push(Bounce {
+                            contact: i as u32,
+                            point: point as u32,
+                            speed: restitution * closing,
+                        });
                     }
                 }
             }
@@ -233,8 +237,7 @@ impl Groups {
     pub(crate) fn set_impulses(&mut self, contact: u32, point: usize, normal: f32, tangent: f32) {
         let Place { double, group, lane } = self.places[contact as usize];
         let (group, lane) = (group as usize, lane as usize);
-        let rows =
-            if double { &mut self.doubles[group].points[point] } else { &mut self.singles[group].points[point] };
+        let rows = if double { &mut self.doubles[group].points[point] } else { &mut self.singles[group].points[point] };
         rows.normal_impulse[lane] = normal;
         rows.tangent_impulse[lane] = tangent;
     }

@@ -290,8 +290,19 @@ mod tests {
             let index = [7, 0, 3, 9, 1, 8, 2, 5];
             let [p, q, r, s] = V::gather(self.2, &index);
             let mut rows = vec![
-                a.add(b), a.sub(b), a.mul(b), a.div(b), a.mul(a).sqrt(), a.max(b), a.min(b), a.if_positive(a, b),
-                V::splat(0.3).mul(a), p, q, r, s,
+                a.add(b),
+                a.sub(b),
+                a.mul(b),
+                a.div(b),
+                a.mul(a).sqrt(),
+                a.max(b),
+                a.min(b),
+                a.if_positive(a, b),
+                V::splat(0.3).mul(a),
+                p,
+                q,
+                r,
+                s,
             ]
             .into_iter()
             .flat_map(|v| {

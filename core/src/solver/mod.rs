@@ -19,6 +19,7 @@ mod bodies;
 mod coloring;
 mod groups;
 mod kernels;
+#[allow(unsafe_code)]
 pub(crate) mod lanes;
 pub(crate) mod softness;
 
@@ -48,7 +49,11 @@ impl Solver {
     /// Contacts between bodies that move, as indices of solver bodies less one (the first stands for all statics).
     pub(crate) fn links<'a>(&'a self, contacts: &'a [Pair]) -> impl Iterator<Item = (u32, u32)> + 'a {
         let index = |body: u32| self.bodies.index_of(body);
-        contacts.iter().map(move |&[a, b]| (index(a), index(b))).filter(|&(a, b)| a != 0 && b != 0).map(|(a, b)| (a - 1, b - 1))
+        contacts
+            .iter()
+            .map(move |&[a, b]| (index(a), index(b)))
+            .filter(|&(a, b)| a != 0 && b != 0)
+            .map(|(a, b)| (a - 1, b - 1))
     }
 
     /// Colors the contacts and writes their constraints.
