@@ -18,6 +18,9 @@ use bincode::config::{Configuration, Fixint, Limit, LittleEndian};
 use bincode::{Decode, Encode};
 use bytemuck::Pod;
 
+#[cfg(test)]
+mod tests;
+
 /// The version of the frame; grows with every change of any record.
 pub const FORMAT: u32 = 1;
 

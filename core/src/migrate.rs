@@ -74,7 +74,6 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
 }
 
 /// Finds the bodies near or beyond the tile's border, their owners, and who needs a ghost of them.
-#[inline(never)]
 fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
     if work.mark.len() < tile.owned {
         work.mark.resize(tile.owned, 0);
@@ -104,7 +103,6 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
 
 /// One pass over the contacts of the last step: sums unseen impulses, sends the contacts of departing bodies, and
 /// moves those that cannot be found by slot any more to the strays.
-#[inline(never)]
 fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork) {
     tile.strays.clear();
     let mut kept = 0;
@@ -181,7 +179,6 @@ fn close_gaps(keys: &mut [PairKey], gone: &[u32]) {
 }
 
 /// Takes in what other tiles sent: arrivals, ghosts, contacts. Sorts the bodies by place when it is time to.
-#[inline(never)]
 pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, setup: &Setup, step: u64) {
     tile.arrived = tile.owned;
     for message in bag.messages() {

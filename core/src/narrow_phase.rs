@@ -96,7 +96,6 @@ impl Contacts {
     }
 
     /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
-    #[inline(never)]
     fn sort(&mut self, owned: usize) {
         let mut sum = 0;
         for start in &mut self.start {

@@ -66,12 +66,12 @@ impl Layout {
     /// Bodies outside the box are held in its outermost cells: never further from a neighbour than they are.
     #[inline(always)]
     fn column(&self, x: f32) -> usize {
-        (((x - self.origin[0]) * self.per_meter) as usize).min(self.columns - 3) + 1
+        (((x - self.origin[0]) * self.per_meter) as i32).clamp(0, self.columns as i32 - 3) as usize + 1
     }
 
     #[inline(always)]
     fn row(&self, y: f32) -> usize {
-        (((y - self.origin[1]) * self.per_meter) as usize).min(self.rows - 3) + 1
+        (((y - self.origin[1]) * self.per_meter) as i32).clamp(0, self.rows as i32 - 3) as usize + 1
     }
 }
 
@@ -107,7 +107,6 @@ impl Grid {
     }
 
     /// Sorts the bodies of `rest` by cell.
-    #[inline(never)]
     fn bin(&mut self, proxies: &Proxies, limit: f32) -> Layout {
         // Bodies far outside the tile share its outermost cells: one stray must not make all cells coarse.
         let (mut low, mut high) = bounds(proxies, &self.rest);
@@ -133,22 +132,15 @@ impl Grid {
             sum += *start;
             *start = sum;
         }
-        self.sorted.resize(self.rest.len());
-        for (&body, &cell) in self.rest.iter().zip(&self.cell) {
-            let place = &mut self.start[cell as usize + 1];
-            self.sorted.set(*place as usize, proxies, body, cell);
-            *place += 1;
-        }
+        self.sorted.fill(proxies, &self.rest, &self.cell, &mut self.start);
         layout
     }
 
-    #[inline(never)]
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, pairs: &mut Vec<Pair>) {
         let search = Search { sorted: &self.sorted, slack: proxies.slack, dt: proxies.dt, owned: proxies.owned, pairs };
         search.neighbours(&self.start, layout.columns);
     }
 
-    #[inline(never)]
     fn pair_large(&self, layout: &Layout, proxies: &Proxies, limit: f32, pairs: &mut Vec<Pair>) {
         for &body in &self.large {
             let i = body as usize;
@@ -199,7 +191,6 @@ struct Class {
 /// about 9/2 n (2u)^2 / A candidates per small body, and a large body of half extents v, w meets
 /// n (2u + 2v) (2u + 2w) / A. The constants are nanoseconds, measured: the search among small bodies compares eight at
 /// once.
-#[inline(never)]
 fn choose_limit(proxies: &Proxies, bodies: &[u32]) -> f32 {
     const CLASSES: usize = 64;
     /// The class of the smallest float we tell apart, 2^-16 m.

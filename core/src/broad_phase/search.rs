@@ -23,25 +23,33 @@ pub(super) struct Sorted {
 const PADDING: usize = 8;
 
 impl Sorted {
-    pub(super) fn resize(&mut self, len: usize) {
+    /// Lays bodies out by cell. `start[c + 1]` holds where cell `c` begins; afterwards, where it ends.
+    pub(super) fn fill(&mut self, proxies: &Proxies, bodies: &[u32], cells: &[u32], start: &mut [u32]) {
+        self.len = bodies.len();
+        let (all, padded) = (proxies.len(), self.len + PADDING);
         for column in [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach] {
-            column.resize(len + PADDING, 0.0);
+            column.resize(padded, 0.0);
         }
-        self.body.resize(len + PADDING, 0);
-        self.cell.resize(len + PADDING, 0);
-        self.len = len;
-    }
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, place: usize, proxies: &Proxies, body: u32, cell: u32) {
-        let i = body as usize;
-        self.x[place] = proxies.x[i];
-        self.y[place] = proxies.y[i];
-        self.velocity_x[place] = proxies.velocity_x[i];
-        self.velocity_y[place] = proxies.velocity_y[i];
-        self.reach[place] = proxies.reach[i];
-        self.body[place] = body;
-        self.cell[place] = cell;
+        self.body.resize(padded, 0);
+        self.cell.resize(padded, 0);
+        // One length for all columns on either side: each index is checked once, not once per column.
+        let from = [&proxies.x, &proxies.y, &proxies.velocity_x, &proxies.velocity_y, &proxies.reach];
+        let from = from.map(|column| &column[..all]);
+        let to = [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach];
+        let [x, y, velocity_x, velocity_y, reach] = to.map(|column| &mut column[..padded]);
+        let (to_body, to_cell) = (&mut self.body[..padded], &mut self.cell[..padded]);
+        for (&body, &cell) in bodies.iter().zip(cells) {
+            let next = &mut start[cell as usize + 1];
+            let (i, place) = (body as usize, *next as usize);
+            *next += 1;
+            x[place] = from[0][i];
+            y[place] = from[1][i];
+            velocity_x[place] = from[2][i];
+            velocity_y[place] = from[3][i];
+            reach[place] = from[4][i];
+            to_body[place] = body;
+            to_cell[place] = cell;
+        }
     }
 }
 
@@ -114,12 +122,17 @@ impl Search<'_> {
     fn neighbours_avx2(mut self, start: &[u32], columns: usize) {
         use std::arch::x86_64::*;
         let sorted = self.sorted;
+        // One length for all: each place is checked once, not once per column.
+        let padded = sorted.len + PADDING;
+        let (xs, ys, reaches) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.reach[..padded]);
+        let (velocities_x, velocities_y) = (&sorted.velocity_x[..padded], &sorted.velocity_y[..padded]);
+        let cells = &sorted.cell[..padded];
         let (dt, more, slack) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE), _mm256_set1_ps(2.0 * self.slack));
         for place in 0..sorted.len {
             let one = |column: &[f32]| _mm256_set1_ps(column[place]);
-            let (x, y, reach) = (one(&sorted.x), one(&sorted.y), one(&sorted.reach));
-            let (velocity_x, velocity_y) = (one(&sorted.velocity_x), one(&sorted.velocity_y));
-            for (first, end) in runs(start, columns, sorted.cell[place] as usize, place) {
+            let (x, y, reach) = (one(xs), one(ys), one(reaches));
+            let (velocity_x, velocity_y) = (one(velocities_x), one(velocities_y));
+            for (first, end) in runs(start, columns, cells[place] as usize, place) {
                 let mut first = first;
                 loop {
                     let eight = |column: &[f32]| {
@@ -129,12 +142,12 @@ impl Search<'_> {
                     };
                     let length =
                         |x: __m256, y: __m256| _mm256_sqrt_ps(_mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y)));
-                    let distance = length(_mm256_sub_ps(eight(&sorted.x), x), _mm256_sub_ps(eight(&sorted.y), y));
+                    let distance = length(_mm256_sub_ps(eight(xs), x), _mm256_sub_ps(eight(ys), y));
                     let speed = length(
-                        _mm256_sub_ps(eight(&sorted.velocity_x), velocity_x),
-                        _mm256_sub_ps(eight(&sorted.velocity_y), velocity_y),
+                        _mm256_sub_ps(eight(velocities_x), velocity_x),
+                        _mm256_sub_ps(eight(velocities_y), velocity_y),
                     );
-                    let within = _mm256_add_ps(_mm256_add_ps(reach, eight(&sorted.reach)), _mm256_mul_ps(dt, speed));
+                    let within = _mm256_add_ps(_mm256_add_ps(reach, eight(reaches)), _mm256_mul_ps(dt, speed));
                     let within = _mm256_add_ps(_mm256_mul_ps(within, more), slack);
                     let hits = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(distance, within)) as u32;
                     // Lanes behind the end of the run are not meant.

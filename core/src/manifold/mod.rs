@@ -6,6 +6,8 @@
 mod box_box;
 mod circle_box;
 mod circle_circle;
+#[cfg(test)]
+mod tests;
 
 use crate::contact::ContactPoint;
 use crate::math::Rot;
