@@ -131,6 +131,13 @@ impl TileGrid {
         rows.flat_map(move |row| columns.clone().map(move |column| self.tile_at(column, row)))
     }
 
+    /// Whether a tile is among those [`TileGrid::reached`].
+    pub(crate) fn reaches(&self, tile: TileId, center: DVec2, half: Vec2, reach: f64) -> bool {
+        let (columns, rows) = self.reached_span(center, half, reach);
+        let (column, row) = (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
+        columns.contains(&column) && rows.contains(&row)
+    }
+
     #[inline]
     fn reached_span(&self, center: DVec2, half: Vec2, reach: f64) -> (RangeInclusive<usize>, RangeInclusive<usize>) {
         let (half_x, half_y) = (f64::from(half.x) + reach, f64::from(half.y) + reach);

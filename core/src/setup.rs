@@ -115,7 +115,7 @@ impl Setup {
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
         let reaches = |body: &Body| {
             let half = self.kind(body.kind).half_extents(body.rotation);
-            self.grid.reached(body.position, half, self.halo_width).any(|reached| reached == tile)
+            self.grid.reaches(tile, body.position, half, self.halo_width)
         };
         (0..).zip(&self.statics).filter(|(_, body)| reaches(body)).map(|(row, _)| row).collect()
     }

@@ -1,1 +1,6 @@
-//! x
+//! What the integration tests share. The tests themselves are in `tests/`, one file per subject.
+
+pub mod program;
+pub mod ranks;
+pub mod scenes;
+pub mod world;

@@ -3,6 +3,7 @@
 use super::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
 use crate::broad_phase::Pair;
 use crate::halo::{GhostRefresh, Unseen};
+use crate::id::GlobalId;
 use crate::math::Rot;
 use crate::setup::Setup;
 use crate::tile::Tile;
@@ -245,26 +246,62 @@ impl Kernel for IntegratePositions<'_> {
     }
 }
 
+/// The owned bodies of a tile, to be given their new state: columns of one length, so that an index is checked once.
+struct Owned<'a> {
+    position: &'a mut [DVec2],
+    rotation: &'a mut [Rot],
+    velocity: &'a mut [Vec2],
+    angular_velocity: &'a mut [f32],
+    id: &'a [GlobalId],
+    not_finite: &'a mut Option<GlobalId>,
+}
+
+impl<'a> Owned<'a> {
+    #[inline(always)]
+    fn of(tile: &'a mut Tile) -> Self {
+        let (bodies, owned) = (&mut tile.bodies, tile.owned);
+        Self {
+            position: &mut bodies.position[..owned],
+            rotation: &mut bodies.rotation[..owned],
+            velocity: &mut bodies.velocity[..owned],
+            angular_velocity: &mut bodies.angular_velocity[..owned],
+            id: &bodies.id[..owned],
+            not_finite: &mut tile.counts.not_finite,
+        }
+    }
+
+    /// Gives a body its new state, and notes if it is no longer finite.
+    #[inline(always)]
+    fn place(&mut self, i: usize, moved: Vec2, turned: Rot, velocity: Vec2, angular_velocity: f32) {
+        let position = self.position[i] + DVec2::new(f64::from(moved.x), f64::from(moved.y));
+        let rotation = turned.after(self.rotation[i]).normalized();
+        self.position[i] = position;
+        self.rotation[i] = rotation;
+        self.velocity[i] = velocity;
+        self.angular_velocity[i] = angular_velocity;
+        // Zero times a finite number is zero; one test instead of seven.
+        let probe = (rotation.c + rotation.s + velocity.x + velocity.y + angular_velocity) * 0.0;
+        if (position.x + position.y) * 0.0 != 0.0 || probe != 0.0 {
+            let id = self.id[i];
+            *self.not_finite = Some(self.not_finite.map_or(id, |lowest| lowest.min(id)));
+        }
+    }
+}
+
 /// Writes the solved bodies' new state back to the tile. Ghosts' results are scratch: their owners' stand.
 pub(crate) fn store(tile: &mut Tile, solved: &SolverBodies) {
+    let mut owned = Owned::of(tile);
     for (place, &body) in solved.body.iter().enumerate().skip(1) {
         let i = body as usize;
-        if i >= tile.owned {
+        if i >= owned.id.len() {
             break;
         }
-        let [root_mass, root_inertia, root_inv_inertia, root_inv_mass] = solved.weight[place];
-        debug_assert!(root_mass > 0.0 && root_inertia > 0.0);
+        let [_, _, root_inv_inertia, root_inv_mass] = solved.weight[place];
         let [x, y, c, s] = solved.pose[place];
         let [vx, vy, w, _] = solved.velocity[place];
         let turned = Rot { c: c + 1.0, s: s * root_inv_inertia };
-        place_body(
-            tile,
-            i,
-            Vec2::new(x, y) * root_inv_mass,
-            turned,
-            Vec2::new(vx, vy) * root_inv_mass,
-            w * root_inv_inertia,
-        );
+        let (moved, velocity) = (Vec2::new(x, y) * root_inv_mass, Vec2::new(vx, vy) * root_inv_mass);
+        owned.place(i, moved, turned, velocity, w * root_inv_inertia);
     }
 }
 
@@ -286,27 +323,28 @@ impl Kernel for Fly<'_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Self { tile, solved, motion, substeps } = self;
+        let mut owned = Owned::of(tile);
         let mut block = [0_usize; LANES];
         let mut filled = 0;
-        for i in 0..tile.owned {
+        for (i, &place) in solved.place[..owned.id.len()].iter().enumerate() {
             block[filled] = i;
-            filled += usize::from(solved.place[i] == NOT_SOLVED);
+            filled += usize::from(place == NOT_SOLVED);
             if filled == LANES {
-                fly_block::<V>(tile, &block, &motion, substeps);
+                fly_block::<V>(&mut owned, &block, &motion, substeps);
                 filled = 0;
             }
         }
-        fly_block::<V>(tile, &block[..filled], &motion, substeps);
+        fly_block::<V>(&mut owned, &block[..filled], &motion, substeps);
     }
 }
 
 /// Moves up to eight bodies through all substeps at once.
 #[inline(always)]
-fn fly_block<V: Lanes>(tile: &mut Tile, block: &[usize], motion: &Motion, substeps: u32) {
+fn fly_block<V: Lanes>(owned: &mut Owned<'_>, block: &[usize], motion: &Motion, substeps: u32) {
     let mut rows: [Row; 3] = [[0.0; LANES]; 3];
     for (lane, &i) in block.iter().enumerate() {
-        let velocity = tile.bodies.velocity[i];
-        (rows[0][lane], rows[1][lane], rows[2][lane]) = (velocity.x, velocity.y, tile.bodies.angular_velocity[i]);
+        let velocity = owned.velocity[i];
+        (rows[0][lane], rows[1][lane], rows[2][lane]) = (velocity.x, velocity.y, owned.angular_velocity[i]);
     }
     let (h, one, zero) = (V::splat(motion.h), V::splat(1.0), V::splat(0.0));
     let mut velocity = rows.each_ref().map(V::load);
@@ -321,25 +359,7 @@ fn fly_block<V: Lanes>(tile: &mut Tile, block: &[usize], motion: &Motion, subste
         value.store(row);
     }
     for (lane, &i) in block.iter().enumerate() {
-        let [vx, vy, w, x, y, c, s] = out.map(|row| row[lane]);
-        place_body(tile, i, Vec2::new(x, y), Rot { c, s }, Vec2::new(vx, vy), w);
-    }
-}
-
-/// Gives an owned body its new state, and notes if it is no longer finite.
-#[inline(always)]
-fn place_body(tile: &mut Tile, i: usize, moved: Vec2, turned: Rot, velocity: Vec2, angular_velocity: f32) {
-    let bodies = &mut tile.bodies;
-    let position = bodies.position[i] + DVec2::new(f64::from(moved.x), f64::from(moved.y));
-    let rotation = turned.after(bodies.rotation[i]).normalized();
-    bodies.position[i] = position;
-    bodies.rotation[i] = rotation;
-    bodies.velocity[i] = velocity;
-    bodies.angular_velocity[i] = angular_velocity;
-    // Zero times a finite number is zero; one test instead of seven.
-    let probe = (rotation.c + rotation.s + velocity.x + velocity.y + angular_velocity) * 0.0;
-    if (position.x + position.y) * 0.0 != 0.0 || probe != 0.0 {
-        let id = bodies.id[i];
-        tile.counts.not_finite = Some(tile.counts.not_finite.map_or(id, |lowest| lowest.min(id)));
+        let [vx, vy, w, x, y, c, s] = out.each_ref().map(|row| row[lane]);
+        owned.place(i, Vec2::new(x, y), Rot { c, s }, Vec2::new(vx, vy), w);
     }
 }

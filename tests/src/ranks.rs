@@ -1,0 +1,92 @@
+//! Ranks as threads that hand each other frames through channels: the smallest halo there can be for more than one.
+
+use crate::world::Scene;
+use atoll_core::{Exchange, Halo, Inbox, Outbox, TileId, World};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+
+/// Which rank holds a tile.
+pub type RankOf<'a> = &'a (dyn Fn(TileId) -> usize + Sync);
+
+/// How a scene is spread.
+#[derive(Clone, Copy)]
+pub struct Spread<'a> {
+    /// Columns and rows of tiles.
+    pub tiles: (u32, u32),
+    /// Sync points of a step.
+    pub exchange: Exchange,
+    /// How many ranks; some may have no tile.
+    pub ranks: usize,
+    /// Who holds what.
+    pub rank_of: RankOf<'a>,
+    /// Threads of each rank.
+    pub threads: usize,
+}
+
+/// One rank's end of the channels to and from all others.
+pub struct RankHalo<'a> {
+    own: usize,
+    rank_of: RankOf<'a>,
+    to: Vec<Sender<Vec<u8>>>,
+    from: Vec<Receiver<Vec<u8>>>,
+    lengths: Vec<usize>,
+    /// Bytes sent so far.
+    pub bytes: usize,
+}
+
+impl Halo for RankHalo<'_> {
+    type Error = String;
+
+    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), String> {
+        let rank_of = |tile| (self.rank_of)(tile);
+        outbox.frame_lengths(self.to.len(), &rank_of, self.own, &mut self.lengths);
+        for (rank, &length) in self.lengths.iter().enumerate().filter(|&(rank, _)| rank != self.own) {
+            let mut frame = vec![0; length];
+            outbox.encode(rank, &rank_of, &mut frame);
+            self.to[rank].send(frame).map_err(|_| format!("rank {rank} has left"))?;
+            self.bytes += length;
+        }
+        outbox.deliver(inbox);
+        // Against the order of ranks: what arrives first must not matter.
+        for rank in (0..self.from.len()).rev().filter(|&rank| rank != self.own) {
+            let frame = self.from[rank].recv().map_err(|_| format!("rank {rank} has left"))?;
+            inbox.decode(&frame).map_err(|error| format!("from rank {rank}: {error}"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs `work` on every rank, each with its own part of the scene, and gives the results by rank.
+pub fn run<R: Send>(
+    scene: &Scene,
+    spread: Spread<'_>,
+    work: impl Fn(World, &mut RankHalo<'_>) -> R + Sync,
+) -> Vec<R> {
+    let Spread { tiles, exchange, ranks, rank_of, threads } = spread;
+    let blueprint = scene.blueprint(tiles, exchange);
+    let mut halos: Vec<_> = (0..ranks)
+        .map(|own| RankHalo { own, rank_of, to: Vec::new(), from: Vec::new(), lengths: Vec::new(), bytes: 0 })
+        .collect();
+    for from in 0..ranks {
+        for to in 0..ranks {
+            let (sender, receiver) = channel();
+            halos[from].to.push(sender);
+            halos[to].from.push(receiver);
+        }
+    }
+    let (blueprint, work) = (&blueprint, &work);
+    let one = move |mut halo: RankHalo<'_>| {
+        let all = 0..blueprint.grid.tiles() as u32;
+        let own: Vec<_> = all.map(TileId).filter(|&tile| rank_of(tile) == halo.own).collect();
+        let mut world = World::new(blueprint, &own).expect("a world that can be built");
+        for &body in &scene.bodies {
+            world.add(body).expect("a body that can be added");
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| work(world, &mut halo))
+    };
+    thread::scope(|scope| {
+        let running: Vec<_> = halos.into_iter().map(|halo| scope.spawn(move || one(halo))).collect();
+        running.into_iter().map(|rank| rank.join().expect("no rank panics")).collect()
+    })
+}
