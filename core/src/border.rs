@@ -11,6 +11,9 @@ use crate::narrow_phase::Contacts;
 use crate::solver::Solver;
 use crate::tile::{Fault, Tile};
 
+#[cfg(test)]
+mod tests;
+
 /// The border contacts of a tile and who must hear of them; made once a step.
 #[derive(Default, Debug)]
 pub(crate) struct Border {

@@ -57,11 +57,7 @@ impl Halo for RankHalo<'_> {
 }
 
 /// Runs `work` on every rank, each with its own part of the scene, and gives the results by rank.
-pub fn run<R: Send>(
-    scene: &Scene,
-    spread: Spread<'_>,
-    work: impl Fn(World, &mut RankHalo<'_>) -> R + Sync,
-) -> Vec<R> {
+pub fn run<R: Send>(scene: &Scene, spread: Spread<'_>, work: impl Fn(World, &mut RankHalo<'_>) -> R + Sync) -> Vec<R> {
     let Spread { tiles, exchange, ranks, rank_of, threads } = spread;
     let blueprint = scene.blueprint(tiles, exchange);
     let mut halos: Vec<_> = (0..ranks)

@@ -25,7 +25,7 @@ pub fn cluster(bodies: u64, seed: u64) -> Scene {
     ];
     for k in 0..bodies {
         let offset = DVec2::new(noise(seed, 2 * k) - 0.5, noise(seed, 2 * k + 1) - 0.5) * 4.0;
-        let velocity = (offset * -1.5).as_vec2() + Vec2::new(0.3, 0.2);
+        let velocity = (offset * -2.0).as_vec2() + Vec2::new(0.3, 0.2);
         scene.body(kinds[k as usize % 2], scene.middle + offset, velocity);
     }
     scene

@@ -4,8 +4,8 @@
 //! alone in its process; [`crate::ranks::run`] spreads the same tiles over several ranks.
 
 use atoll_core::{
-    Blueprint, Body, Exchange, Facts, GlobalId, Halo, Hashes, Inbox, Kind, KindId, Material, Outbox, Params, Rot, Shape,
-    StaticBody, StepReport, TileGrid, TileId, World, finish, step,
+    Blueprint, Body, Exchange, Facts, GlobalId, Halo, Hashes, Inbox, Kind, KindId, Material, Outbox, Params, Rot,
+    Shape, StaticBody, StepReport, TileGrid, TileId, World, finish, step,
 };
 use glam::{DVec2, Vec2};
 use std::convert::Infallible;

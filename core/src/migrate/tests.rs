@@ -194,9 +194,68 @@ fn check_border_contacts(world: &World) -> usize {
     border
 }
 
+/// A contact as its tile stored it: of whom, with whose body, and the impulse upon either body with its moments.
+struct Push {
+    tile: TileId,
+    pair: PairOfNames,
+    /// Owners of the two bodies when it was stored.
+    owners: [Option<TileId>; 2],
+    /// Impulse x, y and moment, upon either body.
+    upon: [[f64; 3]; 2],
+}
+
+/// Every contact held, from the definition of its numbers: a sum over points of normal and tangent impulse at the anchor.
+fn pushes(world: &World) -> Vec<Push> {
+    let mut pushes = Vec::new();
+    for tile in world.tile_states() {
+        for (pair, (peer, contact)) in contacts_of(tile) {
+            let mut upon = [[0.0; 3]; 2];
+            for point in contact.points() {
+                let (n, t) = (f64::from(point.normal_impulse), f64::from(point.tangent_impulse));
+                let (normal, anchor, offset) =
+                    (contact.normal.as_dvec2(), point.anchor.as_dvec2(), contact.offset.as_dvec2());
+                let impulse = normal * n + DVec2::new(normal.y, -normal.x) * t;
+                for (sign, arm, sum) in [(-1.0, anchor, 0), (1.0, anchor - offset, 1)] {
+                    upon[sum][0] += sign * impulse.x;
+                    upon[sum][1] += sign * impulse.y;
+                    upon[sum][2] += sign * (arm.x * impulse.y - arm.y * impulse.x);
+                }
+            }
+            let owns = |id: GlobalId| tile.bodies.id[..tile.owned].contains(&id);
+            let owner = |id: GlobalId| if owns(id) { Some(tile.id) } else { peer };
+            pushes.push(Push { tile: tile.id, pair, owners: [owner(pair.0), owner(pair.1)], upon });
+        }
+    }
+    pushes
+}
+
+/// Every ghost is given what its owner stored for contacts that the ghost's tile does not solve: those with partners
+/// that are not its own, by the owners of the step before.
+fn check_unseen(world: &World, before: &[Push]) {
+    for tile in world.tile_states() {
+        for (unseen, id) in tile.unseen.iter().zip(&tile.bodies.id[tile.owned..]) {
+            let (mut wanted, mut size) = ([0.0; 3], 1e-6);
+            for push in before {
+                for (me, other) in [(0, 1), (1, 0)] {
+                    let name = [push.pair.0, push.pair.1][me];
+                    if name == *id && push.owners[me] == Some(push.tile) && push.owners[other] != Some(tile.id) {
+                        for (sum, value) in wanted.iter_mut().zip(push.upon[me]) {
+                            *sum += value;
+                            size += value.abs();
+                        }
+                    }
+                }
+            }
+            let given = [unseen.linear.x, unseen.linear.y, unseen.angular].map(f64::from);
+            let error = given.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(error <= 1e-5 * size, "body {id} as a ghost of tile {}: {given:?}, not {wanted:?}", tile.id);
+        }
+    }
+}
+
 /// Every contact of the world with its geometry, each once.
 fn all_contacts(world: &World) -> BTreeMap<PairOfNames, Vec<u8>> {
-    let contacts = world.tile_states().iter().flat_map(|tile| contacts_of(tile));
+    let contacts = world.tile_states().iter().flat_map(contacts_of);
     contacts.map(|(pair, (_, contact))| (pair, bytemuck::bytes_of(&without_impulses(&contact)).to_vec())).collect()
 }
 
@@ -207,9 +266,10 @@ proptest! {
     fn owners_ghosts_and_border_contacts_are_as_defined(scene in any_scene(40, -10.0)) {
         let mut world = scene.world();
         for _ in 0..8 {
-            let before = by_name(&world);
+            let (before, stored) = (by_name(&world), pushes(&world));
             step(&mut world, &mut Loopback).unwrap();
             check_owners_and_ghosts(&world, &before);
+            check_unseen(&world, &stored);
             check_border_contacts(&world);
         }
     }

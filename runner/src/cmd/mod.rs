@@ -19,7 +19,9 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
-        eprintln!("atoll: {error}");
+        // On one line, whatever names and values the user has given.
+        let lines = error.to_string();
+        eprintln!("atoll: {}", lines.lines().collect::<Vec<_>>().join(" "));
         error.exit()
     });
     ExitCode::from(exit as u8)

@@ -1,0 +1,210 @@
+//! What a tile border may not do to bodies that touch across it: the rule for ghosts, measured.
+
+use atoll_core::{Exchange, GlobalId, Material, Rot, Shape};
+use atoll_tests::scenes;
+use atoll_tests::world::{ALL_WAYS, Cut, EXACT_WAYS, Scene, Sim, Way};
+use glam::{DVec2, Vec2};
+
+const MIDDLE: DVec2 = DVec2::new(-2.0, 1.0);
+
+/// Two bodies that meet in the middle: what they are, and how they come.
+struct Encounter {
+    name: &'static str,
+    shapes: [Shape; 2],
+    material: Material,
+    /// The first body's velocity; the other comes the opposite way.
+    velocity: Vec2,
+    /// The second body's place beside the line of the first, in meters.
+    beside: f64,
+    spin: f32,
+}
+
+impl Encounter {
+    fn scene(&self) -> Scene {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let kinds = self.shapes.map(|shape| scene.kind(shape, self.material));
+        let direction = self.velocity.as_dvec2().normalize();
+        for (side, kind) in [(-1.0, kinds[0]), (1.0, kinds[1])] {
+            let place = MIDDLE + direction * side * 1.1 + direction.perp() * side * 0.5 * self.beside;
+            scene.body(kind, place, self.velocity * -(side as f32));
+            (scene.last().rotation, scene.last().angular_velocity) = (Rot::from_angle(0.3), self.spin * side as f32);
+        }
+        scene
+    }
+}
+
+fn encounters() -> [Encounter; 5] {
+    let (circle, square, plank) = (Shape::circle(0.4), Shape::rectangle(0.6, 0.6), Shape::rectangle(1.2, 0.2));
+    let rough = Material::default();
+    let bouncy = Material { restitution: 0.7, ..rough };
+    [
+        Encounter {
+            name: "circles, head on",
+            shapes: [circle; 2],
+            material: rough,
+            velocity: Vec2::new(2.0, 0.5),
+            beside: 0.0,
+            spin: 0.0,
+        },
+        Encounter {
+            name: "bouncing circles of two sizes, off center",
+            shapes: [circle, Shape::circle(0.25)],
+            material: bouncy,
+            velocity: Vec2::new(2.0, 1.0),
+            beside: 0.3,
+            spin: 3.0,
+        },
+        Encounter {
+            name: "boxes, turning",
+            shapes: [square; 2],
+            material: rough,
+            velocity: Vec2::new(1.5, 0.5),
+            beside: 0.1,
+            spin: 2.0,
+        },
+        Encounter {
+            name: "bouncing boxes, along a diagonal",
+            shapes: [square, plank],
+            material: bouncy,
+            velocity: Vec2::new(1.0, -1.0),
+            beside: 0.2,
+            spin: -1.0,
+        },
+        Encounter {
+            name: "a circle and a box, fast",
+            shapes: [circle, square],
+            material: rough,
+            velocity: Vec2::new(0.0, 18.0),
+            beside: 0.2,
+            spin: 5.0,
+        },
+    ]
+}
+
+#[test]
+fn two_bodies_meet_upon_a_border_as_anywhere() {
+    for encounter in encounters() {
+        let scene = encounter.scene();
+        for way in ALL_WAYS {
+            let (mut sim, mut whole) = (scene.start(way), scene.start((Cut::Whole, way.1)));
+            let (momentum, size) = (sim.momentum(), sim.sum_of_momenta());
+            let mut on_the_border = 0;
+            let at_first = sim.bodies();
+            for _ in 0..90 {
+                sim.run(1);
+                on_the_border += sim.report.border_contacts;
+            }
+            whole.run(90);
+            let name = encounter.name;
+            let drift = (sim.momentum() - momentum).length() / size;
+            assert!(drift < 1e-5, "{name}, {way:?}: momentum drifted by {drift} of the sum of |p|");
+            for (body, (alone, before)) in sim.bodies().iter().zip(whole.bodies().iter().zip(&at_first)) {
+                let error = (body.velocity - alone.velocity).length();
+                assert!(error < 1e-4 * encounter.velocity.length(), "{name}, {way:?}: velocity is {error} m/s off");
+                let error = (body.angular_velocity - alone.angular_velocity).abs();
+                assert!(error < 1e-3, "{name}, {way:?}: spin is {error} rad/s off");
+                assert!((body.velocity - before.velocity).length() > 0.5, "{name}, {way:?}: nothing happened");
+            }
+            assert!(way.0 == Cut::Whole || on_the_border > 0, "{name}, {way:?}: they met elsewhere");
+        }
+    }
+}
+
+/// What became of clusters of one kind but different seeds, cut one way.
+#[derive(Default, Debug)]
+struct Clusters {
+    /// Of the momentum, as a part of the sum of |p|: over all steps of all seeds, and in the end by the mean.
+    worst_drift: f64,
+    mean_drift: f64,
+    kinetic_energy: f64,
+    extent: f64,
+    /// The most contacts on the border in a step of each, added up.
+    on_the_border: u64,
+}
+
+impl Clusters {
+    const SEEDS: u64 = 8;
+
+    fn run(way: Way) -> Self {
+        let mut all = Self::default();
+        for seed in 0..Self::SEEDS {
+            let mut sim = scenes::cluster(50, seed).start(way);
+            let (momentum, size) = (sim.momentum(), sim.sum_of_momenta());
+            let drift = |sim: &Sim| (sim.momentum() - momentum).length() / size;
+            let mut most = 0;
+            for _ in 0..120 {
+                sim.run(1);
+                most = most.max(sim.report.border_contacts);
+                all.worst_drift = f64::max(all.worst_drift, drift(&sim));
+            }
+            all.mean_drift += drift(&sim) / Self::SEEDS as f64;
+            all.kinetic_energy += sim.kinetic_energy();
+            all.extent += sim.extent();
+            all.on_the_border += most;
+        }
+        all
+    }
+
+    fn check(way: Way, allowed_drift: f64, drift: impl Fn(&Self) -> f64) {
+        let (cut, whole) = (Self::run(way), Self::run((Cut::Whole, way.1)));
+        let (energy, extent) = (cut.kinetic_energy / whole.kinetic_energy, cut.extent / whole.extent);
+        println!("{way:?}: energy {energy:.3}, extent {extent:.3} of those on one tile, {cut:?}");
+        assert!(drift(&cut) < allowed_drift, "{way:?}: momentum drifted by {} of the sum of |p|", drift(&cut));
+        assert!((energy - 1.0).abs() < 0.3, "{way:?}: {energy} times the kinetic energy on one tile");
+        assert!((extent - 1.0).abs() < 0.2, "{way:?}: {extent} times the extent on one tile");
+        assert!(cut.on_the_border >= 5 * Self::SEEDS, "{way:?}: the border is elsewhere, {cut:?}");
+    }
+}
+
+#[test]
+fn a_cluster_upon_a_border_collides_as_on_one_tile() {
+    for cut in [Cut::Columns, Cut::Rows, Cut::Corner] {
+        Clusters::check((cut, Exchange::Substep), 1e-5, |clusters| clusters.worst_drift);
+    }
+}
+
+/// A single cluster may drift by twice the mean; what becomes of it is chaos.
+#[test]
+fn with_one_exchange_a_step_a_cluster_upon_a_border_nearly_does() {
+    for cut in [Cut::Columns, Cut::Rows] {
+        Clusters::check((cut, Exchange::Step), 5e-2, |clusters| clusters.mean_drift);
+    }
+}
+
+/// A stack of ten boxes on a border, of which nothing must tell that there is one.
+#[test]
+fn a_stack_over_a_border_sinks_no_deeper_than_one_beside_it() {
+    let scene = scenes::stack(10);
+    let sunk = |sim: &Sim, before: f64| before - sim.body(GlobalId(10)).position.y;
+    let mut alone = None;
+    for way in EXACT_WAYS {
+        let mut sim = scene.start(way);
+        let before = sim.body(GlobalId(10)).position.y;
+        sim.run(600);
+        let depth = sunk(&sim, before);
+        println!("{way:?}: sinks {depth:.4} m");
+        let alone = *alone.get_or_insert(depth);
+        assert!((depth - alone).abs() < 0.002, "{way:?}: sinks {depth} m, on one tile {alone} m");
+    }
+}
+
+/// The last row of the table of ghost rules: a heap of 20,000 bodies over the borders of 4 x 4 tiles comes to rest.
+#[test]
+fn a_large_pile_comes_to_rest_over_its_borders() {
+    let scene = scenes::pile(200, 100);
+    let mut sim = scene.start_on((4, 4), Exchange::Substep);
+    sim.run(600);
+    assert!(sim.report.border_contacts > 300, "{} contacts on the borders", sim.report.border_contacts);
+    let (low, high) = (DVec2::ZERO, 2.0 * scene.half);
+    let escaped = |place: DVec2| place.cmplt(low).any() || place.x > high.x || !place.is_finite();
+    assert_eq!(sim.bodies().iter().filter(|body| escaped(body.position)).count(), 0);
+    let facts = sim.finish();
+    let energy = facts.kinetic_energy / facts.mass;
+    println!(
+        "{energy:.2e} J/kg, mean penetration {:.4} m, greatest {:.3} m",
+        facts.mean_penetration, facts.max_penetration
+    );
+    assert_eq!(facts.bodies, 20_000);
+    assert!(energy < 1e-3, "{energy} J/kg");
+    assert!(facts.mean_penetration <= 0.020, "mean penetration {} m", facts.mean_penetration);
+}
