@@ -188,9 +188,9 @@ impl Inbox {
     ///
     /// # Errors
     /// On bytes that are not a frame of this version, step and sync point, whole and with nothing after it, for tiles
-    /// of this world. Never panics and never allocates more than the bytes given.
+    /// of this world. Never panics, and allocates in proportion to the bytes given.
     pub fn decode(&mut self, bytes: &[u8]) -> Result<(), CodecError> {
-        let length = bytes.len();
+        let (length, kinds) = (bytes.len(), self.kinds);
         let header_error = |reason: String| CodecError::Header { length, reason };
         let (header, read): (Header, usize) =
             bincode::decode_from_slice(bytes, config()).map_err(|error| header_error(error.to_string()))?;
@@ -212,26 +212,17 @@ impl Inbox {
             let (from, to) = (TileId(counts.take_u32()?), TileId(counts.take_u32()?));
             let message = self.receive(from, to).ok_or(CodecError::WrongTile { from, to })?;
             each_array!(arrays!(&mut message), array => reader.take_records(counts.take_u32()?, array)?);
+            // A kind that the table does not have would be an index out of bounds later on.
+            let bodies = message.migrants.iter().chain(message.ghosts.iter().map(|ghost| &ghost.body));
+            if let Some(unknown) = bodies.into_iter().find(|body| body.kind.0 >= kinds) {
+                return Err(CodecError::BadRecord { id: unknown.id });
+            }
         }
         if !reader.rest.is_empty() {
             return Err(CodecError::Length { length, announced: (length - reader.rest.len()) as u64 });
         }
-        self.check_records()?;
         let failure = header.failure.map(|(step, id)| (step, GlobalId(id)));
         self.hear(Verdict { stop: header.stop, failure });
         Ok(())
-    }
-
-    /// Refuses records that name a kind the table does not have: an index out of bounds later on.
-    fn check_records(&self) -> Result<(), CodecError> {
-        let bodies = |message: &'_ Message| -> Option<GlobalId> {
-            let migrants = message.migrants.iter();
-            let ghosts = message.ghosts.iter().map(|ghost| &ghost.body);
-            migrants.chain(ghosts).find(|body| body.kind.0 >= self.kinds).map(|body| body.id)
-        };
-        match self.bags.iter().flat_map(|bag| bag.messages()).find_map(bodies) {
-            Some(id) => Err(CodecError::BadRecord { id }),
-            None => Ok(()),
-        }
     }
 }

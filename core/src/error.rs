@@ -13,13 +13,17 @@ pub enum SetupError {
         kind: KindId,
     },
     /// A static body.
-    #[error("static body {id}: its shape, material and position must be finite and its sizes positive")]
+    #[error(
+        "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive"
+    )]
     BadStatic {
         /// Its name.
         id: GlobalId,
     },
     /// A dynamic body.
-    #[error("body {id}: position, rotation and velocities must be finite and its kind a row of the table")]
+    #[error(
+        "body {id}: position and velocities must be finite, its rotation of length one, its kind a row of the table, its name no static's"
+    )]
     BadBody {
         /// Its name.
         id: GlobalId,

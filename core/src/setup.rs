@@ -2,7 +2,7 @@
 
 use crate::body::{Body, StaticBody};
 use crate::error::SetupError;
-use crate::id::{KindId, TileId};
+use crate::id::{GlobalId, KindId, TileId};
 use crate::math::{self, Rot};
 use crate::params::{Exchange, Params};
 use crate::partition::TileGrid;
@@ -32,6 +32,8 @@ pub(crate) struct Setup {
     pub(crate) kinds: Vec<KindRow>,
     pub(crate) dynamic_kinds: usize,
     pub(crate) statics: Vec<Body>,
+    /// Their names, sorted.
+    static_names: Vec<GlobalId>,
     /// Bodies this near a tile's region may matter to it, in meters.
     pub(crate) halo_width: f64,
     /// A body further inside its tile than this neither leaves nor is anybody's ghost.
@@ -73,6 +75,11 @@ impl Setup {
             kinds.push(row);
             statics.push(body);
         }
+        let mut static_names: Vec<_> = statics.iter().map(|body| body.id).collect();
+        static_names.sort_unstable();
+        if let Some(pair) = static_names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(SetupError::BadStatic { id: pair[0] });
+        }
         let largest = kinds[..dynamic_kinds].iter().fold(0.0, |most, kind| math::max(kind.bounding_radius, most));
         // A thousandth more than the rule asks for, so that the rounding of a sum never decides who sees a contact.
         let halo_width = f64::from(largest + params.margin_cap) * 1.001;
@@ -89,8 +96,14 @@ impl Setup {
             kinds,
             dynamic_kinds,
             statics,
+            static_names,
             params,
         })
+    }
+
+    /// Whether a static has this name.
+    pub(crate) fn is_static(&self, id: GlobalId) -> bool {
+        self.static_names.binary_search(&id).is_ok()
     }
 
     #[inline(always)]

@@ -60,12 +60,15 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
             });
             for substep in 0..world.setup.params.substeps {
+                // After the last substep only a bounce still looks at a ghost's velocity.
+                let refreshed = substep + 1 < world.setup.params.substeps || world.setup.bouncy;
                 world.each_tile(|bench| {
                     solve_substep(bench, substep);
-                    bench.stage(Phase::Border, send_refresh);
+                    if refreshed {
+                        bench.stage(Phase::Border, send_refresh);
+                    }
                 });
-                // After the last substep only a bounce still looks at a ghost's velocity.
-                if substep + 1 < world.setup.params.substeps || world.setup.bouncy {
+                if refreshed {
                     world.exchange(halo)?;
                     world.each_tile(|bench| bench.stage(Phase::Border, refresh));
                 }

@@ -104,9 +104,12 @@ impl World {
     /// order, or each its own.
     ///
     /// # Errors
-    /// If its state is not finite or its kind unknown.
+    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name a static's. That no
+    /// two bodies of the world share a name is for the caller to see to.
     pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
-        if !body.is_finite() || body.kind.0 as usize >= self.setup.dynamic_kinds {
+        let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
+        let known = (body.kind.0 as usize) < self.setup.dynamic_kinds && !self.setup.is_static(body.id);
+        if !(body.is_finite() && turned && known) {
             return Err(SetupError::BadBody { id: body.id });
         }
         let owner = self.setup.grid.locate(body.position);

@@ -66,7 +66,11 @@ fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
     }
     // Stable: among equals, the lowest rank's.
     errors.sort_by_key(|error| match error {
-        RunError::NonFinite { .. } | RunError::Protocol { .. } | RunError::FloatMode { .. } | RunError::Setup(_) | RunError::Threads { .. } => 0,
+        RunError::NonFinite { .. }
+        | RunError::Protocol { .. }
+        | RunError::FloatMode { .. }
+        | RunError::Setup(_)
+        | RunError::Threads { .. } => 0,
         // A rank that says itself how it ended, before those that merely miss it.
         RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
         _ => 2,

@@ -82,11 +82,11 @@ impl Grid {
         self.rest.extend(0..proxies.len() as u32);
         while self.rest.len() > FEW {
             let limit = choose_limit(proxies, &self.rest);
-            let half = |body: u32| math::max(proxies.half_x[body as usize], proxies.half_y[body as usize]);
             self.large.clear();
             let large = &mut self.large;
             self.rest.retain(|&body| {
-                let small = half(body) <= limit || half(body).is_nan();
+                let extent = proxies.extent(body);
+                let small = extent <= limit || extent.is_nan();
                 if !small {
                     large.push(body);
                 }
@@ -114,7 +114,7 @@ impl Grid {
             let (least, most) = (-proxies.size[axis], 2.0 * proxies.size[axis]);
             (low[axis], high[axis]) = (math::clamp(low[axis], least, most), math::clamp(high[axis], least, most));
         }
-        let cell = (2.0 * limit + proxies.slack) * 1.001;
+        let cell = 2.0 * limit * 1.001;
         let layout = Layout::new(low, high, cell, self.rest.len());
         self.start.clear();
         self.start.resize(layout.cells() + 2, 0);
@@ -137,7 +137,7 @@ impl Grid {
     }
 
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, pairs: &mut Vec<Pair>) {
-        let search = Search { sorted: &self.sorted, slack: proxies.slack, dt: proxies.dt, owned: proxies.owned, pairs };
+        let search = Search { sorted: &self.sorted, dt: proxies.dt, owned: proxies.owned, pairs };
         search.neighbours(&self.start, layout.columns);
     }
 
@@ -145,8 +145,8 @@ impl Grid {
         for &body in &self.large {
             let i = body as usize;
             let (x, y) = (proxies.x[i], proxies.y[i]);
-            let reach_x = proxies.half_x[i] + limit + proxies.slack;
-            let reach_y = proxies.half_y[i] + limit + proxies.slack;
+            let reach_x = proxies.half_x[i] + proxies.slack[i] + limit;
+            let reach_y = proxies.half_y[i] + proxies.slack[i] + limit;
             let columns = layout.column(x - reach_x)..=layout.column(x + reach_x);
             for row in layout.row(y - reach_y)..=layout.row(y + reach_y) {
                 let first = self.start[row * layout.columns + columns.start()] as usize;
@@ -198,12 +198,12 @@ fn choose_limit(proxies: &Proxies, bodies: &[u32]) -> f32 {
     let mut classes = [Class::default(); CLASSES];
     for &body in bodies {
         let (x, y) = (proxies.half_x[body as usize], proxies.half_y[body as usize]);
-        let half = math::max(x, y);
-        let class = &mut classes[((half.to_bits() >> 22).saturating_sub(FIRST) as usize).min(CLASSES - 1)];
+        let extent = proxies.extent(body);
+        let class = &mut classes[((extent.to_bits() >> 22).saturating_sub(FIRST) as usize).min(CLASSES - 1)];
         // What reaches beyond the tile meets nobody there.
         let (x, y) = (math::min(x, proxies.size[0]), math::min(y, proxies.size[1]));
         class.count += 1;
-        class.greatest = math::max(half, class.greatest);
+        class.greatest = math::max(extent, class.greatest);
         class.extents += f64::from(x + y);
         class.area += f64::from(x * y);
     }

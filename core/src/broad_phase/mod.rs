@@ -34,11 +34,11 @@ pub(crate) struct Proxies {
     pub(crate) reach: Vec<f32>,
     /// One for a box, zero for a circle.
     pub(crate) boxy: Vec<f32>,
+    /// Local coordinates are rounded; comparing them needs this much more room for the body, in meters.
+    pub(crate) slack: Vec<f32>,
     pub(crate) owned: usize,
     /// Width and height of the tile, in meters.
     pub(crate) size: [f32; 2],
-    /// Local coordinates are rounded; comparing them needs this much more room, in meters.
-    pub(crate) slack: f32,
     /// Length of a step, in seconds.
     pub(crate) dt: f32,
 }
@@ -61,20 +61,20 @@ impl Proxies {
             &mut self.velocity_y,
             &mut self.reach,
             &mut self.boxy,
+            &mut self.slack,
         ];
-        let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy] = columns.map(|column| {
+        let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy, slack] = columns.map(|column| {
             column.resize(total, 0.0);
             &mut column[..total]
         });
         let (position, velocity, rotation) =
             (&bodies.position[..total], &bodies.velocity[..total], &bodies.rotation[..total]);
         let (angular_velocity, kinds) = (&bodies.angular_velocity[..total], &bodies.kind[..total]);
-        let mut farthest = 0.0;
         for i in 0..total {
             let kind = setup.kind(kinds[i]);
             let local = (position[i] - tile.corner).as_vec2();
             (x[i], y[i]) = (local.x, local.y);
-            farthest = math::max(math::max(local.x.abs(), local.y.abs()), farthest);
+            slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
             let mut half = kind.half_extents(rotation[i]);
             if i < dynamic {
                 half += Vec2::splat(setup.margin(velocity[i]));
@@ -89,7 +89,6 @@ impl Proxies {
         }
         self.owned = tile.owned;
         self.size = setup.grid.tile_size().as_vec2().to_array();
-        self.slack = 4.0 * f32::EPSILON * farthest;
         self.dt = setup.params.dt;
     }
 
@@ -99,7 +98,15 @@ impl Proxies {
         let (a, b) = (a as usize, b as usize);
         let apart_x = (self.x[a] - self.x[b]).abs() - (self.half_x[a] + self.half_x[b]);
         let apart_y = (self.y[a] - self.y[b]).abs() - (self.half_y[a] + self.half_y[b]);
-        (apart_x <= self.slack) & (apart_y <= self.slack)
+        let slack = self.slack[a] + self.slack[b];
+        (apart_x <= slack) & (apart_y <= slack)
+    }
+
+    /// The greater half extent of a body's AABB, with room for rounding.
+    #[inline(always)]
+    fn extent(&self, body: u32) -> f32 {
+        let i = body as usize;
+        math::max(self.half_x[i], self.half_y[i]) + self.slack[i]
     }
 
     /// The definition of a pair: the grown AABBs of two bodies overlap, and their bounding circles may touch within the

@@ -33,7 +33,7 @@ impl Sorted {
         self.body.resize(padded, 0);
         self.cell.resize(padded, 0);
         // One length for all columns on either side: each index is checked once, not once per column.
-        let from = [&proxies.x, &proxies.y, &proxies.velocity_x, &proxies.velocity_y, &proxies.reach];
+        let from = [&proxies.x, &proxies.y, &proxies.velocity_x, &proxies.velocity_y, &proxies.reach, &proxies.slack];
         let from = from.map(|column| &column[..all]);
         let to = [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach];
         let [x, y, velocity_x, velocity_y, reach] = to.map(|column| &mut column[..padded]);
@@ -46,7 +46,8 @@ impl Sorted {
             y[place] = from[1][i];
             velocity_x[place] = from[2][i];
             velocity_y[place] = from[3][i];
-            reach[place] = from[4][i];
+            // Distances here come from local coordinates.
+            reach[place] = from[4][i] + 2.0 * from[5][i];
             to_body[place] = body;
             to_cell[place] = cell;
         }
@@ -60,8 +61,6 @@ pub(super) struct Search<'a> {
     pub(super) owned: usize,
     /// Length of a step, in seconds.
     pub(super) dt: f32,
-    /// Room for the rounding of local coordinates, in meters.
-    pub(super) slack: f32,
     pub(super) pairs: &'a mut Vec<Pair>,
 }
 
@@ -109,7 +108,7 @@ impl Search<'_> {
         let length = |x: f32, y: f32| (x * x + y * y).sqrt();
         let distance = length(x[b] - x[a], y[b] - y[a]);
         let speed = length(velocity_x[b] - velocity_x[a], velocity_y[b] - velocity_y[a]);
-        distance <= (reach[a] + reach[b] + self.dt * speed) * MORE + 2.0 * self.slack
+        distance <= (reach[a] + reach[b] + self.dt * speed) * MORE
     }
 
     #[inline(always)]
@@ -127,7 +126,7 @@ impl Search<'_> {
         let (xs, ys, reaches) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.reach[..padded]);
         let (velocities_x, velocities_y) = (&sorted.velocity_x[..padded], &sorted.velocity_y[..padded]);
         let cells = &sorted.cell[..padded];
-        let (dt, more, slack) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE), _mm256_set1_ps(2.0 * self.slack));
+        let (dt, more) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE));
         for place in 0..sorted.len {
             let one = |column: &[f32]| _mm256_set1_ps(column[place]);
             let (x, y, reach) = (one(xs), one(ys), one(reaches));
@@ -148,8 +147,8 @@ impl Search<'_> {
                         _mm256_sub_ps(eight(velocities_y), velocity_y),
                     );
                     let within = _mm256_add_ps(_mm256_add_ps(reach, eight(reaches)), _mm256_mul_ps(dt, speed));
-                    let within = _mm256_add_ps(_mm256_mul_ps(within, more), slack);
-                    let hits = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(distance, within)) as u32;
+                    let near = _mm256_cmp_ps::<_CMP_LE_OQ>(distance, _mm256_mul_ps(within, more));
+                    let hits = _mm256_movemask_ps(near) as u32;
                     // Lanes behind the end of the run are not meant.
                     let left = end.saturating_sub(first).min(8) as u32;
                     let mut hits = hits & ((1 << left) - 1);

@@ -5,7 +5,7 @@
 //! edge instead, so that boxes passing corner to corner do not meet an invisible wall.
 
 use super::{Manifold, ManifoldPoint};
-use crate::math::{Rot, clamp, cross, dot};
+use crate::math::{Rot, clamp, dot, min};
 use glam::Vec2;
 
 /// A face of B becomes the reference only if it separates by so much more than one of A, in meters (a
@@ -90,7 +90,12 @@ fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2
     let mut manifold = Manifold { normal: n, ..Manifold::EMPTY };
     for (end, &(at, separation)) in (0..).zip(&place) {
         let clipped = clamp(at, -width, width);
-        let separation = separation + slope * (clipped - at);
+        let mut separation = separation + slope * (clipped - at);
+        if clipped != at && separation > 0.0 {
+            // Around a corner a slanted edge is nearer than straight up from the face.
+            let gap = nearest(n * height + t * clipped, ends).0;
+            separation = min(dot(gap, gap).sqrt(), separation);
+        }
         let anchor = t * clipped + n * (height + 0.5 * separation);
         manifold.push(ManifoldPoint { anchor, separation, feature: features | end });
     }
@@ -99,12 +104,16 @@ fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2
 
 /// Where no face opposes the edge: the nearest points of the reference's corner and the incident edge.
 fn corner_to_edge(corner: Vec2, ends: [Vec2; 2], n: Vec2, features: u32) -> Manifold {
-    let edge = ends[1] - ends[0];
-    let part = clamp(dot(corner - ends[0], edge) / dot(edge, edge), 0.0, 1.0);
-    let gap = ends[0] + edge * part - corner;
+    let (gap, part) = nearest(corner, ends);
     let distance = dot(gap, gap).sqrt();
     let normal = if distance > 0.0 { gap / distance } else { n };
-    debug_assert!(cross(normal, normal) == 0.0);
     let feature = features | u32::from(part >= 0.5);
     Manifold::single(normal, corner + gap * 0.5, distance, feature)
+}
+
+/// From a corner to the nearest point of an edge, and where on the edge that lies: 0 to 1.
+fn nearest(corner: Vec2, ends: [Vec2; 2]) -> (Vec2, f32) {
+    let edge = ends[1] - ends[0];
+    let part = clamp(dot(corner - ends[0], edge) / dot(edge, edge), 0.0, 1.0);
+    (ends[0] + edge * part - corner, part)
 }
