@@ -59,6 +59,7 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
         mark[body.body as usize] = 0;
         if body.owner != tile.id {
             departures.push(body.body);
+            tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, body.owner));
             bag.message(tile.id, body.owner).migrants.push(tile.bodies.get(body.body as usize));
         }
     }

@@ -131,6 +131,13 @@ impl TileGrid {
         rows.flat_map(move |row| columns.clone().map(move |column| self.tile_at(column, row)))
     }
 
+    /// Whether two tiles share an edge or a corner, or are the same.
+    pub(crate) fn are_neighbours(&self, a: TileId, b: TileId) -> bool {
+        let place = |tile: TileId| (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
+        let ((ax, ay), (bx, by)) = (place(a), place(b));
+        ax.abs_diff(bx) <= 1 && ay.abs_diff(by) <= 1
+    }
+
     /// Whether a tile is among those [`TileGrid::reached`].
     pub(crate) fn reaches(&self, tile: TileId, center: DVec2, half: Vec2, reach: f64) -> bool {
         let (columns, rows) = self.reached_span(center, half, reach);

@@ -44,6 +44,8 @@ pub(crate) struct TileCounts {
     pub(crate) contacts: u64,
     pub(crate) border_contacts: u64,
     pub(crate) migrations: u64,
+    /// Bodies that left for a tile that is no neighbour.
+    pub(crate) leaps: u64,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
     /// The lowest owned body whose state is no longer finite.

@@ -33,6 +33,8 @@ pub struct World {
     /// What this rank has to say at the next exchange.
     verdict: Verdict,
     timings: Timings,
+    /// Whether it was said that bodies outrun their tiles.
+    warned_of_leaps: bool,
 }
 
 /// Everything a step needs beyond a tile's own state. With one sync point a step, a tile is stepped in one go and a
@@ -64,6 +66,7 @@ pub(crate) struct Bench<'a> {
 impl Bench<'_> {
     /// Runs one stage and books its time.
     pub(crate) fn stage(&mut self, phase: Phase, stage: impl FnOnce(&mut Self)) {
+        let _span = tracing::trace_span!("stage", name = phase.name(), tile = self.tile.id.0).entered();
         let mut watch = Stopwatch::start();
         stage(self);
         watch.lap(phase, &mut self.work.timings);
@@ -97,6 +100,7 @@ impl World {
             sync: 0,
             verdict: Verdict::default(),
             timings: Timings::default(),
+            warned_of_leaps: false,
         })
     }
 
@@ -181,6 +185,14 @@ impl World {
         for work in &mut self.works {
             let work = work.get_mut().expect("no stage panicked");
             self.timings.add_share(&std::mem::take(&mut work.timings), threads);
+        }
+        let leaps: u64 = self.tiles.iter().map(|tile| tile.counts.leaps).sum();
+        if leaps > 0 && !self.warned_of_leaps {
+            self.warned_of_leaps = true;
+            tracing::warn!(
+                "step {}: {leaps} bodies moved past a neighbouring tile; larger tiles or a speed limit are faster",
+                self.step
+            );
         }
         if let Some(id) = self.tiles.iter().filter_map(|tile| tile.counts.not_finite).min() {
             self.verdict = self.verdict.merge(Verdict { stop: false, failure: Some((self.step, id)) });

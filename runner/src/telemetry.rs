@@ -2,6 +2,7 @@
 
 use crate::error::RunError;
 use std::env::{self, VarError};
+use std::io::IsTerminal;
 use tracing_subscriber::EnvFilter;
 
 /// Starts logging: warnings and errors, or what `RUST_LOG` says.
@@ -19,7 +20,9 @@ pub fn init() -> Result<(), RunError> {
     };
     let filter =
         EnvFilter::try_new(&value).map_err(|error| RunError::LogFilter { value, reason: error.to_string() })?;
+    let stderr = std::io::stderr;
+    let colored = stderr().is_terminal();
     // Fails only where a subscriber is already in place, which then serves as well.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colored).with_writer(stderr).try_init();
     Ok(())
 }
