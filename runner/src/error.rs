@@ -33,6 +33,24 @@ pub enum RunError {
     /// The world it describes.
     #[error("this configuration makes no world: {0}")]
     Setup(#[from] SetupError),
+    /// More than this machine can hold.
+    #[error(
+        "too large for this machine: {bodies} bodies on {tiles} tiles with {ranks} ranks need about {:.1} GB of memory, and {:.1} GB are free: use fewer",
+        *.needed as f64 / 1e9,
+        *.available as f64 / 1e9
+    )]
+    TooLarge {
+        /// Bodies asked for.
+        bodies: u64,
+        /// Tiles asked for, or by default.
+        tiles: u64,
+        /// Ranks, all of this process.
+        ranks: u64,
+        /// Bytes, estimated.
+        needed: u64,
+        /// Bytes free.
+        available: u64,
+    },
     /// `RUST_LOG`.
     #[error("RUST_LOG = {value}: {reason}; write a level or target=level, such as atoll=debug")]
     LogFilter {
@@ -135,6 +153,7 @@ impl RunError {
             | Self::Setup(_)
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
+            | Self::TooLarge { .. }
             | Self::Threads { .. } => Exit::Usage,
             Self::PeerLost { .. } | Self::Transport { .. } => Exit::PeerLost,
             Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {

@@ -70,8 +70,9 @@ impl JsonFile {
 
     /// Beside the file, so that renaming never crosses file systems.
     fn temporary(&self) -> PathBuf {
-        let mut name = OsString::from(self.path.file_name().expect("checked to have a name"));
-        name.push(".tmp");
+        let mut name = OsString::from(".");
+        name.push(self.path.file_name().expect("checked to have a name"));
+        name.push(format!(".{}.tmp", std::process::id()));
         self.path.with_file_name(name)
     }
 }

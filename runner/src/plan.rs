@@ -24,6 +24,21 @@ pub struct Plan {
     pub transport: TransportKind,
 }
 
+/// Refuses a world that this machine cannot hold, before it tries to.
+fn check_memory(bodies: u64, tiles: u64, ranks: u64) -> Result<(), RunError> {
+    // A body takes 48 bytes and its contacts as much again and more; an empty tile a few buffers, and four bytes in
+    // every rank's map of tiles; a pair of ranks a channel.
+    let needed = bodies.saturating_mul(200) + tiles * (1000 + 4 * ranks) + ranks * ranks * 500;
+    let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|facts| {
+        let line = facts.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+        Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+    });
+    match available {
+        Some(available) if needed > available => Err(RunError::TooLarge { bodies, tiles, ranks, needed, available }),
+        _ => Ok(()),
+    }
+}
+
 impl Plan {
     /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks.
     ///
@@ -32,6 +47,7 @@ impl Plan {
     pub fn new(config: &Config) -> Result<Self, RunError> {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
+        check_memory(scene.bodies(), u64::from(tiles[0]) * u64::from(tiles[1]), config.run.ranks as u64)?;
         let (low, high) = scene.domain();
         let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
         let params = config.params.clone();

@@ -307,6 +307,13 @@ fn the_summary_has_all_its_keys() {
 }
 
 #[test]
+fn a_world_larger_than_the_machine_is_refused_before_anything_heavy() {
+    for options in ["--tiles 65535x65535", "--bodies 10000000000", "--tiles 60000x60000 --ranks 1024"] {
+        refused(options, "too large for this machine: ");
+    }
+}
+
+#[test]
 fn quiet_leaves_only_the_report() {
     let desk = Desk::new(SMALL);
     let ended = run(&mut desk.atoll(["--quiet", "--json", "summary.json"]));
@@ -317,6 +324,13 @@ fn quiet_leaves_only_the_report() {
     }
     assert!(ended.stdout.contains("0 lost, 0 escaped"), "{ended}");
     assert!(!ended.stdout.contains('\u{1b}'), "escape sequences without a terminal: {ended}");
+}
+
+#[test]
+fn the_log_is_plain_text_where_there_is_no_terminal() {
+    let ended = run(Desk::new(SMALL).atoll(["--quiet", "--ranks", "2"]).env("RUST_LOG", "atoll=info"));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert!(ended.stderr.contains("rank=1") && !ended.stderr.contains('\u{1b}'), "{ended}");
 }
 
 #[test]

@@ -31,15 +31,18 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
 
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
     let summary = backend::run(&plan, &Observer { show, stop })?;
-    if let Err(error) = write!(io::stdout(), "{summary}") {
+    // Both are tried before either is complained about: the one may save what the other lost.
+    let shown = match write!(io::stdout(), "{summary}") {
         // A reader that has seen enough, as in `atoll run ... | head`, is not a failure.
-        if error.kind() != ErrorKind::BrokenPipe {
-            return Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() });
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() })
         }
-    }
+        _ => Ok(()),
+    };
     if let Some(json) = json {
         json.write(&summary)?;
     }
+    shown?;
 
     if summary.bodies_lost != 0 {
         let found = summary.bodies.wrapping_add_signed(-summary.bodies_lost);

@@ -234,7 +234,7 @@ fn read_scene(settings: &mut Settings) -> Result<SceneConfig, ConfigError> {
 
 fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
-    let ranks = settings.integer("run.ranks", 1..=4096, 1)? as usize;
+    let ranks = settings.integer("run.ranks", 1..=1024, 1)? as usize;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
     let transports = [
         ("local", Some(TransportKind::Local)),

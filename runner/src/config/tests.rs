@@ -104,7 +104,7 @@ fn out_of_range_and_of_the_wrong_type() {
         ("scene", "power = nan", "test.toml: scene.power = nan: must be a number within 0.1 to 10"),
         ("scene", "power = true", "test.toml: scene.power = true: must be a number"),
         ("run", "steps = 0", "test.toml: run.steps = 0: must be a whole number within 1 to"),
-        ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 4096"),
+        ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 1024"),
         ("run", "threads = 0", "test.toml: run.threads = 0: must be a whole number within 1 to 1024"),
         ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", or columns and rows"),
         ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
