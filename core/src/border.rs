@@ -4,7 +4,7 @@
 //! Who hears what follows from the border contacts alone. Both owners of a contact hold it, made from the same bits,
 //! so the bodies that one side sends are exactly those the other expects, in the order of its ghost list.
 
-use crate::contact::{Contact, ContactPoint, PairKey, SlotKind};
+use crate::contact::{Contact, ContactPoint, SlotKind};
 use crate::halo::{BorderImpulse, BorderPoint, GhostRefresh, Mailbag, Unseen};
 use crate::id::{GlobalId, TileId};
 use crate::narrow_phase::Contacts;
@@ -179,11 +179,6 @@ fn owner_of(tile: &Tile, slot: crate::contact::Slot) -> Option<TileId> {
         SlotKind::Ghost(ghost) => Some(tile.ghost_owners[ghost]),
         SlotKind::Static(_) => None,
     }
-}
-
-/// Whether a contact is a border contact.
-pub(crate) fn is_border(key: PairKey) -> bool {
-    matches!(key.high().kind(), SlotKind::Ghost(_))
 }
 
 impl Solver {

@@ -139,6 +139,12 @@ impl PairKey {
     pub(crate) fn high(self) -> Slot {
         Slot(self.0 as u32)
     }
+
+    /// Whether the bodies belong to two tiles: then both solve the contact.
+    #[inline(always)]
+    pub(crate) fn is_border(self) -> bool {
+        matches!(self.high().kind(), SlotKind::Ghost(_))
+    }
 }
 
 /// The contacts a tile solved, in canonical order: ascending by the slots of their bodies.

@@ -54,7 +54,7 @@ impl TileFacts {
         }
         for (i, (key, contact)) in contacts.cache.iter().enumerate() {
             // Both owners of a border contact see it; the one with body A counts it.
-            let border = crate::border::is_border(key);
+            let border = key.is_border();
             if border && contacts.bodies[i][0] as usize >= tile.owned {
                 continue;
             }

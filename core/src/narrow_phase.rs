@@ -68,7 +68,7 @@ impl Contacts {
     pub(crate) fn count(&self, owned: usize) -> (u64, u64) {
         let (mut all, mut border) = (0, 0);
         for (&[a, _], &key) in self.bodies.iter().zip(&self.cache.keys) {
-            let is_border = crate::border::is_border(key);
+            let is_border = key.is_border();
             let counts = !is_border || (a as usize) < owned;
             all += u64::from(counts);
             border += u64::from(counts && is_border);

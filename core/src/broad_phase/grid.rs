@@ -8,7 +8,7 @@
 //!
 //! What counts as small is chosen by estimated cost from a histogram of sizes.
 
-use super::search::{Search, Sorted};
+use super::search::{Search, Sorted, emit};
 use super::{Pair, Proxies};
 use crate::math;
 
@@ -26,15 +26,6 @@ pub(crate) struct Grid {
     start: Vec<u32>,
     /// Bodies of this level in cell order.
     sorted: Sorted,
-}
-
-/// Appends a pair, lower index first, unless neither body is owned.
-#[inline(always)]
-pub(super) fn emit(pairs: &mut Vec<Pair>, owned: usize, a: u32, b: u32) {
-    let (low, high) = if a < b { (a, b) } else { (b, a) };
-    if (low as usize) < owned {
-        pairs.push([low, high]);
-    }
 }
 
 /// Where the cells lie. One column and one row of empty cells surround the others, so that neighbours always exist.

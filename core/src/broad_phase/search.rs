@@ -67,6 +67,15 @@ pub(super) struct Search<'a> {
 /// Room for the rounding of everything that follows from the coordinates.
 const MORE: f32 = 1.001;
 
+/// Appends a pair, lower index first, unless neither body is owned.
+#[inline(always)]
+pub(super) fn emit(pairs: &mut Vec<Pair>, owned: usize, a: u32, b: u32) {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    if (low as usize) < owned {
+        pairs.push([low, high]);
+    }
+}
+
 /// Where the two runs of a body lie that hold all its neighbours not yet met.
 #[inline(always)]
 fn runs(start: &[u32], columns: usize, cell: usize, place: usize) -> [(usize, usize); 2] {
@@ -113,7 +122,7 @@ impl Search<'_> {
 
     #[inline(always)]
     fn emit(&mut self, a: usize, b: usize) {
-        super::grid::emit(self.pairs, self.owned, self.sorted.body[a], self.sorted.body[b]);
+        emit(self.pairs, self.owned, self.sorted.body[a], self.sorted.body[b]);
     }
 
     #[cfg(target_arch = "x86_64")]
