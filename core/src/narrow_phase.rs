@@ -51,8 +51,7 @@ impl Contacts {
             let known = (old < keys.len() && keys[old] == key).then(|| &tile.contacts.contacts[old]);
             let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
             let (a, b, pair) = if ids.0 < ids.1 { (low, high, ids) } else { (high, low, (ids.1, ids.0)) };
-            let is_ghost = (tile.owned..tile.owned + ghosts).contains(&(high as usize));
-            let strange = is_ghost
+            let strange = key.is_border()
                 || low as usize >= tile.arrived
                 || (high as usize) < tile.owned && high as usize >= tile.arrived;
             let stray = if strange { tile.strays.find(pair) } else { None };

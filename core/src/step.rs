@@ -41,7 +41,7 @@ pub struct StepReport {
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
     world.begin_step();
     let stopped = migrate(world, halo)?;
-    match world.exchanges_in_step() {
+    match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
             world.each_tile(|bench| {

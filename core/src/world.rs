@@ -159,10 +159,6 @@ impl World {
         &self.tiles
     }
 
-    pub(crate) fn exchanges_in_step(&self) -> Exchange {
-        self.setup.params.exchange
-    }
-
     /// Starts a step: no sync point passed, nothing counted.
     pub(crate) fn begin_step(&mut self) {
         self.sync = 0;
