@@ -52,6 +52,17 @@ pub enum SetupError {
         /// What is asked of it.
         must: &'static str,
     },
+    /// Sleeping is known within one tile only.
+    #[error(
+        "sleep = true on {tiles} tiles: an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
+    )]
+    SleepAcrossTiles {
+        /// How many tiles there are.
+        tiles: usize,
+    },
+    /// Frozen ghosts take nothing over within a step.
+    #[error("ghosts = \"frozen\" goes with exchange = \"step\" only: read-only copies are heard of once a step")]
+    FrozenSubsteps,
     /// A tile outside the grid, or named twice.
     #[error("tile {tile}: outside the grid, or given twice")]
     BadTile {

@@ -23,6 +23,12 @@ pub struct TileFacts {
     pub penetration: f64,
     /// The deepest, in meters.
     pub max_penetration: f64,
+    /// Contact points looked at after the last solve, if it was measured ([`crate::World::measure_next_step`]).
+    pub solved_points: u64,
+    /// Sum of the speeds at which their surfaces still came nearer than they may, in m/s.
+    pub violation: f64,
+    /// The greatest of these, in m/s.
+    pub max_violation: f64,
     /// Sum of masses, in kg.
     pub mass: f64,
     /// Energy of motion, rotation included, in J.
@@ -88,6 +94,11 @@ pub struct Facts {
     pub mean_penetration: f64,
     /// The deepest, in meters.
     pub max_penetration: f64,
+    /// Mean speed at which contact points still came nearer than they may after the last solve, in m/s; zero if not
+    /// measured.
+    pub mean_violation: f64,
+    /// The greatest, in m/s.
+    pub max_violation: f64,
     /// Mass, in kg.
     pub mass: f64,
     /// Energy of motion, rotation included, in J.
@@ -107,6 +118,7 @@ impl Facts {
         tiles.sort_unstable_by_key(|tile| tile.tile);
         let mut total = Self::default();
         let (mut penetration, mut half_v2, mut spin2) = (0.0, 0.0, 0.0);
+        let (mut solved_points, mut violation) = (0, 0.0);
         for tile in &tiles {
             total.bodies += tile.bodies;
             total.contacts += tile.contacts;
@@ -114,6 +126,9 @@ impl Facts {
             total.overlaps += tile.overlaps;
             penetration += tile.penetration;
             total.max_penetration = f64::max(total.max_penetration, tile.max_penetration);
+            solved_points += tile.solved_points;
+            violation += tile.violation;
+            total.max_violation = f64::max(total.max_violation, tile.max_violation);
             total.mass += tile.mass;
             total.kinetic_energy += tile.kinetic_energy;
             half_v2 += tile.half_v2;
@@ -123,6 +138,7 @@ impl Facts {
         }
         let mean = |sum: f64, count: u64| if count > 0 { sum / count as f64 } else { 0.0 };
         total.mean_penetration = mean(penetration, total.overlaps);
+        total.mean_violation = mean(violation, solved_points);
         total.mean_half_v2 = mean(half_v2, total.bodies);
         total.mean_spin2 = mean(spin2, total.bodies);
         total

@@ -96,7 +96,7 @@ pub use halo::{
 pub use hash::Hashes;
 pub use id::{GlobalId, KindId, TileId};
 pub use math::Rot;
-pub use params::{BroadPhase, Exchange, Params, Solver};
+pub use params::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
 pub use partition::{Region, TileGrid};
 pub use phase::{Phase, Timings};
 pub use setup::Blueprint;

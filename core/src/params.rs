@@ -19,6 +19,8 @@ pub enum BroadPhase {
     /// Cells sorted in memory, built anew each step.
     #[default]
     Grid,
+    /// A quadtree of fat AABBs that lives from step to step; bodies that left theirs are put in anew (the report's).
+    Quadtree,
 }
 
 /// How contact impulses are found.
@@ -27,6 +29,45 @@ pub enum Solver {
     /// Substepped soft constraints with relax (Box2D v3's scheme).
     #[default]
     SoftStep,
+    /// Sequential impulses over the whole step: projected Gauss-Seidel with warm starting and accumulated clamping, and
+    /// Baumgarte's position correction (the report's). Counts as one substep.
+    Pgs,
+}
+
+/// How the islands of a tile are found. The same islands, and the same bits, whichever.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum IslandSearch {
+    /// Disjoint sets joined contact by contact.
+    #[default]
+    UnionFind,
+    /// Depth-first search over each body's contacts (the report's).
+    Dfs,
+    /// Disjoint sets joined by all threads at once.
+    ParallelUnionFind,
+}
+
+/// How one tile's contacts are shared among threads, where there are more threads than tiles. The same bits, whichever.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Parallel {
+    /// Not at all.
+    Serial,
+    /// Every island on one thread (the report's).
+    Islands,
+    /// Contacts of one color on all threads at once, whatever their islands.
+    Coloring,
+    /// Large islands by color, the small ones by island.
+    #[default]
+    Auto,
+}
+
+/// How a ghost takes part in the contacts of a tile that does not own it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Ghosts {
+    /// With its true mass; the owner's result stands.
+    #[default]
+    Dynamic,
+    /// Read-only: infinite mass, constant velocity (the report's). For comparison: it doubles border impulses.
+    Frozen,
 }
 
 /// The parameters of a step. `Default` is the setting of the scenes: 60 Hz, 4 substeps, no gravity.
@@ -74,6 +115,26 @@ pub struct Params {
     pub broad_phase: BroadPhase,
     /// Solver (soft-step).
     pub solver: Solver,
+    /// Passes over all contacts in a step of [`Solver::Pgs`] (10). More make stacks stiffer; the solver's cost grows with
+    /// them.
+    pub iterations: u32,
+    /// Part of an overlap that [`Solver::Pgs`] pushes out in a step (0.2), at most `push_out_speed`. More resolves it
+    /// sooner, with more energy.
+    pub baumgarte: f32,
+    /// Overlap that [`Solver::Pgs`] leaves alone, in m (0.005), so that resting contacts do not flicker.
+    pub linear_slop: f32,
+    /// How islands are found (union-find). Changes no bit of the result.
+    pub island_search: IslandSearch,
+    /// How a tile's contacts are shared among threads (auto). Changes no bit of the result.
+    pub parallel: Parallel,
+    /// What ghosts are (dynamic).
+    pub ghosts: Ghosts,
+    /// Islands that rest are left out until something touches them (no). On one tile only.
+    pub sleep: bool,
+    /// Speed of a body's fastest point below which it counts as resting, in m/s (0.05).
+    pub sleep_speed: f32,
+    /// An island falls asleep once all its bodies have rested for so long, in s (0.5).
+    pub sleep_time: f32,
 }
 
 impl Default for Params {
@@ -98,6 +159,15 @@ impl Default for Params {
             exchange: Exchange::default(),
             broad_phase: BroadPhase::default(),
             solver: Solver::default(),
+            iterations: 10,
+            baumgarte: 0.2,
+            linear_slop: 0.005,
+            island_search: IslandSearch::default(),
+            parallel: Parallel::default(),
+            ghosts: Ghosts::default(),
+            sleep: false,
+            sleep_speed: 0.05,
+            sleep_time: 0.5,
         }
     }
 }
@@ -128,12 +198,29 @@ impl Params {
             self.margin_cap >= self.margin_floor && self.margin_cap.is_finite(),
             "finite and at least margin_floor",
         )?;
-        require("sort_interval", self.sort_interval as f32, self.sort_interval > 0, "at least 1")
+        require("sort_interval", self.sort_interval as f32, self.sort_interval > 0, "at least 1")?;
+        require("iterations", self.iterations as f32, (1..=1000).contains(&self.iterations), "within 1 to 1000")?;
+        require("baumgarte", self.baumgarte, (0.0..=1.0).contains(&self.baumgarte), "within 0 to 1")?;
+        not_negative("linear_slop", self.linear_slop)?;
+        not_negative("sleep_speed", self.sleep_speed)?;
+        not_negative("sleep_time", self.sleep_time)?;
+        if self.ghosts == Ghosts::Frozen && self.exchange == Exchange::Substep {
+            return Err(SetupError::FrozenSubsteps);
+        }
+        Ok(())
+    }
+
+    /// How often velocities and positions are integrated in a step.
+    pub(crate) fn integrations(&self) -> u32 {
+        match self.solver {
+            Solver::SoftStep => self.substeps,
+            Solver::Pgs => 1,
+        }
     }
 
     /// Length of a substep in seconds.
     pub(crate) fn substep(&self) -> f32 {
-        self.dt / self.substeps as f32
+        self.dt / self.integrations() as f32
     }
 }
 

@@ -10,13 +10,17 @@ pub enum Phase {
     Migrate,
     /// Waiting for, and carrying, messages.
     Exchange,
+    /// The broad phase's own order brought up to date: cells filled, or bodies that left their fat AABBs put in anew.
+    Flush,
     /// Pairs of bodies that may touch.
     BroadPhase,
     /// Manifolds, matched with last step's impulses.
     NarrowPhase,
     /// Bodies connected through contacts.
     Islands,
-    /// Coloring and constraint rows.
+    /// Contacts of one color share no body.
+    Coloring,
+    /// Constraint rows.
     Prepare,
     /// Substeps: velocities, warm start, solve, positions, relax.
     Substeps,
@@ -28,12 +32,14 @@ pub enum Phase {
 
 impl Phase {
     /// All of them, in the order of the step.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Migrate,
         Self::Exchange,
+        Self::Flush,
         Self::BroadPhase,
         Self::NarrowPhase,
         Self::Islands,
+        Self::Coloring,
         Self::Prepare,
         Self::Substeps,
         Self::Border,
@@ -45,9 +51,11 @@ impl Phase {
         match self {
             Self::Migrate => "migrate",
             Self::Exchange => "exchange",
+            Self::Flush => "flush",
             Self::BroadPhase => "broad_phase",
             Self::NarrowPhase => "narrow_phase",
             Self::Islands => "islands",
+            Self::Coloring => "coloring",
             Self::Prepare => "prepare",
             Self::Substeps => "substeps",
             Self::Border => "border",

@@ -52,6 +52,9 @@ impl Setup {
     pub(crate) fn new(blueprint: &Blueprint) -> Result<Self, SetupError> {
         let params = blueprint.params.clone();
         params.check()?;
+        if params.sleep && blueprint.grid.tiles() > 1 {
+            return Err(SetupError::SleepAcrossTiles { tiles: blueprint.grid.tiles() });
+        }
         let mut kinds = Vec::with_capacity(blueprint.kinds.len() + blueprint.statics.len());
         for (row, kind) in (0..).zip(&blueprint.kinds) {
             kinds.push(KindRow::dynamic(kind, KindId(row))?);

@@ -29,6 +29,10 @@ pub struct StepReport {
     pub islands: u64,
     /// Bodies in the largest.
     pub largest_island: u64,
+    /// Bodies whose islands sleep.
+    pub asleep: u64,
+    /// Colors of the contacts of one tile, at most.
+    pub colors: u64,
 }
 
 /// Makes one step of this rank's part of the world.
@@ -47,7 +51,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             world.each_tile(|bench| {
                 collide(bench);
                 prepare(bench);
-                for substep in 0..bench.setup.params.substeps {
+                for substep in 0..bench.setup.params.integrations() {
                     solve_substep(bench, substep);
                 }
                 finalize(bench);
@@ -59,9 +63,9 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 prepare(bench);
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
             });
-            for substep in 0..world.setup.params.substeps {
+            for substep in 0..world.setup.params.integrations() {
                 // After the last substep only a bounce still looks at a ghost's velocity.
-                let refreshed = substep + 1 < world.setup.params.substeps || world.setup.bouncy;
+                let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
                 world.each_tile(|bench| {
                     solve_substep(bench, substep);
                     if refreshed {
@@ -202,6 +206,8 @@ fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E
         report.migrations += tile.counts.migrations;
         report.islands += tile.counts.islands;
         report.largest_island = report.largest_island.max(tile.counts.largest_island);
+        report.asleep += tile.counts.asleep;
+        report.colors = report.colors.max(tile.counts.colors);
     }
     world.end_step();
     Ok(report)

@@ -48,6 +48,8 @@ pub(crate) struct TileCounts {
     pub(crate) leaps: u64,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
+    pub(crate) asleep: u64,
+    pub(crate) colors: u64,
     /// The lowest owned body whose state is no longer finite.
     pub(crate) not_finite: Option<GlobalId>,
     /// What must never happen, and did.

@@ -33,6 +33,8 @@ pub struct World {
     /// What this rank has to say at the next exchange.
     verdict: Verdict,
     timings: Timings,
+    /// Whether the next step measures how well its contacts are solved.
+    pub(crate) measures: bool,
     /// Whether it was said that bodies outrun their tiles.
     warned_of_leaps: bool,
 }
@@ -100,6 +102,7 @@ impl World {
             sync: 0,
             verdict: Verdict::default(),
             timings: Timings::default(),
+            measures: false,
             warned_of_leaps: false,
         })
     }
@@ -148,6 +151,12 @@ impl World {
     /// Asks all ranks to stop: every rank's next step reports `stopped`.
     pub fn request_stop(&mut self) {
         self.verdict.stop = true;
+    }
+
+    /// Asks that the next step, and the last one of a run that was asked to stop, measure how well its contacts are
+    /// solved: [`TileFacts`](crate::TileFacts) then tell.
+    pub fn measure_next_step(&mut self) {
+        self.measures = true;
     }
 
     /// Time spent in each phase so far, as shares of the wall clock.

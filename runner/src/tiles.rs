@@ -19,6 +19,9 @@ const MOST: f64 = 65_535.0;
 /// Columns and rows of tiles: those given, else the default for the scene.
 pub fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
     config.run.tiles.unwrap_or_else(|| {
+        if config.params.sleep {
+            return [1, 1]; // islands sleep within one tile only
+        }
         let (low, high) = scene.domain();
         default_counts(scene.bodies(), high - low, halo_width(&scene.kinds(), &config.params))
     })

@@ -197,12 +197,6 @@ fn configurations_that_cannot_be_read_are_named() {
 #[test]
 fn what_is_not_built_yet_says_what_to_use() {
     for (options, named, instead) in [
-        ("--set broad_phase=quadtree", "--set physics.broad_phase=quadtree", "\"grid\""),
-        ("--set solver=pgs", "--set physics.solver=pgs", "\"soft-step\""),
-        ("--set ghosts=frozen", "--set physics.ghosts=frozen", "\"dynamic\""),
-        ("--set sleep=true", "--set physics.sleep=true", "false"),
-        ("--set parallel=coloring", "--set physics.parallel=coloring", "\"serial\" or \"auto\""),
-        ("--set parallel=islands", "--set physics.parallel=islands", "\"serial\" or \"auto\""),
         ("--transport mpi", "--transport mpi", "\"local\" or \"channel\""),
         ("--transport iceoryx2", "--transport iceoryx2", "\"local\" or \"channel\""),
         ("--out records", "--out records", "--json FILE"),

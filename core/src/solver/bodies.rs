@@ -308,7 +308,7 @@ pub(crate) fn store(tile: &mut Tile, solved: &SolverBodies) {
 /// Moves the owned bodies without contacts.
 pub(crate) fn fly(tile: &mut Tile, solved: &SolverBodies, setup: &Setup) {
     let motion = Motion::new(setup);
-    dispatch(Fly { tile, solved, motion, substeps: setup.params.substeps });
+    dispatch(Fly { tile, solved, motion, substeps: setup.params.integrations() });
 }
 
 struct Fly<'a> {

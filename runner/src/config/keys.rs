@@ -33,10 +33,16 @@ pub(super) const KEYS: &[&str] = &[
     "physics.sort_interval",
     "physics.broad_phase",
     "physics.solver",
+    "physics.iterations",
+    "physics.baumgarte",
+    "physics.linear_slop",
+    "physics.islands",
     "physics.parallel",
     "physics.exchange",
     "physics.ghosts",
     "physics.sleep",
+    "physics.sleep_speed",
+    "physics.sleep_time",
 ];
 
 /// The sections of a file.

@@ -12,7 +12,7 @@ pub use error::{ConfigError, Origin, Place};
 pub use settings::Override;
 
 use crate::scene::rooms;
-use atoll_core::{BroadPhase, Exchange, Params, SetupError, Solver};
+use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, SetupError, Solver};
 use glam::Vec2;
 use settings::{Settings, one_of};
 use std::fmt::Write as _;
@@ -33,8 +33,6 @@ pub struct Config {
     pub run: RunConfig,
     /// The numbers of a step.
     pub params: Params,
-    /// How a tile's own work is shared among threads.
-    pub parallel: Parallel,
 }
 
 /// `[scene]`
@@ -109,15 +107,6 @@ impl TransportKind {
     }
 }
 
-/// How the work of one tile is shared among threads. Tiles themselves always are.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Parallel {
-    /// Not at all.
-    Serial,
-    /// As the state of the tile suggests; in this version, not at all.
-    Auto,
-}
-
 impl Config {
     /// Reads a configuration file.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ConfigError> {
@@ -147,9 +136,8 @@ impl Config {
         let scene = read_scene(&mut settings)?;
         let run = read_run(&mut settings)?;
         let params = read_params(&mut settings, scene.kind)?;
-        let parallel = read_parallel(&mut settings)?;
         settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
-        Ok(Self { scene, run, params, parallel })
+        Ok(Self { scene, run, params })
     }
 
     /// The transport that was chosen, or the one that suits the number of ranks.
@@ -183,6 +171,15 @@ impl Config {
             exchange,
             broad_phase,
             solver,
+            iterations,
+            baumgarte,
+            linear_slop,
+            island_search,
+            parallel,
+            ghosts,
+            sleep,
+            sleep_speed,
+            sleep_time,
         } = &self.params;
         let mut text = String::new();
         macro_rules! line {
@@ -199,7 +196,10 @@ impl Config {
         line!(speculative_distance = speculative_distance, recycle_distance = recycle_distance);
         line!(restitution_threshold = restitution_threshold);
         line!(margin_floor = margin_floor, margin_cap = margin_cap, sort_interval = sort_interval);
-        line!(exchange = exchange, broad_phase = broad_phase, solver = solver, parallel = self.parallel);
+        line!(exchange = exchange, ghosts = ghosts, broad_phase = broad_phase, solver = solver);
+        line!(iterations = iterations, baumgarte = baumgarte, linear_slop = linear_slop);
+        line!(islands = island_search, parallel = parallel);
+        line!(sleep = sleep, sleep_speed = sleep_speed, sleep_time = sleep_time);
         text
     }
 
@@ -215,7 +215,7 @@ fn read_scene(settings: &mut Settings) -> Result<SceneConfig, ConfigError> {
         Rooms,
         Pile,
     }
-    let names = [("rooms", Some(Name::Rooms)), ("pile", Some(Name::Pile))];
+    let names = [("rooms", Name::Rooms), ("pile", Name::Pile)];
     let name = settings.choice("scene.kind", &names)?.ok_or_else(|| settings.missing("scene.kind", one_of(&names)))?;
     let (kind, least, usual) = match name {
         Name::Rooms => {
@@ -236,13 +236,8 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
     let ranks = settings.integer("run.ranks", 1..=1024, 1)? as usize;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
-    let transports = [
-        ("local", Some(TransportKind::Local)),
-        ("channel", Some(TransportKind::Channel)),
-        ("iceoryx2", None),
-        ("mpi", None),
-    ];
-    let transport = settings.choice("run.transport", &transports)?;
+    let transports = [("local", TransportKind::Local), ("channel", TransportKind::Channel)];
+    let transport = settings.choice_of("run.transport", &transports, &["iceoryx2", "mpi"])?;
     if transport == Some(TransportKind::Local) && ranks > 1 {
         let place = settings.place("run.transport").expect("it was given").clone();
         let reason = format!("one rank at most, and this run has {ranks}; use transport channel, or ranks 1");
@@ -278,35 +273,57 @@ fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, Conf
         restitution_threshold: settings.float("physics.restitution_threshold", usual.restitution_threshold)?,
         margin_floor: settings.float("physics.margin_floor", usual.margin_floor)?,
         margin_cap: settings.float("physics.margin_cap", usual.margin_cap)?,
-        sort_interval: settings.integer("physics.sort_interval", whole, usual.sort_interval.into())? as u32,
+        sort_interval: settings.integer("physics.sort_interval", whole.clone(), usual.sort_interval.into())? as u32,
         exchange: settings
-            .choice("physics.exchange", &[("step", Some(Exchange::Step)), ("substep", Some(Exchange::Substep))])?
+            .choice("physics.exchange", &[("step", Exchange::Step), ("substep", Exchange::Substep)])?
             .unwrap_or(usual.exchange),
         broad_phase: settings
-            .choice("physics.broad_phase", &[("grid", Some(BroadPhase::Grid)), ("quadtree", None)])?
+            .choice("physics.broad_phase", &[("grid", BroadPhase::Grid), ("quadtree", BroadPhase::Quadtree)])?
             .unwrap_or(usual.broad_phase),
         solver: settings
-            .choice("physics.solver", &[("soft-step", Some(Solver::SoftStep)), ("pgs", None)])?
+            .choice("physics.solver", &[("soft-step", Solver::SoftStep), ("pgs", Solver::Pgs)])?
             .unwrap_or(usual.solver),
+        iterations: settings.integer("physics.iterations", whole, usual.iterations.into())? as u32,
+        baumgarte: settings.float("physics.baumgarte", usual.baumgarte)?,
+        linear_slop: settings.float("physics.linear_slop", usual.linear_slop)?,
+        island_search: settings
+            .choice(
+                "physics.islands",
+                &[
+                    ("union-find", IslandSearch::UnionFind),
+                    ("dfs", IslandSearch::Dfs),
+                    ("parallel-union-find", IslandSearch::ParallelUnionFind),
+                ],
+            )?
+            .unwrap_or(usual.island_search),
+        parallel: settings
+            .choice(
+                "physics.parallel",
+                &[
+                    ("serial", Parallel::Serial),
+                    ("islands", Parallel::Islands),
+                    ("coloring", Parallel::Coloring),
+                    ("auto", Parallel::Auto),
+                ],
+            )?
+            .unwrap_or(usual.parallel),
+        ghosts: settings
+            .choice("physics.ghosts", &[("dynamic", Ghosts::Dynamic), ("frozen", Ghosts::Frozen)])?
+            .unwrap_or(usual.ghosts),
+        sleep: settings.flag("physics.sleep", usual.sleep)?,
+        sleep_speed: settings.float("physics.sleep_speed", usual.sleep_speed)?,
+        sleep_time: settings.float("physics.sleep_time", usual.sleep_time)?,
     };
-    settings.choice("physics.ghosts", &[("dynamic", Some(())), ("frozen", None)])?;
-    if settings.flag("physics.sleep", false)? {
-        let place = settings.place("physics.sleep").expect("it was given").clone();
-        return Err(ConfigError::NotYet { place, instead: "false".to_owned() });
-    }
     params.check().map_err(|error| refused_param(settings, error))?;
     Ok(params)
-}
-
-fn read_parallel(settings: &mut Settings) -> Result<Parallel, ConfigError> {
-    let words =
-        [("serial", Some(Parallel::Serial)), ("auto", Some(Parallel::Auto)), ("islands", None), ("coloring", None)];
-    Ok(settings.choice("physics.parallel", &words)?.unwrap_or(Parallel::Auto))
 }
 
 /// The core's refusal of a parameter, in terms of the key that gave it.
 fn refused_param(settings: &Settings, error: SetupError) -> ConfigError {
     let (name, value, must) = match error {
+        SetupError::FrozenSubsteps if settings.place("physics.ghosts").is_some() => {
+            return settings.refusal("physics.ghosts", "\"dynamic\" where exchange = \"substep\"");
+        }
         SetupError::BadParam { name: "dt", value, must } => ("hertz", 1.0 / value, must),
         SetupError::BadParam { name, value, must } => (name, value, must),
         other => unreachable!("parameters are refused as parameters, not with: {other}"),

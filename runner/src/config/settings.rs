@@ -191,30 +191,35 @@ impl Settings {
         Ok(self.get(key, "true or false", Value::as_bool)?.unwrap_or(default))
     }
 
-    /// One of some words. `None` behind a word says that a later version brings it.
-    pub(super) fn choice<T: Copy>(
+    /// One of some words.
+    pub(super) fn choice<T: Copy>(&mut self, key: &'static str, words: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
+        self.choice_of(key, words, &[])
+    }
+
+    /// One of some words; those of `later` are refused as not built in yet.
+    pub(super) fn choice_of<T: Copy>(
         &mut self,
         key: &'static str,
-        words: &[(&str, Option<T>)],
+        words: &[(&str, T)],
+        later: &[&str],
     ) -> Result<Option<T>, ConfigError> {
         let must = one_of(words);
         let Some(text) = self.get(key, &must, |value| value.as_str().map(str::to_owned))? else { return Ok(None) };
         let place = || self.given[key].place.clone();
-        match words.iter().find(|(word, _)| *word == text) {
-            Some((_, Some(value))) => Ok(Some(*value)),
-            Some((_, None)) => Err(ConfigError::NotYet { place: place(), instead: must }),
-            None => {
-                let available = words.iter().filter(|(_, value)| value.is_some()).map(|(word, _)| *word);
-                Err(ConfigError::BadValue { place: place(), must, suggestion: keys::nearest(available, &text) })
-            }
+        if let Some((_, value)) = words.iter().find(|(word, _)| *word == text) {
+            return Ok(Some(*value));
         }
+        if later.contains(&text.as_str()) {
+            return Err(ConfigError::NotYet { place: place(), instead: must });
+        }
+        let suggestion = keys::nearest(words.iter().map(|(word, _)| *word), &text);
+        Err(ConfigError::BadValue { place: place(), must, suggestion })
     }
 }
 
-/// The words that work today.
-pub(super) fn one_of<T>(words: &[(&str, Option<T>)]) -> String {
-    let words: Vec<String> =
-        words.iter().filter(|(_, value)| value.is_some()).map(|(word, _)| format!("\"{word}\"")).collect();
+/// The words that may be said.
+pub(super) fn one_of<T>(words: &[(&str, T)]) -> String {
+    let words: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
     words.join(" or ")
 }
 
