@@ -80,6 +80,7 @@ mod setup;
 mod shape;
 mod solver;
 mod step;
+mod team;
 #[cfg(test)]
 mod testing;
 mod tile;

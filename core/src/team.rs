@@ -1,0 +1,66 @@
+//! The threads that work inside one tile, where a rank has fewer tiles than threads.
+//!
+//! How many there are never shows in a result: work is cut into ranges, each range's result is a function of the range,
+//! and results are taken in the order of the ranges or are independent of it.
+
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// How many threads may work on a tile at once.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Team {
+    threads: usize,
+}
+
+impl Team {
+    /// One thread: everything in order.
+    pub(crate) const ALONE: Self = Self { threads: 1 };
+
+    /// All threads of this pool. Only for who holds no lock that another piece of the pool's work may ask for.
+    pub(crate) fn of_pool() -> Self {
+        Self { threads: rayon::current_num_threads() }
+    }
+
+    pub(crate) fn is_alone(self) -> bool {
+        self.threads == 1
+    }
+
+    /// How many ranges to cut `len` things into, none shorter than `grain`: some for each thread, so that none waits
+    /// long for another.
+    pub(crate) fn pieces(self, len: usize, grain: usize) -> usize {
+        if self.is_alone() { 1 } else { (len / grain).clamp(1, 4 * self.threads) }
+    }
+
+    /// Runs `work` on ranges that make up `0..len`, none shorter than `grain`; their results in order.
+    pub(crate) fn map<R: Send>(self, len: usize, grain: usize, work: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
+        let pieces = self.pieces(len, grain);
+        let piece = |i: usize| work(i * len / pieces..(i + 1) * len / pieces);
+        if pieces == 1 { vec![piece(0)] } else { (0..pieces).into_par_iter().with_max_len(1).map(piece).collect() }
+    }
+
+    /// Runs `work` on each of some things.
+    pub(crate) fn for_each<T: Send>(self, things: Vec<T>, work: impl Fn(T) + Sync + Send) {
+        if self.is_alone() || things.len() == 1 {
+            things.into_iter().for_each(work);
+        } else {
+            things.into_par_iter().with_max_len(1).for_each(work);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_make_up_the_whole() {
+        for threads in [1, 2, 7] {
+            for len in [0, 1, 9, 1000] {
+                let team = Team { threads };
+                let ranges = team.map(len, 10, |range| range);
+                assert!(ranges.len() <= 4 * threads && (ranges.len() == 1 || ranges.iter().all(|r| r.len() >= 10)));
+                assert!(ranges.into_iter().flatten().eq(0..len), "{threads} {len}");
+            }
+        }
+    }
+}
