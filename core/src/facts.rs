@@ -58,6 +58,8 @@ impl TileFacts {
             facts.momentum[0] += mass * velocity.x;
             facts.momentum[1] += mass * velocity.y;
         }
+        let violation = tile.violation;
+        (facts.solved_points, facts.violation, facts.max_violation) = (violation.points, violation.sum, violation.max);
         for (i, (key, contact)) in contacts.cache.iter().enumerate() {
             // Both owners of a border contact see it; the one with body A counts it.
             let border = key.is_border();

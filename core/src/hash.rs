@@ -47,6 +47,12 @@ impl Hashes {
         self.state = self.state.wrapping_add(xxh3_128(bytemuck::bytes_of(&key)));
     }
 
+    /// How long a body has rested is part of the future, where bodies may sleep.
+    pub(crate) fn add_rest(&mut self, id: GlobalId, still: f32) {
+        let key = [id.0, u64::from(still.to_bits())];
+        self.contact = self.contact.wrapping_add(xxh3_128(bytemuck::bytes_of(&key)));
+    }
+
     pub(crate) fn add_contact(&mut self, tile: TileId, pair: (GlobalId, GlobalId), contact: &Contact) {
         #[derive(Clone, Copy, Pod, Zeroable)]
         #[repr(C)]

@@ -60,24 +60,37 @@ pub struct IslandSizes {
 pub struct Islands {
     sets: UnionFind,
     size: Vec<u32>,
+    roots: Vec<u32>,
 }
 
 impl Islands {
     /// Finds the islands among `count` bodies joined by `contacts`. Every body counts, also one without contacts.
-    pub fn find(&mut self, count: usize, contacts: impl Iterator<Item = (u32, u32)>) -> IslandSizes {
+    pub(crate) fn find(
+        &mut self,
+        _search: crate::IslandSearch,
+        count: usize,
+        contacts: &[[u32; 2]],
+        _team: crate::team::Team,
+    ) -> IslandSizes {
         self.sets.reset(count);
-        for (a, b) in contacts {
+        for &[a, b] in contacts {
             self.sets.union(a, b);
         }
+        self.roots.clear();
         self.size.clear();
         self.size.resize(count, 0);
         let mut sizes = IslandSizes::default();
         for body in 0..count as u32 {
             let root = self.sets.find(body) as usize;
+            self.roots.push(root as u32);
             sizes.islands += u64::from(root == body as usize);
             self.size[root] += 1;
             sizes.largest = sizes.largest.max(u64::from(self.size[root]));
         }
         sizes
+    }
+
+    pub(crate) fn roots(&self) -> &[u32] {
+        &self.roots
     }
 }

@@ -78,6 +78,7 @@ mod partition;
 mod phase;
 mod setup;
 mod shape;
+mod sleep;
 mod solver;
 mod step;
 mod team;

@@ -236,6 +236,7 @@ fn sort_by_place(tile: &mut Tile, setup: &Setup) {
     order.sort_unstable();
     let order: Vec<u32> = order.into_iter().map(|(.., from)| from).collect();
     tile.bodies.permute(&order);
+    tile.sleep.permute(&order);
     let mut new_place = vec![0; order.len()];
     for (to, &from) in (0..).zip(&order) {
         new_place[from as usize] = to;

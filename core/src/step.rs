@@ -9,6 +9,7 @@ use crate::phase::Phase;
 use crate::solver;
 use crate::tile::Fault;
 use crate::world::{Bench, World};
+use std::ops::Range;
 
 /// What one step of one rank was like. Counts are of this rank's tiles.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -45,15 +46,14 @@ pub struct StepReport {
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
     world.begin_step();
     let stopped = migrate(world, halo)?;
+    world.measures |= stopped;
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
             world.each_tile(|bench| {
                 collide(bench);
                 prepare(bench);
-                for substep in 0..bench.setup.params.integrations() {
-                    solve_substep(bench, substep);
-                }
+                solve(bench, 0..bench.setup.params.integrations());
                 finalize(bench);
             });
         }
@@ -67,7 +67,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 // After the last substep only a bounce still looks at a ghost's velocity.
                 let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
                 world.each_tile(|bench| {
-                    solve_substep(bench, substep);
+                    solve(bench, substep..substep + 1);
                     if refreshed {
                         bench.stage(Phase::Border, send_refresh);
                     }
@@ -135,27 +135,23 @@ fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::NarrowPhase, |b| b.work.contacts.find(b.tile, &b.work.proxies, &b.work.pairs, b.setup));
 }
 
-/// Islands, constraints.
+/// Islands, and who sleeps; constraints.
 fn prepare(bench: &mut Bench<'_>) {
     bench.stage(Phase::Islands, |b| {
-        let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
-        solver.gather(b.tile, &contacts.bodies, b.setup);
-        let sizes = b.work.islands.find(solver.bodies.moving(), solver.links(&contacts.bodies));
+        let (solver, contacts, params) = (&mut b.work.solver, &b.work.contacts, &b.setup.params);
+        let (nodes, links) = solver.graph(b.tile, &contacts.bodies);
+        let sizes = b.work.islands.find(params.island_search, nodes, links, b.team);
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (sizes.islands, sizes.largest);
         (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
+        solver.gather(b.tile, &contacts.bodies, b.work.islands.roots(), b.setup);
     });
-    bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup));
+    bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
+    bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));
 }
 
-fn solve_substep(bench: &mut Bench<'_>, substep: u32) {
-    bench.stage(Phase::Substeps, |b| {
-        let (solver, setup) = (&mut b.work.solver, b.setup);
-        solver.integrate_velocities(substep, setup);
-        solver.solve(setup);
-        solver.integrate_positions(setup);
-        solver.relax(setup);
-    });
+fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
+    bench.stage(Phase::Substeps, |b| b.work.solver.solve(substeps, b.setup, b.team));
 }
 
 /// Restitution where it has not been, and everything written back.
@@ -165,10 +161,13 @@ fn finalize(bench: &mut Bench<'_>) {
         if b.setup.params.exchange == Exchange::Step {
             solver.restitute(b.setup);
         }
+        if b.measures {
+            b.tile.violation = solver.violation(contacts, b.setup);
+        }
         solver.store_impulses(contacts);
         b.tile.contacts.copy_from(&contacts.cache);
-        solver::store(b.tile, &solver.bodies);
-        solver::fly(b.tile, &solver.bodies, b.setup);
+        solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
+        b.tile.count_rest(b.setup);
     });
 }
 

@@ -21,6 +21,10 @@ impl Team {
         Self { threads: rayon::current_num_threads() }
     }
 
+    pub(crate) fn threads(self) -> usize {
+        self.threads
+    }
+
     pub(crate) fn is_alone(self) -> bool {
         self.threads == 1
     }
@@ -38,12 +42,21 @@ impl Team {
         if pieces == 1 { vec![piece(0)] } else { (0..pieces).into_par_iter().with_max_len(1).map(piece).collect() }
     }
 
-    /// Runs `work` on each of some things.
-    pub(crate) fn for_each<T: Send>(self, things: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    /// Runs `work` on each of some things; the results in order.
+    pub(crate) fn for_each<T: Send, R: Send>(self, things: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
         if self.is_alone() || things.len() == 1 {
-            things.into_iter().for_each(work);
+            things.into_iter().map(work).collect()
         } else {
-            things.into_par_iter().with_max_len(1).for_each(work);
+            things.into_par_iter().with_max_len(1).map(work).collect()
+        }
+    }
+
+    /// Runs `work` once on every thread, all at the same time.
+    pub(crate) fn all_at_once(self, work: impl Fn() + Sync) {
+        if self.is_alone() {
+            work();
+        } else {
+            rayon::broadcast(|_| work());
         }
     }
 }

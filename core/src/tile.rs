@@ -7,6 +7,8 @@ use crate::hash::Hashes;
 use crate::id::{GlobalId, TileId};
 use crate::partition::Region;
 use crate::setup::Setup;
+use crate::sleep::Sleep;
+use crate::solver::Violation;
 use glam::DVec2;
 
 /// The unit of physics: one step of a tile is a function of its state and of the messages it received.
@@ -34,6 +36,10 @@ pub(crate) struct Tile {
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
     pub(crate) strays: Strays,
+    /// Who rests; empty unless `sleep` is on.
+    pub(crate) sleep: Sleep,
+    /// How well the contacts of the last step were solved, if that was measured.
+    pub(crate) violation: Violation,
     /// What happened in the step under way.
     pub(crate) counts: TileCounts,
 }
@@ -81,6 +87,8 @@ impl Tile {
             statics: setup.statics_of(id),
             contacts: ContactCache::default(),
             strays: Strays::default(),
+            sleep: Sleep::default(),
+            violation: Violation::default(),
             counts: TileCounts::default(),
         }
     }
@@ -102,10 +110,34 @@ impl Tile {
         if a < b { (a, b) } else { (b, a) }
     }
 
+    /// Sends islands to sleep, or wakes them. Returns which sleep (see [`Sleep::decide`]).
+    pub(crate) fn fall_asleep(&mut self, nodes: &[u32], roots: &[u32], setup: &Setup) -> &[bool] {
+        self.sleep.resize(self.owned);
+        let (velocity, angular_velocity) = (&mut self.bodies.velocity, &mut self.bodies.angular_velocity);
+        let (islands, count) = self.sleep.decide(nodes, roots, velocity, angular_velocity, setup);
+        self.counts.asleep = count;
+        islands
+    }
+
+    /// Notes who has rested in this step.
+    pub(crate) fn count_rest(&mut self, setup: &Setup) {
+        if setup.params.sleep {
+            let bodies = &self.bodies;
+            let speed = |i: usize| {
+                let reach = setup.kind(bodies.kind[i]).bounding_radius;
+                bodies.velocity[i].length() + reach * bodies.angular_velocity[i].abs()
+            };
+            self.sleep.count_on(speed, setup);
+        }
+    }
+
     pub(crate) fn hashes(&self) -> Hashes {
         let mut hashes = Hashes::default();
         for index in 0..self.owned {
             hashes.add_body(&self.bodies.get(index));
+        }
+        for (&id, &still) in self.bodies.id.iter().zip(self.sleep.still()) {
+            hashes.add_rest(id, still);
         }
         for (key, contact) in self.contacts.iter() {
             hashes.add_contact(self.id, self.pair_of(key), contact);

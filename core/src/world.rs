@@ -16,6 +16,7 @@ use crate::params::Exchange;
 use crate::phase::{Phase, Stopwatch, Timings};
 use crate::setup::{Blueprint, Setup};
 use crate::solver::Solver;
+use crate::team::Team;
 use crate::tile::{Fault, Tile};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -63,6 +64,10 @@ pub(crate) struct Bench<'a> {
     pub(crate) incoming: &'a Mailbag,
     pub(crate) setup: &'a Setup,
     pub(crate) step: u64,
+    /// Who works on this tile.
+    pub(crate) team: Team,
+    /// Whether this step measures how well its contacts are solved.
+    pub(crate) measures: bool,
 }
 
 impl Bench<'_> {
@@ -73,6 +78,13 @@ impl Bench<'_> {
         stage(self);
         watch.lap(phase, &mut self.work.timings);
     }
+}
+
+/// Whether every thread works on tiles of its own. Where there are fewer tiles than threads, all work on one tile after
+/// the other; not both, as who waits for others within a tile might be handed another tile, and its work is taken.
+fn apart(tiles: usize) -> bool {
+    let threads = rayon::current_num_threads();
+    threads > 1 && tiles >= threads
 }
 
 impl World {
@@ -186,7 +198,7 @@ impl World {
 
     /// Ends a step: the clock, and what went wrong.
     pub(crate) fn end_step(&mut self) {
-        let threads = rayon::current_num_threads() as u32;
+        let threads = if apart(self.tiles.len()) { rayon::current_num_threads() as u32 } else { 1 };
         for work in &mut self.works {
             let work = work.get_mut().expect("no stage panicked");
             self.timings.add_share(&std::mem::take(&mut work.timings), threads);
@@ -202,6 +214,7 @@ impl World {
         if let Some(id) = self.tiles.iter().filter_map(|tile| tile.counts.not_finite).min() {
             self.verdict = self.verdict.merge(Verdict { stop: false, failure: Some((self.step, id)) });
         }
+        self.measures = false;
         self.step += 1;
     }
 
@@ -226,8 +239,10 @@ impl World {
 
     /// A stage over all tiles, in parallel; each result at its tile's place.
     pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
-        let Self { setup, works, tiles, outbox, inbox, step, .. } = self;
-        let (setup, works, step) = (&*setup, &*works, *step);
+        let Self { setup, works, tiles, outbox, inbox, step, measures, .. } = self;
+        let (setup, works, step, measures) = (&*setup, &*works, *step, *measures);
+        let apart = apart(tiles.len());
+        let team = if apart { Team::ALONE } else { Team::of_pool() };
         let per_tile = setup.params.exchange == Exchange::Substep;
         let run = |(place, ((tile, outgoing), incoming)): (usize, ((&mut Tile, _), _))| {
             let work = if per_tile { place } else { rayon::current_thread_index().unwrap_or(0) };
@@ -235,10 +250,9 @@ impl World {
             if !float_mode_is_default() {
                 tile.counts.fault = Some(Fault::FloatMode);
             }
-            stage(&mut Bench { tile, work: &mut work, outgoing, incoming, setup, step })
+            stage(&mut Bench { tile, work: &mut work, outgoing, incoming, setup, step, team, measures })
         };
-        // One thread, or one tile: no need to hand the work around.
-        if rayon::current_num_threads() == 1 || tiles.len() == 1 {
+        if !apart {
             tiles.iter_mut().zip(&mut outbox.bags).zip(&inbox.bags).enumerate().map(run).collect()
         } else {
             let tiles = tiles.par_iter_mut().with_max_len(1);

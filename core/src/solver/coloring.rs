@@ -1,37 +1,57 @@
 //! Greedy coloring of the constraint graph: contacts of one color share no body that moves.
 
-use super::bodies::SolverBodies;
-use crate::narrow_phase::Contacts;
+use super::batches::Batches;
+use super::bodies::STATIC;
+use crate::broad_phase::Pair;
+use crate::team::Team;
 
 /// Colors that are told apart by a bit of a mask. The contacts beyond, of a body with more contacts than this, are the
 /// overflow: each is a color of its own.
 pub(super) const COLORS: usize = 64;
 
-/// The color of each contact, `COLORS` for the overflow; a function of the contacts and their order alone.
+/// The color of each contact, `COLORS` for the overflow. An island's colors are a function of its contacts and their
+/// canonical order alone, whatever batch it is in.
 #[derive(Default, Debug)]
 pub(super) struct Coloring {
+    /// In the order of [`Batches::contacts`].
     pub(super) color: Vec<u8>,
     /// For each solver body the colors its contacts have.
     taken: Vec<u64>,
 }
 
 impl Coloring {
-    /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet.
-    pub(super) fn color(&mut self, contacts: &Contacts, bodies: &SolverBodies) {
+    /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet. `place` gives for
+    /// each body of the tile its place among the solver's.
+    pub(super) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[u32], team: Team) {
         self.taken.clear();
-        self.taken.resize(bodies.len(), 0);
+        self.taken.resize(batches.all.last().map_or(0, |batch| batch.bodies.end), 0);
         self.color.clear();
-        for &[a, b] in &contacts.bodies {
-            let (a, b) = (bodies.index_of(a) as usize, bodies.index_of(b) as usize);
-            let taken = self.taken[a] | self.taken[b];
-            let color = taken.trailing_ones();
-            if color < COLORS as u32 {
-                self.taken[a] |= 1 << color;
-                self.taken[b] |= 1 << color;
-                // The first solver body stands for all statics: it never moves, so it is never taken.
-                self.taken[0] = 0;
+        self.color.resize(batches.contacts.len(), 0);
+        let (mut color, mut taken) = (&mut self.color[..], &mut self.taken[..]);
+        let mut each = batches.all.iter().map(|batch| {
+            let own = &batches.contacts[batch.contacts.clone()];
+            let color = color.split_off_mut(..batch.contacts.len()).expect("batches lie in order");
+            let taken = taken.split_off_mut(..batch.bodies.len()).expect("batches lie in order");
+            (own, color, taken, batch.bodies.start as u32)
+        });
+        let color_batch = |(own, color, taken, base): (&[u32], &mut [u8], &mut [u64], u32)| {
+            // The first body of a batch stands for all statics: it never moves, so it is never taken.
+            let local = |body: u32| place[body as usize].max(base) as usize - base as usize;
+            for (&contact, color) in own.iter().zip(color) {
+                let [a, b] = contacts[contact as usize].map(local);
+                let free = (taken[a] | taken[b]).trailing_ones();
+                if free < COLORS as u32 {
+                    taken[a] |= 1 << free;
+                    taken[b] |= 1 << free;
+                    taken[STATIC as usize] = 0;
+                }
+                *color = free as u8;
             }
-            self.color.push(color as u8);
+        };
+        if team.is_alone() {
+            each.for_each(color_batch);
+        } else {
+            team.for_each(each.by_ref().collect(), color_batch);
         }
     }
 }

@@ -1,29 +1,24 @@
-//! Constraints in groups of eight lanes.
+//! Constraints in groups of eight lanes, by batch, color and number of points.
 
+use super::batches::{Batch, Batches};
 use super::bodies::SolverBodies;
 use super::coloring::{COLORS, Coloring};
-use super::lanes::{LANES, Row};
+use super::lanes::{LANES, Quad, Row};
+use crate::contact::Contact;
 use crate::halo::BorderPoint;
-use crate::math::{cross, dot, max, right_perp, turn};
-use crate::narrow_phase::Contacts;
-use crate::setup::Setup;
-use crate::shape::{KindRow, Shape};
-use crate::tile::Tile;
-use glam::Vec2;
+use crate::math::max;
 use std::ops::Range;
 
 /// Marks a lane without a contact.
-const NO_CONTACT: u32 = u32::MAX;
+pub(super) const NO_CONTACT: u32 = u32::MAX;
 
 /// Eight contacts of `N` points each that share no moving body. All rows are mass-weighted.
 #[derive(Clone, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct Group<const N: usize> {
-    /// Solver bodies; 0 in a lane without a contact.
+    /// Bodies, as places in their batch; 0, a static, in a lane without a contact.
     pub(super) a: [u32; LANES],
     pub(super) b: [u32; LANES],
-    /// The contact's place in canonical order.
-    pub(super) contact: [u32; LANES],
     /// The normal, times the root of the inverse mass of A and of B.
     pub(super) normal_ax: Row,
     pub(super) normal_ay: Row,
@@ -83,10 +78,9 @@ impl PointRows {
 }
 
 impl<const N: usize> Group<N> {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         a: [0; LANES],
         b: [0; LANES],
-        contact: [NO_CONTACT; LANES],
         normal_ax: ZERO,
         normal_ay: ZERO,
         normal_bx: ZERO,
@@ -97,128 +91,162 @@ impl<const N: usize> Group<N> {
     };
 }
 
-/// The groups of one color.
+/// The groups of one color of a batch.
 #[derive(Clone, Debug)]
 pub(crate) struct Color {
+    /// Within the batch's groups.
     pub(super) singles: Range<usize>,
     pub(super) doubles: Range<usize>,
+    /// Into how many pieces the groups are cut.
+    pub(super) slices: u32,
+}
+
+impl Color {
+    /// The groups of one piece.
+    #[inline(always)]
+    pub(super) fn slice(&self, slice: u32) -> (Range<usize>, Range<usize>) {
+        let cut = |range: &Range<usize>| {
+            let at = |slice: u32| range.start + range.len() * slice as usize / self.slices as usize;
+            at(slice)..at(slice + 1)
+        };
+        (cut(&self.singles), cut(&self.doubles))
+    }
 }
 
 /// Where a contact's constraint lies.
-#[derive(Clone, Copy, Default, Debug)]
-pub(crate) struct Place {
-    pub(crate) double: bool,
-    pub(crate) group: u32,
-    pub(crate) lane: u32,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    double: bool,
+    group: u32,
+    lane: u32,
+    /// The first body of its batch.
+    base: u32,
 }
 
-/// All constraints of a tile, color by color.
+impl Place {
+    /// Of a contact that is not solved: its island sleeps.
+    const NONE: Self = Self { double: false, group: u32::MAX, lane: 0, base: 0 };
+}
+
+/// All constraints of a tile, batch by batch and color by color.
 #[derive(Default, Debug)]
 pub(crate) struct Groups {
     pub(super) singles: Vec<Group<1>>,
     pub(super) doubles: Vec<Group<2>>,
+    /// For each group and lane the contact, in canonical order, or [`NO_CONTACT`].
+    pub(super) in_singles: Vec<[u32; LANES]>,
+    pub(super) in_doubles: Vec<[u32; LANES]>,
     pub(super) colors: Vec<Color>,
     /// For each contact, in canonical order.
-    pub(super) places: Vec<Place>,
-    /// Points that may bounce: contact, point, restitution times approach speed.
-    bounces: Vec<Bounce>,
+    places: Vec<Place>,
+    /// Points that may bounce.
+    pub(super) bounces: Vec<Bounce>,
 }
 
+/// A point that may bounce.
 #[derive(Debug)]
-struct Bounce {
-    contact: u32,
-    point: u32,
-    speed: f32,
+pub(super) struct Bounce {
+    pub(super) contact: u32,
+    pub(super) point: u32,
+    /// Restitution times approach speed, in m/s.
+    pub(super) speed: f32,
+}
+
+/// A place among the lanes of single and of double points.
+#[derive(Clone, Copy, Default)]
+struct Cursor {
+    single: usize,
+    double: usize,
+}
+
+impl Cursor {
+    fn of(&mut self, double: bool) -> &mut usize {
+        if double { &mut self.double } else { &mut self.single }
+    }
 }
 
 impl Groups {
-    /// Lays the contacts out by color and number of points, and writes their rows.
-    pub(super) fn prepare(
-        &mut self,
-        tile: &Tile,
-        contacts: &Contacts,
-        bodies: &SolverBodies,
-        coloring: &Coloring,
-        setup: &Setup,
-    ) {
-        self.lay_out(contacts, coloring);
-        self.bounces.clear();
-        for (i, contact) in contacts.cache.contacts.iter().enumerate() {
-            let constraint = Constraint::new(tile, contacts, i, bodies, setup);
-            let place = self.places[i];
-            let (group, lane) = (place.group as usize, place.lane as usize);
-            if place.double {
-                constraint.write(&mut self.doubles[group], lane);
-            } else {
-                constraint.write(&mut self.singles[group], lane);
-            }
-            let restitution = max(constraint.kinds[0].material.restitution, constraint.kinds[1].material.restitution);
-            if restitution > 0.0 {
-                for point in 0..contact.point_count() {
-                    let closing = constraint.closing_speed(tile, point);
-                    if closing > setup.params.restitution_threshold {
-                        self.bounces.push(Bounce {
-                            contact: i as u32,
-                            point: point as u32,
-                            speed: restitution * closing,
-                        });
-                    }
-                }
-            }
+    /// Decides in which group and lane each contact goes. Returns the most colors of a batch.
+    pub(super) fn lay_out(&mut self, contacts: &[Contact], batches: &mut Batches, coloring: &Coloring) -> usize {
+        self.colors.clear();
+        self.in_singles.clear();
+        self.in_doubles.clear();
+        self.places.clear();
+        self.places.resize(contacts.len(), Place::NONE);
+        let mut most_colors = 0;
+        for batch in &mut batches.all {
+            let first = self.colors.len();
+            let range = batch.contacts.clone();
+            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch);
+            batch.colors = first..self.colors.len();
+            most_colors = most_colors.max(batch.colors.len());
         }
+        self.singles.resize(self.in_singles.len(), Group::EMPTY);
+        self.doubles.resize(self.in_doubles.len(), Group::EMPTY);
+        most_colors
     }
 
-    fn lay_out(&mut self, contacts: &Contacts, coloring: &Coloring) {
-        let mut counts = [[0_usize; 2]; COLORS + 1];
-        let is_double = |i: usize| contacts.cache.contacts[i].point_count() == 2;
-        for (i, &color) in coloring.color.iter().enumerate() {
-            counts[color as usize][usize::from(is_double(i))] += 1;
+    fn lay_out_batch(&mut self, contacts: &[Contact], own: &[u32], colors: &[u8], batch: &mut Batch) {
+        let (first_single, first_double) = (self.in_singles.len(), self.in_doubles.len());
+        let is_double = |contact: u32| contacts[contact as usize].point_count() == 2;
+        let mut counts = [Cursor::default(); COLORS + 1];
+        for (&contact, &color) in own.iter().zip(colors) {
+            *counts[color as usize].of(is_double(contact)) += 1;
         }
-        self.colors.clear();
-        let (mut singles, mut doubles) = (0, 0);
-        // Where the next contact of each color and number of points goes, in lanes.
-        let mut next = [[0_usize; 2]; COLORS];
-        for (color, &[single, double]) in counts[..COLORS].iter().enumerate() {
-            next[color] = [singles * LANES, doubles * LANES];
-            let (end_single, end_double) = (singles + single.div_ceil(LANES), doubles + double.div_ceil(LANES));
-            if end_single > singles || end_double > doubles {
-                self.colors.push(Color { singles: singles..end_single, doubles: doubles..end_double });
+        // Where the next contact of each color goes, in lanes of the batch.
+        let mut next = [Cursor::default(); COLORS];
+        let mut end = Cursor::default();
+        let mut color = |groups: Cursor, end: &mut Cursor| {
+            let begin = *end;
+            *end = Cursor { single: begin.single + groups.single, double: begin.double + groups.double };
+            let slices = batch.slices(groups.single + groups.double);
+            self.colors.push(Color { singles: begin.single..end.single, doubles: begin.double..end.double, slices });
+        };
+        for (next, count) in next.iter_mut().zip(&counts).filter(|(_, count)| count.single + count.double > 0) {
+            *next = Cursor { single: end.single * LANES, double: end.double * LANES };
+            let groups = Cursor { single: count.single.div_ceil(LANES), double: count.double.div_ceil(LANES) };
+            color(groups, &mut end);
+        }
+        // What overflows: a group, and a color, for each.
+        let mut overflow = Cursor { single: end.single * LANES, double: end.double * LANES };
+        if counts[COLORS].single + counts[COLORS].double > 0 {
+            for (&contact, _) in own.iter().zip(colors).filter(|&(_, &color)| color as usize == COLORS) {
+                let mut groups = Cursor::default();
+                *groups.of(is_double(contact)) = 1;
+                color(groups, &mut end);
             }
-            (singles, doubles) = (end_single, end_double);
         }
-        self.places.clear();
-        for (i, &color) in coloring.color.iter().enumerate() {
-            let double = is_double(i);
-            let lane = if (color as usize) < COLORS {
-                let next = &mut next[color as usize][usize::from(double)];
-                *next += 1;
-                *next - 1
-            } else {
-                // Overflow: a group, and a color, of its own.
-                let count = if double { &mut doubles } else { &mut singles };
-                *count += 1;
-                let group = *count - 1;
-                let range = group..group + 1;
-                self.colors.push(if double {
-                    Color { singles: 0..0, doubles: range }
-                } else {
-                    Color { singles: range, doubles: 0..0 }
-                });
-                group * LANES
+        self.in_singles.resize(first_single + end.single, [NO_CONTACT; LANES]);
+        self.in_doubles.resize(first_double + end.double, [NO_CONTACT; LANES]);
+        batch.singles = first_single..self.in_singles.len();
+        batch.doubles = first_double..self.in_doubles.len();
+        for (&contact, &color) in own.iter().zip(colors) {
+            let double = is_double(contact);
+            let (next, step) = match next.get_mut(color as usize) {
+                Some(next) => (next.of(double), 1),
+                None => (overflow.of(double), LANES),
             };
-            self.places.push(Place { double, group: (lane / LANES) as u32, lane: (lane % LANES) as u32 });
+            let (lane, in_batch) = (*next % LANES, *next / LANES);
+            *next += step;
+            let (members, first) =
+                if double { (&mut self.in_doubles, first_double) } else { (&mut self.in_singles, first_single) };
+            let group = first + in_batch;
+            members[group][lane] = contact;
+            let base = batch.bodies.start as u32;
+            self.places[contact as usize] = Place { double, group: group as u32, lane: lane as u32, base };
         }
-        self.singles.clear();
-        self.singles.resize(singles, Group::EMPTY);
-        self.doubles.clear();
-        self.doubles.resize(doubles, Group::EMPTY);
     }
 
     fn rows(&self, contact: u32, point: usize) -> (&PointRows, usize) {
-        let Place { double, group, lane } = self.places[contact as usize];
+        let Place { double, group, lane, .. } = self.places[contact as usize];
         let group = group as usize;
         let rows = if double { &self.doubles[group].points[point] } else { &self.singles[group].points[point] };
         (rows, lane as usize)
+    }
+
+    /// Whether a contact has a constraint: not while its island sleeps.
+    pub(super) fn is_solved(&self, contact: u32) -> bool {
+        self.places[contact as usize].group != Place::NONE.group
     }
 
     /// What one point of a contact did: its impulses now, and their sums over the step.
@@ -235,7 +263,7 @@ impl Groups {
 
     /// Overwrites the accumulated impulses of one point.
     pub(crate) fn set_impulses(&mut self, contact: u32, point: usize, normal: f32, tangent: f32) {
-        let Place { double, group, lane } = self.places[contact as usize];
+        let Place { double, group, lane, .. } = self.places[contact as usize];
         let (group, lane) = (group as usize, lane as usize);
         let rows = if double { &mut self.doubles[group].points[point] } else { &mut self.singles[group].points[point] };
         rows.normal_impulse[lane] = normal;
@@ -245,95 +273,70 @@ impl Groups {
     /// One pass of restitution, in canonical order.
     pub(super) fn restitute(&mut self, bodies: &mut SolverBodies) {
         for bounce in &self.bounces {
-            let Place { double, group, lane } = self.places[bounce.contact as usize];
+            let Place { double, group, lane, base } = self.places[bounce.contact as usize];
             let (group, lane, point) = (group as usize, lane as usize, bounce.point as usize);
+            let velocity = &mut bodies.velocity[base as usize..];
             if double {
-                self.doubles[group].bounce(lane, point, bounce.speed, bodies);
+                self.doubles[group].bounce(lane, point, bounce.speed, velocity);
             } else {
-                self.singles[group].bounce(lane, point, bounce.speed, bodies);
+                self.singles[group].bounce(lane, point, bounce.speed, velocity);
             }
         }
     }
-}
 
-/// Everything about one contact that its lane needs.
-struct Constraint<'a> {
-    contact: &'a crate::Contact,
-    index: usize,
-    separation: [f32; 2],
-    bodies: [usize; 2],
-    solver: [u32; 2],
-    kinds: [&'a KindRow; 2],
-}
-
-impl<'a> Constraint<'a> {
-    #[inline(always)]
-    fn new(tile: &Tile, contacts: &'a Contacts, index: usize, bodies: &SolverBodies, setup: &'a Setup) -> Self {
-        let [a, b] = contacts.bodies[index];
-        Self {
-            contact: &contacts.cache.contacts[index],
-            index,
-            separation: contacts.separation[index],
-            bodies: [a as usize, b as usize],
-            solver: [bodies.index_of(a), bodies.index_of(b)],
-            kinds: [a, b].map(|body| setup.kind(tile.bodies.kind[body as usize])),
+    /// Brings a contact's separations up to date after its bodies were placed anew.
+    pub(super) fn refresh_separation(&mut self, contact: u32, bodies: &SolverBodies) {
+        let Place { double, group, lane, base } = self.places[contact as usize];
+        let (group, lane, pose) = (group as usize, lane as usize, &bodies.pose[base as usize..]);
+        if double {
+            self.doubles[group].refresh_separation(lane, pose);
+        } else {
+            self.singles[group].refresh_separation(lane, pose);
         }
     }
 
-    #[inline(always)]
-    fn write<const N: usize>(&self, group: &mut Group<N>, lane: usize) {
-        let [a, b] = self.kinds;
-        let normal = self.contact.normal;
-        let tangent = right_perp(normal);
-        group.a[lane] = self.solver[0];
-        group.b[lane] = self.solver[1];
-        group.contact[lane] = self.index as u32;
-        let (on_a, on_b) = (normal * a.root_inv_mass, normal * b.root_inv_mass);
-        (group.normal_ax[lane], group.normal_ay[lane]) = (on_a.x, on_a.y);
-        (group.normal_bx[lane], group.normal_by[lane]) = (on_b.x, on_b.y);
-        group.friction[lane] = (a.material.friction * b.material.friction).sqrt();
-        group.fixed[lane] = if a.inv_mass == 0.0 || b.inv_mass == 0.0 { 1.0 } else { 0.0 };
-        let linear = dot(on_a, on_a) + dot(on_b, on_b);
-        for (k, rows) in group.points.iter_mut().enumerate() {
-            let point = &self.contact.points[k];
-            let (arm_a, arm_b) = (point.anchor, point.anchor - self.contact.offset);
-            let arm = |kind: &KindRow, arm: Vec2, axis: Vec2| {
-                // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
-                kind.root_inv_inertia * cross(arm, axis)
-            };
-            let is_circle = |kind: &KindRow| matches!(kind.shape, Shape::Circle { .. });
-            let flat = |kind: &KindRow, value: f32| if is_circle(kind) { 0.0 } else { value };
-            let (normal_a, normal_b) = (flat(a, arm(a, arm_a, normal)), flat(b, arm(b, arm_b, normal)));
-            let (tangent_a, tangent_b) = (arm(a, arm_a, tangent), arm(b, arm_b, tangent));
-            rows.normal_a[lane] = normal_a;
-            rows.normal_b[lane] = normal_b;
-            rows.tangent_a[lane] = tangent_a;
-            rows.tangent_b[lane] = tangent_b;
-            rows.depth_a[lane] = flat(a, dot(arm_a, normal));
-            rows.depth_b[lane] = flat(b, dot(arm_b, normal));
-            rows.normal_mass[lane] = 1.0 / (linear + normal_a * normal_a + normal_b * normal_b);
-            rows.tangent_mass[lane] = 1.0 / (linear + tangent_a * tangent_a + tangent_b * tangent_b);
-            rows.first_separation[lane] = self.separation[k];
-            rows.separation[lane] = self.separation[k];
-            rows.normal_impulse[lane] = point.normal_impulse;
-            rows.tangent_impulse[lane] = point.tangent_impulse;
+    /// Gives one of a contact's bodies some more impulse, along the normal and the tangent, at one of its points.
+    pub(super) fn push(&self, contact: u32, point: usize, upon_a: bool, impulse: [f32; 2], bodies: &mut SolverBodies) {
+        let Place { double, group, lane, base } = self.places[contact as usize];
+        let (group, lane, velocity) = (group as usize, lane as usize, &mut bodies.velocity[base as usize..]);
+        if double {
+            self.doubles[group].push(lane, point, upon_a, impulse, velocity);
+        } else {
+            self.singles[group].push(lane, point, upon_a, impulse, velocity);
         }
     }
 
-    /// Speed at which a point's surfaces come nearer, in m/s.
-    fn closing_speed(&self, tile: &Tile, point: usize) -> f32 {
-        let anchor = self.contact.points[point].anchor;
-        let velocity = |side: usize, arm: Vec2| {
-            let i = self.bodies[side];
-            tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
+    /// How fast the surfaces of a contact's point come nearer than they may, in m/s; negative or zero: they do not.
+    pub(super) fn violation(&self, contact: u32, point: usize, bodies: &SolverBodies, h: f32) -> f32 {
+        let Place { double, group, lane, base } = self.places[contact as usize];
+        let (group, lane, velocity) = (group as usize, lane as usize, &bodies.velocity[base as usize..]);
+        let speed = if double {
+            self.doubles[group].normal_speed(lane, point, velocity)
+        } else {
+            self.singles[group].normal_speed(lane, point, velocity)
         };
-        -dot(velocity(1, anchor - self.contact.offset) - velocity(0, anchor), self.contact.normal)
+        let (rows, lane) = self.rows(contact, point);
+        -speed - max(rows.separation[lane], 0.0) / h
     }
+}
+
+/// The speed of a body along a row.
+fn along(row: [f32; 3], v: Quad) -> f32 {
+    row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 }
 
 impl<const N: usize> Group<N> {
+    /// Speed at which one point's surfaces move apart, in m/s.
+    fn normal_speed(&self, lane: usize, point: usize, velocity: &[Quad]) -> f32 {
+        let rows = &self.points[point];
+        let row_a = [self.normal_ax[lane], self.normal_ay[lane], rows.normal_a[lane]];
+        let row_b = [self.normal_bx[lane], self.normal_by[lane], rows.normal_b[lane]];
+        along(row_b, velocity[self.b[lane] as usize]) - along(row_a, velocity[self.a[lane] as usize])
+    }
+
     /// Gives one point back the speed it came in with, if it pressed at all.
-    fn bounce(&mut self, lane: usize, point: usize, speed: f32, bodies: &mut SolverBodies) {
+    fn bounce(&mut self, lane: usize, point: usize, speed: f32, velocity: &mut [Quad]) {
+        let approach = self.normal_speed(lane, point, velocity);
         let (a, b) = (self.a[lane] as usize, self.b[lane] as usize);
         let rows = &mut self.points[point];
         if rows.total_normal[lane] <= 0.0 {
@@ -341,26 +344,24 @@ impl<const N: usize> Group<N> {
         }
         let row_a = [self.normal_ax[lane], self.normal_ay[lane], rows.normal_a[lane]];
         let row_b = [self.normal_bx[lane], self.normal_by[lane], rows.normal_b[lane]];
-        let along = |row: [f32; 3], v: super::lanes::Quad| row[0] * v[0] + row[1] * v[1] + row[2] * v[2];
-        let approach = along(row_b, bodies.velocity[b]) - along(row_a, bodies.velocity[a]);
         let wanted = -rows.normal_mass[lane] * (approach - speed);
         let impulse = max(wanted, -rows.normal_impulse[lane]);
         rows.total_normal[lane] += impulse;
         for k in 0..3 {
-            bodies.velocity[a][k] -= row_a[k] * impulse;
-            bodies.velocity[b][k] += row_b[k] * impulse;
+            velocity[a][k] -= row_a[k] * impulse;
+            velocity[b][k] += row_b[k] * impulse;
         }
     }
 
     /// Gives one body of one lane an impulse along the normal and the tangent of one point.
-    pub(super) fn push(&self, lane: usize, point: usize, upon_a: bool, impulse: [f32; 2], bodies: &mut SolverBodies) {
+    pub(super) fn push(&self, lane: usize, point: usize, upon_a: bool, impulse: [f32; 2], velocity: &mut [Quad]) {
         let rows = &self.points[point];
         let (body, sign, x, y, normal, tangent) = if upon_a {
             (self.a[lane], -1.0, self.normal_ax[lane], self.normal_ay[lane], rows.normal_a[lane], rows.tangent_a[lane])
         } else {
             (self.b[lane], 1.0, self.normal_bx[lane], self.normal_by[lane], rows.normal_b[lane], rows.tangent_b[lane])
         };
-        let velocity = &mut bodies.velocity[body as usize];
+        let velocity = &mut velocity[body as usize];
         let [along, across] = impulse.map(|impulse| sign * impulse);
         velocity[0] += x * along + y * across;
         velocity[1] += y * along - x * across;
@@ -368,8 +369,8 @@ impl<const N: usize> Group<N> {
     }
 
     /// Separation of one lane's point by the bodies' poses now.
-    pub(super) fn refresh_separation(&mut self, lane: usize, bodies: &SolverBodies) {
-        let (pose_a, pose_b) = (bodies.pose[self.a[lane] as usize], bodies.pose[self.b[lane] as usize]);
+    pub(super) fn refresh_separation(&mut self, lane: usize, pose: &[Quad]) {
+        let (pose_a, pose_b) = (pose[self.a[lane] as usize], pose[self.b[lane] as usize]);
         for rows in &mut self.points {
             let moved_a = self.normal_ax[lane] * pose_a[0]
                 + self.normal_ay[lane] * pose_a[1]

@@ -4,6 +4,8 @@
 //! arrays, and for AVX2 with vector registers. Every operation is the IEEE one, lane by lane, so both give the same
 //! bits; how many lanes a register has never decides how work is grouped.
 
+use std::cell::Cell;
+
 /// How many numbers a [`Lanes`] holds. Part of the result's definition nowhere, of the memory layout everywhere.
 pub(crate) const LANES: usize = 8;
 
@@ -30,9 +32,9 @@ pub(crate) trait Lanes: Copy {
     /// `yes` where `self > 0`, else `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
     /// The four columns of the eight quads at `index`.
-    fn gather(from: &[Quad], index: &[u32; LANES]) -> [Self; 4];
+    fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4];
     /// The inverse of [`Lanes::gather`].
-    fn scatter(columns: [Self; 4], to: &mut [Quad], index: &[u32; LANES]);
+    fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]);
     /// The four columns of eight quads in a row.
     fn load_quads(from: &[Quad; LANES]) -> [Self; 4];
     /// The inverse of [`Lanes::load_quads`].
@@ -96,14 +98,14 @@ impl Lanes for Portable {
         Self(std::array::from_fn(|l| if self.0[l] > 0.0 { yes.0[l] } else { no.0[l] }))
     }
     #[inline(always)]
-    fn gather(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
-        let quads = index.map(|i| from[i as usize]);
+    fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
+        let quads = index.map(|i| from[i as usize].get());
         Self::load_quads(&quads)
     }
     #[inline(always)]
-    fn scatter(columns: [Self; 4], to: &mut [Quad], index: &[u32; LANES]) {
+    fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
         for (l, &i) in index.iter().enumerate() {
-            to[i as usize] = columns.map(|column| column.0[l]);
+            to[i as usize].set(columns.map(|column| column.0[l]));
         }
     }
     #[inline(always)]
@@ -129,6 +131,7 @@ mod avx2 {
     //! processor was asked; no other code names this type.
     use super::{LANES, Lanes, Quad, Row};
     use std::arch::x86_64::*;
+    use std::cell::Cell;
 
     #[derive(Clone, Copy)]
     pub(crate) struct Avx2(__m256);
@@ -153,9 +156,9 @@ mod avx2 {
     }
 
     #[inline(always)]
-    fn two_quads(low: &Quad, high: &Quad) -> __m256 {
-        // SAFETY: AVX2 is there; each pointer covers four floats.
-        unsafe { _mm256_loadu2_m128(high.as_ptr(), low.as_ptr()) }
+    fn two_quads(low: *const Quad, high: *const Quad) -> __m256 {
+        // SAFETY: AVX2 is there; each pointer comes from a reference and covers four floats.
+        unsafe { _mm256_loadu2_m128(high.cast(), low.cast()) }
     }
 
     impl Lanes for Avx2 {
@@ -218,19 +221,19 @@ mod avx2 {
             }
         }
         #[inline(always)]
-        fn gather(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
-            let quad = |l: usize| &from[index[l] as usize];
+        fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
+            let quad = |l: usize| from[index[l] as usize].as_ptr().cast_const();
             let rows = std::array::from_fn(|l| two_quads(quad(l), quad(l + 4)));
             transpose(rows).map(Self)
         }
         #[inline(always)]
-        fn scatter(columns: [Self; 4], to: &mut [Quad], index: &[u32; LANES]) {
+        fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
             let rows = transpose(columns.map(|column| column.0));
             for (l, row) in rows.into_iter().enumerate() {
                 // SAFETY: AVX2 is there; the slices are bounds-checked and cover four floats each.
                 unsafe {
-                    _mm_storeu_ps(to[index[l] as usize].as_mut_ptr(), _mm256_castps256_ps128(row));
-                    _mm_storeu_ps(to[index[l + 4] as usize].as_mut_ptr(), _mm256_extractf128_ps::<1>(row));
+                    _mm_storeu_ps(to[index[l] as usize].as_ptr().cast(), _mm256_castps256_ps128(row));
+                    _mm_storeu_ps(to[index[l + 4] as usize].as_ptr().cast(), _mm256_extractf128_ps::<1>(row));
                 }
             }
         }
@@ -288,7 +291,9 @@ mod tests {
         fn run<V: Lanes>(self) -> Vec<u32> {
             let (a, b) = (V::load(self.0), V::load(self.1));
             let index = [7, 0, 3, 9, 1, 8, 2, 5];
-            let [p, q, r, s] = V::gather(self.2, &index);
+            let mut back = self.2.to_vec();
+            let cells = Cell::from_mut(&mut back[..]).as_slice_of_cells();
+            let [p, q, r, s] = V::gather(cells, &index);
             let mut rows = vec![
                 a.add(b),
                 a.sub(b),
@@ -311,8 +316,7 @@ mod tests {
                 row
             })
             .collect::<Vec<f32>>();
-            let mut back = self.2.to_vec();
-            V::scatter([q, p, s, r], &mut back, &index);
+            V::scatter([q, p, s, r], cells, &index);
             let mut block = [[0.0; 4]; LANES];
             V::store_quads(V::load_quads(back[..LANES].try_into().unwrap()), &mut block);
             assert_eq!(block[..], back[..LANES]);

@@ -1,8 +1,4 @@
-//! Solver `soft-step`: substepped soft constraints with relax.
-//!
-//! Source: E. Catto, "Solver2D" and Box2D v3. Each substep integrates velocities, applies last substep's impulses
-//! (warm starting), solves with soft contacts that push overlap out, integrates positions, and solves once more without
-//! the push ("relax"), so that the push adds no energy.
+//! From contacts to new velocities and positions.
 //!
 //! # Mass-weighted velocities
 //!
@@ -13,80 +9,131 @@
 //! # Order
 //!
 //! Contacts are colored greedily in canonical order; contacts of one color share no body and fill groups of eight lanes.
-//! Colors follow from the contacts alone, so the order of all arithmetic does, whatever the machine.
+//! An island's colors follow from its contacts alone, and islands share nothing. So the order in which any body meets
+//! its contacts does not depend on how islands are put into batches, on lanes, or on threads: `serial`, `islands`,
+//! `coloring` and `auto` give the same bits.
 
+mod batches;
 mod bodies;
 mod coloring;
+mod crew;
 mod groups;
+#[allow(unsafe_code)]
+mod job;
 mod kernels;
 #[allow(unsafe_code)]
 pub(crate) mod lanes;
+mod motion;
+mod pgs;
+mod rows;
+#[allow(unsafe_code)]
+mod shared;
+mod soft_step;
 pub(crate) mod softness;
+mod write_back;
 
-pub(crate) use bodies::{SolverBodies, fly, store};
+pub(crate) use bodies::{NOT_SOLVED, SolverBodies};
+pub(crate) use write_back::write_back;
 
 use crate::broad_phase::Pair;
 use crate::narrow_phase::Contacts;
+use crate::params::Parallel;
 use crate::setup::Setup;
+use crate::team::Team;
 use crate::tile::Tile;
+use batches::Batches;
 use coloring::Coloring;
-use groups::{Group, Groups};
+use crew::{Crew, Member};
+use groups::Groups;
+use job::{Job, Parts, Run};
+use lanes::{LANES, dispatch};
+use rows::Source;
+use std::ops::Range;
 
 /// Buffers of the solver, shared by all tiles of a thread.
 #[derive(Default, Debug)]
 pub(crate) struct Solver {
     pub(crate) bodies: SolverBodies,
+    batches: Batches,
     coloring: Coloring,
     pub(crate) groups: Groups,
 }
 
 impl Solver {
-    /// Picks the bodies that take part.
-    pub(crate) fn gather(&mut self, tile: &Tile, contacts: &[Pair], setup: &Setup) {
-        self.bodies.gather(tile, contacts, setup);
+    /// The graph of contacts: how many bodies have some (nodes, in the order of the tile), and who touches whom (links).
+    pub(crate) fn graph(&mut self, tile: &Tile, contacts: &[Pair]) -> (usize, &[Pair]) {
+        self.bodies.number(tile, contacts);
+        self.bodies.graph()
     }
 
-    /// Contacts between bodies that move, as indices of solver bodies less one (the first stands for all statics).
-    pub(crate) fn links<'a>(&'a self, contacts: &'a [Pair]) -> impl Iterator<Item = (u32, u32)> + 'a {
-        let index = |body: u32| self.bodies.index_of(body);
-        contacts
-            .iter()
-            .map(move |&[a, b]| (index(a), index(b)))
-            .filter(|&(a, b)| a != 0 && b != 0)
-            .map(|(a, b)| (a - 1, b - 1))
+    /// Puts the islands into batches, leaves those out that sleep (see [`crate::sleep`]), and takes their bodies in.
+    pub(crate) fn gather(
+        &mut self,
+        tile: &mut Tile,
+        contacts: &[Pair],
+        roots: &[u32],
+        setup: &Setup,
+    ) {
+        let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
+        self.batches.divide(contacts, self.bodies.places_mut(), roots, sleeps, setup.params.parallel);
+        self.bodies.load(tile, &self.batches, setup);
     }
 
-    /// Colors the contacts and writes their constraints.
-    pub(crate) fn prepare(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
-        self.coloring.color(contacts, &self.bodies);
-        self.groups.prepare(tile, contacts, &self.bodies, &self.coloring, setup);
+    /// Colors the contacts and gives each its place. Returns how many colors there are.
+    pub(crate) fn color(&mut self, contacts: &Contacts, team: Team) -> u64 {
+        self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
+        self.groups.lay_out(&contacts.cache.contacts, &mut self.batches, &self.coloring) as u64
     }
 
-    /// Gravity, damping, speed limits, what ghosts are given; then the impulses of the last substep once more.
-    pub(crate) fn integrate_velocities(&mut self, substep: u32, setup: &Setup) {
-        self.bodies.integrate_velocities(substep, setup);
-        if substep == 0 {
-            self.for_each_color(kernels::WarmStart);
+    /// Writes the rows of all contacts.
+    pub(crate) fn prepare(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, team: Team) {
+        let source = Source { tile, contacts, bodies: &self.bodies, setup };
+        self.groups.write(&self.batches, source, team);
+        if setup.bouncy {
+            self.groups.find_bounces(source);
         }
     }
 
-    /// One pass over all contacts with the push.
-    pub(crate) fn solve(&mut self, setup: &Setup) {
-        self.for_each_color(kernels::Solve::new(setup));
-    }
-
-    /// Moves the bodies by their velocities.
-    pub(crate) fn integrate_positions(&mut self, setup: &Setup) {
-        self.bodies.integrate_positions(setup);
-    }
-
-    /// One pass over all contacts without the push, with friction. Leaves the separations for the next substep.
-    pub(crate) fn relax(&mut self, setup: &Setup) {
-        if setup.totals {
-            self.for_each_color(kernels::Relax::<true>::new(setup));
-        } else {
-            self.for_each_color(kernels::Relax::<false>::new(setup));
+    /// Makes some substeps of all batches.
+    pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
+        let alone = |job: Job<'_>| dispatch(Run { job: &job, member: Member::ALONE, substeps: substeps.clone(), setup });
+        // Nothing to share: no list of jobs.
+        if team.is_alone() || setup.params.parallel == Parallel::Serial {
+            return self.jobs().for_each(alone);
         }
+        let (large, small): (Vec<_>, Vec<_>) = self.jobs().partition(|job| job.large);
+        for job in &large {
+            let crew = Crew::new(team.threads());
+            team.all_at_once(|| dispatch(Run { job, member: crew.member(), substeps: substeps.clone(), setup }));
+        }
+        team.for_each(small, alone);
+    }
+
+    /// The batches, each with its part of the buffers.
+    fn jobs(&mut self) -> impl Iterator<Item = Job<'_>> {
+        const IN_ORDER: &str = "batches lie in order";
+        let SolverBodies { velocity, pose, start, weight, ghosts, frozen, .. } = &mut self.bodies;
+        let Groups { singles, doubles, colors, .. } = &mut self.groups;
+        let (mut velocity, mut pose, mut start) = (&mut velocity[..], &mut pose[..], &mut start[..]);
+        let (mut singles, mut doubles, mut ghosts) = (&mut singles[..], &mut doubles[..], &ghosts[..]);
+        let (weight, colors, frozen) = (&weight[..], &colors[..], *frozen);
+        self.batches.all.iter().map(move |batch| {
+            let bodies = batch.bodies.len();
+            let own_ghosts = ghosts.partition_point(|ghost| (ghost.place as usize) < batch.bodies.end);
+            Job::new(Parts {
+                velocity: velocity.split_off_mut(..bodies).expect(IN_ORDER),
+                pose: pose.split_off_mut(..bodies).expect(IN_ORDER),
+                start: start.split_off_mut(..bodies).expect(IN_ORDER),
+                weight: &weight[batch.bodies.clone()],
+                singles: singles.split_off_mut(..batch.singles.len()).expect(IN_ORDER),
+                doubles: doubles.split_off_mut(..batch.doubles.len()).expect(IN_ORDER),
+                colors: &colors[batch.colors.clone()],
+                ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
+                base: batch.bodies.start as u32,
+                frozen,
+                large: batch.large,
+            })
+        })
     }
 
     /// Bounces: contacts that pressed and came in fast get their approach speed back, in part.
@@ -96,16 +143,11 @@ impl Solver {
         }
     }
 
-    fn for_each_color(&mut self, pass: impl kernels::Pass) {
-        let Groups { singles, doubles, colors, .. } = &mut self.groups;
-        lanes::dispatch(kernels::EachColor { pass, singles, doubles, colors, bodies: &mut self.bodies });
-    }
-
     /// Copies the impulses of the last substep back to the contacts.
     pub(crate) fn store_impulses(&self, contacts: &mut Contacts) {
-        fn copy<const N: usize>(groups: &[Group<N>], contacts: &mut Contacts) {
-            for group in groups {
-                for (lane, &contact) in group.contact.iter().enumerate() {
+        fn copy<const N: usize>(groups: &[groups::Group<N>], members: &[[u32; LANES]], contacts: &mut Contacts) {
+            for (group, members) in groups.iter().zip(members) {
+                for (lane, &contact) in members.iter().enumerate() {
                     let Some(contact) = contacts.cache.contacts.get_mut(contact as usize) else { continue };
                     for (point, rows) in contact.points.iter_mut().zip(&group.points) {
                         point.normal_impulse = rows.normal_impulse[lane];
@@ -114,31 +156,48 @@ impl Solver {
                 }
             }
         }
-        copy(&self.groups.singles, contacts);
-        copy(&self.groups.doubles, contacts);
+        copy(&self.groups.singles, &self.groups.in_singles, contacts);
+        copy(&self.groups.doubles, &self.groups.in_doubles, contacts);
     }
 
     /// Brings a contact's separations up to date after its bodies were placed anew.
     pub(crate) fn refresh_separation(&mut self, contact: u32) {
-        let Groups { singles, doubles, places, .. } = &mut self.groups;
-        let place = places[contact as usize];
-        let lane = place.lane as usize;
-        if place.double {
-            doubles[place.group as usize].refresh_separation(lane, &self.bodies);
-        } else {
-            singles[place.group as usize].refresh_separation(lane, &self.bodies);
-        }
+        self.groups.refresh_separation(contact, &self.bodies);
     }
 
     /// Gives one of a contact's bodies some more impulse at one of its points.
     pub(crate) fn push(&mut self, contact: u32, point: usize, upon_a: bool, normal: f32, tangent: f32) {
-        let Groups { singles, doubles, places, .. } = &mut self.groups;
-        let place = places[contact as usize];
-        let (group, lane) = (place.group as usize, place.lane as usize);
-        if place.double {
-            doubles[group].push(lane, point, upon_a, [normal, tangent], &mut self.bodies);
-        } else {
-            singles[group].push(lane, point, upon_a, [normal, tangent], &mut self.bodies);
+        self.groups.push(contact, point, upon_a, [normal, tangent], &mut self.bodies);
+    }
+
+    /// How fast, in m/s, the surfaces of each solved point still come nearer than they may.
+    pub(crate) fn violation(&self, contacts: &Contacts, setup: &Setup) -> Violation {
+        let mut violation = Violation::default();
+        for (i, contact) in (0..).zip(&contacts.cache.contacts).filter(|&(i, _)| self.groups.is_solved(i)) {
+            for point in 0..contact.point_count() {
+                let speed = f64::from(self.groups.violation(i, point, &self.bodies, setup.h));
+                violation.add(speed);
+            }
+        }
+        violation
+    }
+}
+
+/// How well contacts are solved.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Violation {
+    pub(crate) points: u64,
+    /// Sum and maximum of the speeds, in m/s.
+    pub(crate) sum: f64,
+    pub(crate) max: f64,
+}
+
+impl Violation {
+    fn add(&mut self, speed: f64) {
+        self.points += 1;
+        if speed > 0.0 {
+            self.sum += speed;
+            self.max = if speed > self.max { speed } else { self.max };
         }
     }
 }

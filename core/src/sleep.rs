@@ -1,0 +1,93 @@
+//! Sleeping: islands that rest are left out until something touches them. Within one tile only.
+//!
+//! A body rests while its fastest point is slower than `sleep_speed`. An island sleeps while each of its bodies has
+//! rested for `sleep_time`, which is a function of the state: whatever comes to touch it makes one larger island, which
+//! is awake as long as the newcomer is. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with
+//! their impulses, so that they wake as they fell asleep. Source: islands that sleep as in Box2D (E. Catto); here they
+//! are found anew each step, so nothing has to be kept in order.
+
+use crate::setup::Setup;
+use crate::solver::NOT_SOLVED;
+use glam::Vec2;
+
+/// Who rests since when. Empty where nobody may sleep.
+#[derive(Default, Debug)]
+pub(crate) struct Sleep {
+    /// For each owned body how long it has rested, in seconds.
+    still: Vec<f32>,
+    /// For each owned body whether its island sleeps.
+    asleep: Vec<bool>,
+    /// For each node of the contact graph that is the lowest of its island, whether that sleeps.
+    islands: Vec<bool>,
+}
+
+impl Sleep {
+    /// For each owned body whether it sleeps; empty where nobody may.
+    pub(crate) fn asleep(&self) -> &[bool] {
+        &self.asleep
+    }
+
+    /// For each owned body how long it has rested, in seconds; empty where nobody may sleep.
+    pub(crate) fn still(&self) -> &[f32] {
+        &self.still
+    }
+
+    /// Whether an owned body sleeps.
+    #[inline(always)]
+    pub(crate) fn is_asleep(&self, body: usize) -> bool {
+        self.asleep.get(body).copied().unwrap_or(false)
+    }
+
+    /// Makes room for bodies that were added; these have not rested yet.
+    pub(crate) fn resize(&mut self, owned: usize) {
+        self.still.resize(owned, 0.0);
+        self.asleep.resize(owned, false);
+    }
+
+    /// Follows the bodies to a new order: the one at `order[i]` comes to `i`.
+    pub(crate) fn permute(&mut self, order: &[u32]) {
+        if !self.still.is_empty() {
+            self.still = order.iter().map(|&from| self.still[from as usize]).collect();
+            self.asleep = order.iter().map(|&from| self.asleep[from as usize]).collect();
+        }
+    }
+
+    /// Decides which islands sleep. `nodes` gives for each body its node of the contact graph plus one, or
+    /// [`NOT_SOLVED`] if it has no contact; `roots` for each node the lowest of its island. Takes the velocity of those
+    /// that sleep. Returns which islands sleep, by root, and how many bodies do.
+    pub(crate) fn decide(
+        &mut self,
+        nodes: &[u32],
+        roots: &[u32],
+        velocity: &mut [Vec2],
+        angular_velocity: &mut [f32],
+        setup: &Setup,
+    ) -> (&[bool], u64) {
+        let rested = |still: f32| still >= setup.params.sleep_time;
+        self.islands.clear();
+        self.islands.resize(roots.len(), true);
+        for (&node, &still) in nodes.iter().zip(&self.still).filter(|&(&node, _)| node != NOT_SOLVED) {
+            let island = &mut self.islands[roots[node as usize - 1] as usize];
+            *island &= rested(still);
+        }
+        let mut count = 0;
+        for (i, asleep) in self.asleep.iter_mut().enumerate() {
+            *asleep = match nodes[i] {
+                NOT_SOLVED => rested(self.still[i]),
+                node => self.islands[roots[node as usize - 1] as usize],
+            };
+            if *asleep {
+                (velocity[i], angular_velocity[i]) = (Vec2::ZERO, 0.0);
+                count += 1;
+            }
+        }
+        (&self.islands, count)
+    }
+
+    /// Counts on for those that rest. `speed` tells that of a body's fastest point, in m/s.
+    pub(crate) fn count_on(&mut self, speed: impl Fn(usize) -> f32, setup: &Setup) {
+        for (i, still) in self.still.iter_mut().enumerate().filter(|&(i, _)| !self.asleep[i]) {
+            *still = if speed(i) < setup.params.sleep_speed { *still + setup.params.dt } else { 0.0 };
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! A batch with its part of the solver's buffers, for one thread or a crew of them.
+
+use super::bodies::Ghost;
+use super::crew::Member;
+use super::groups::{Color, Group};
+use super::kernels::{Pass, Table};
+use super::lanes::{Kernel, LANES, Lanes, Quad};
+use super::motion::{Motion, turn_on};
+use super::shared::Shared;
+use super::{pgs, soft_step};
+use crate::params::Solver;
+use crate::setup::Setup;
+use std::ops::Range;
+
+/// Bodies in a piece of a stage.
+const BODIES_PER_PIECE: usize = 64 * LANES;
+
+/// One batch, to be solved. Indices of bodies count from the batch's first.
+///
+/// It is run either by one thread alone, or by the members of one crew, which get different pieces of every stage and
+/// meet between stages.
+pub(super) struct Job<'a> {
+    velocity: Shared<'a, Quad>,
+    pose: Shared<'a, Quad>,
+    start: Shared<'a, Quad>,
+    weight: &'a [Quad],
+    singles: Shared<'a, Group<1>>,
+    doubles: Shared<'a, Group<2>>,
+    colors: &'a [Color],
+    /// Sorted by place, which counts from `base`.
+    ghosts: &'a [Ghost],
+    base: u32,
+    frozen: bool,
+    /// Whether it is worth a crew.
+    pub(super) large: bool,
+}
+
+/// The part of the solver's buffers that one batch has.
+pub(super) struct Parts<'a> {
+    pub(super) velocity: &'a mut [Quad],
+    pub(super) pose: &'a mut [Quad],
+    pub(super) start: &'a mut [Quad],
+    pub(super) weight: &'a [Quad],
+    pub(super) singles: &'a mut [Group<1>],
+    pub(super) doubles: &'a mut [Group<2>],
+    pub(super) colors: &'a [Color],
+    pub(super) ghosts: &'a [Ghost],
+    pub(super) base: u32,
+    pub(super) frozen: bool,
+    pub(super) large: bool,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(parts: Parts<'a>) -> Self {
+        Self {
+            velocity: Shared::new(parts.velocity),
+            pose: Shared::new(parts.pose),
+            start: Shared::new(parts.start),
+            weight: parts.weight,
+            singles: Shared::new(parts.singles),
+            doubles: Shared::new(parts.doubles),
+            colors: parts.colors,
+            ghosts: parts.ghosts,
+            base: parts.base,
+            frozen: parts.frozen,
+            large: parts.large,
+        }
+    }
+
+    /// One pass over all contacts, color by color.
+    #[inline(always)]
+    pub(super) fn each_color<V: Lanes>(&self, member: Member<'_>, pass: impl Pass) {
+        for color in self.colors {
+            member.stage(color.slices, |slice| {
+                let (singles, doubles) = color.slice(slice);
+                // SAFETY: the pieces of a stage are different groups, and contacts of one color share no body that moves;
+                // each piece has a body of its own that stands for statics.
+                let (singles, doubles, bodies) = unsafe {
+                    let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
+                    (self.singles.range(singles), self.doubles.range(doubles), bodies)
+                };
+                for group in singles {
+                    pass.group::<V, 1>(group, bodies);
+                }
+                for group in doubles {
+                    pass.group::<V, 2>(group, bodies);
+                }
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn each_body(&self, member: Member<'_>, work: impl Fn(Range<usize>)) {
+        let bodies = self.velocity.len();
+        member.stage(bodies.div_ceil(BODIES_PER_PIECE) as u32, |piece| {
+            let first = piece as usize * BODIES_PER_PIECE;
+            work(first..bodies.min(first + BODIES_PER_PIECE));
+        });
+    }
+
+    /// What moves bodies but contacts; then last substep's impulses once more, unless this is the first, and what ghosts
+    /// are given.
+    #[inline(always)]
+    pub(super) fn integrate_velocities<V: Lanes>(&self, member: Member<'_>, motion: &Motion, first: bool) {
+        self.each_body(member, |range| {
+            // SAFETY: the pieces of a stage are different bodies.
+            let (velocities, starts) =
+                unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
+            let weights = self.weight[range.clone()].as_chunks::<LANES>().0;
+            let (velocity, start) = (velocities.as_chunks_mut::<LANES>().0, starts.as_chunks_mut::<LANES>().0);
+            for ((velocity, start), weight) in velocity.iter_mut().zip(start).zip(weights) {
+                let [vx, vy, w, rest] = V::load_quads(velocity);
+                let [root_mass, root_inertia, ..] = V::load_quads(weight);
+                let new = motion.accelerate([vx, vy, w], root_mass, root_inertia);
+                let [nx, ny, nw] = new;
+                let warm = if first {
+                    new
+                } else {
+                    let [sx, sy, sw, _] = V::load_quads(start);
+                    [nx.add(vx.sub(sx)), ny.add(vy.sub(sy)), nw.add(w.sub(sw))]
+                };
+                V::store_quads([nx, ny, nw, rest], start);
+                V::store_quads([warm[0], warm[1], warm[2], rest], velocity);
+            }
+            for ghost in self.ghosts_in(&range) {
+                let i = (ghost.place - self.base) as usize - range.start;
+                for (k, given) in ghost.given.into_iter().enumerate() {
+                    if self.frozen {
+                        (starts[i][k], velocities[i][k]) = (given, given);
+                    } else {
+                        starts[i][k] += given;
+                        velocities[i][k] += given;
+                    }
+                }
+            }
+        });
+    }
+
+    /// The ghosts among some bodies.
+    fn ghosts_in(&self, bodies: &Range<usize>) -> &[Ghost] {
+        let before = |body: usize| self.ghosts.partition_point(|ghost| (ghost.place - self.base) as usize <= body);
+        match bodies.start {
+            _ if self.ghosts.is_empty() => &[],
+            start => &self.ghosts[if start == 0 { 0 } else { before(start - 1) }..before(bodies.end - 1)],
+        }
+    }
+
+    /// Moves bodies by their velocities.
+    #[inline(always)]
+    pub(super) fn integrate_positions<V: Lanes>(&self, member: Member<'_>, h: f32) {
+        let (h, one) = (V::splat(h), V::splat(1.0));
+        self.each_body(member, |range| {
+            // SAFETY: the pieces of a stage are different bodies.
+            let (velocity, pose) = unsafe { (self.velocity.range(range.clone()), self.pose.range(range.clone())) };
+            let weight = self.weight[range].as_chunks::<LANES>().0;
+            let blocks = velocity.as_chunks::<LANES>().0.iter().zip(weight);
+            for (pose, (velocity, weight)) in pose.as_chunks_mut::<LANES>().0.iter_mut().zip(blocks) {
+                let [vx, vy, w, _] = V::load_quads(velocity);
+                let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
+                let [x, y, c, s] = V::load_quads(pose);
+                let (c, s) = turn_on(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
+                V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
+            }
+        });
+    }
+}
+
+/// Some substeps of a job, as one member of its crew, or alone.
+pub(super) struct Run<'a> {
+    pub(super) job: &'a Job<'a>,
+    pub(super) member: Member<'a>,
+    pub(super) substeps: Range<u32>,
+    pub(super) setup: &'a Setup,
+}
+
+impl Kernel for Run<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { job, member, substeps, setup } = self;
+        for substep in substeps {
+            match setup.params.solver {
+                Solver::SoftStep => soft_step::substep::<V>(job, member, substep, setup),
+                Solver::Pgs => pgs::step::<V>(job, member, setup),
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Solver `soft-step`: substepped soft constraints with relax.
+//!
+//! Source: E. Catto, "Solver2D" and Box2D v3. Each substep integrates velocities, applies last substep's impulses
+//! (warm starting), solves with soft contacts that push overlap out, integrates positions, and solves once more without
+//! the push ("relax"), so that the push adds no energy.
+
+use super::crew::Member;
+use super::groups::Group;
+use super::job::Job;
+use super::kernels::{Normals, Pass, Table, WarmStart, accumulate};
+use super::lanes::Lanes;
+use super::motion::Motion;
+use super::softness::Softness;
+use crate::setup::Setup;
+
+/// One substep of a batch.
+#[inline(always)]
+pub(super) fn substep<V: Lanes>(job: &Job<'_>, member: Member<'_>, substep: u32, setup: &Setup) {
+    job.integrate_velocities::<V>(member, &Motion::new(setup), substep == 0);
+    if substep == 0 {
+        job.each_color::<V>(member, WarmStart);
+    }
+    job.each_color::<V>(member, Solve::new(setup));
+    job.integrate_positions::<V>(member, setup.h);
+    if setup.totals {
+        job.each_color::<V>(member, Relax::<true>::new(setup));
+    } else {
+        job.each_color::<V>(member, Relax::<false>::new(setup));
+    }
+}
+
+/// Normal impulses, with the soft push out of overlap, then friction.
+#[derive(Clone, Copy)]
+struct Solve {
+    softness: Softness,
+    static_softness: Softness,
+    push_out_speed: f32,
+    inv_h: f32,
+}
+
+impl Solve {
+    fn new(setup: &Setup) -> Self {
+        Self {
+            softness: setup.softness,
+            static_softness: setup.static_softness,
+            push_out_speed: setup.params.push_out_speed,
+            inv_h: 1.0 / setup.h,
+        }
+    }
+}
+
+impl Pass for Solve {
+    #[inline(always)]
+    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+        let mut a = V::gather(bodies.velocity, &group.a);
+        let mut b = V::gather(bodies.velocity, &group.b);
+        let normals = Normals::<V>::load(group);
+        let fixed = V::load(&group.fixed);
+        let either = |of: fn(&Softness) -> f32| {
+            fixed.if_positive(V::splat(of(&self.static_softness)), V::splat(of(&self.softness)))
+        };
+        let (rate, mass_scale, impulse_scale) =
+            (either(|s| s.bias_rate), either(|s| s.mass_scale), either(|s| s.impulse_scale));
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        for rows in &mut group.points {
+            let axis = normals.normal(rows);
+            let separation = V::load(&rows.separation);
+            let old = V::load(&rows.normal_impulse);
+            // Apart: may close the gap within the substep, no more. Overlapping: pushed out softly.
+            let push = rate.mul(separation).max(V::splat(-self.push_out_speed));
+            let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
+            let mass_scale = separation.if_positive(one, mass_scale);
+            let impulse_scale = separation.if_positive(zero, impulse_scale);
+            let speed = axis.speed(&a, &b);
+            let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
+            let new = old.sub(wanted).sub(impulse_scale.mul(old)).max(zero);
+            axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
+        }
+        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
+        V::scatter(a, bodies.velocity, &group.a);
+        V::scatter(b, bodies.velocity, &group.b);
+    }
+}
+
+/// Normal impulses without the push, then friction, at the poses after the substep. Keeps the separations, which hold
+/// until bodies move again: in the next substep's solve. With `TOTALS`, sums impulses over the step.
+#[derive(Clone, Copy)]
+struct Relax<const TOTALS: bool> {
+    inv_h: f32,
+}
+
+impl<const TOTALS: bool> Relax<TOTALS> {
+    fn new(setup: &Setup) -> Self {
+        Self { inv_h: 1.0 / setup.h }
+    }
+}
+
+impl<const TOTALS: bool> Pass for Relax<TOTALS> {
+    #[inline(always)]
+    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+        let mut a = V::gather(bodies.velocity, &group.a);
+        let mut b = V::gather(bodies.velocity, &group.b);
+        let pose_a = V::gather(bodies.pose, &group.a);
+        let pose_b = V::gather(bodies.pose, &group.b);
+        let normals = Normals::<V>::load(group);
+        let zero = V::splat(0.0);
+        for rows in &mut group.points {
+            let axis = normals.normal(rows);
+            let separation = V::load(&rows.first_separation).add(axis.moved_apart(rows, &pose_a, &pose_b));
+            separation.store(&mut rows.separation);
+            let bias = separation.max(zero).mul(V::splat(self.inv_h));
+            let old = V::load(&rows.normal_impulse);
+            let wanted = V::load(&rows.normal_mass).mul(axis.speed(&a, &b).add(bias));
+            let new = old.sub(wanted).max(zero);
+            axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
+            if TOTALS {
+                V::load(&rows.total_normal).add(new).store(&mut rows.total_normal);
+            }
+        }
+        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
+        if TOTALS {
+            for rows in &mut group.points {
+                V::load(&rows.total_tangent).add(V::load(&rows.tangent_impulse)).store(&mut rows.total_tangent);
+            }
+        }
+        V::scatter(a, bodies.velocity, &group.a);
+        V::scatter(b, bodies.velocity, &group.b);
+    }
+}
