@@ -61,34 +61,54 @@ impl Crew {
     }
 }
 
-/// Tells the others if this member panics.
-struct Watch<'a>(&'a Crew);
-
-impl Drop for Watch<'_> {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            self.0.abandoned.store(true, Ordering::Relaxed);
-        }
-    }
-}
-
-impl Member<'_> {
+impl<'a> Member<'a> {
     /// Somebody without a crew: all pieces in order.
     pub(super) const ALONE: Self = Self(None);
 
-    /// One stage of so many pieces. Every member calls it with the same number, in the same order of stages.
+    /// One stage of so many pieces: those that fall to this member. After the last it waits for the others. Every member
+    /// calls it with the same number, in the same order of stages, and takes all there are.
+    ///
+    /// An iterator, not a function that is given the work: what is done to a piece must be compiled within the caller,
+    /// for the caller's processor (see [`super::lanes`]).
     #[inline(always)]
-    pub(super) fn stage(self, pieces: u32, mut work: impl FnMut(u32)) {
-        let Some(crew) = self.0 else { return (0..pieces).for_each(work) };
-        let _watch = Watch(crew);
-        loop {
-            let piece = crew.next.fetch_add(1, Ordering::Relaxed);
-            if piece >= pieces {
-                break;
-            }
-            work(piece);
+    pub(super) fn pieces(self, pieces: u32) -> Pieces<'a> {
+        Pieces { crew: self.0, next: 0, pieces }
+    }
+}
+
+/// The pieces of a stage that fall to one member.
+pub(super) struct Pieces<'a> {
+    crew: Option<&'a Crew>,
+    next: u32,
+    pieces: u32,
+}
+
+impl Iterator for Pieces<'_> {
+    type Item = u32;
+    #[inline(always)]
+    fn next(&mut self) -> Option<u32> {
+        let piece = match self.crew {
+            None => self.next,
+            Some(crew) => crew.next.fetch_add(1, Ordering::Relaxed),
+        };
+        if piece < self.pieces {
+            self.next = piece + 1;
+            return Some(piece);
         }
-        crew.wait();
+        if let Some(crew) = self.crew {
+            crew.wait();
+        }
+        None
+    }
+}
+
+impl Drop for Pieces<'_> {
+    #[inline(always)]
+    fn drop(&mut self) {
+        // Nobody is to wait for a member that panicked.
+        if let Some(crew) = self.crew.filter(|_| thread::panicking()) {
+            crew.abandoned.store(true, Ordering::Relaxed);
+        }
     }
 }
 
@@ -106,10 +126,10 @@ mod tests {
                 scope.spawn(|| {
                     let member = crew.member();
                     for stage in 0..200 {
-                        member.stage(50, |piece| {
+                        for piece in member.pieces(50) {
                             let before = done[piece as usize].fetch_add(1, Ordering::Relaxed);
                             assert_eq!(before, stage);
-                        });
+                        }
                     }
                 });
             }
@@ -121,14 +141,14 @@ mod tests {
     fn nobody_waits_for_a_member_that_panicked() {
         let crew = Crew::new(2);
         let ends = thread::scope(|scope| {
-            let run = |dies: bool| {
+            let run = || {
                 let member = crew.member();
-                member.stage(2, |_| ());
-                member.stage(2, |_| if dies { std::panic::resume_unwind(Box::new("on purpose")) });
-                // Whoever took both pieces of the stage before the other came.
-                member.stage(1, |_| ());
+                assert!(member.pieces(2).count() <= 2);
+                for _ in member.pieces(1) {
+                    std::panic::resume_unwind(Box::new("on purpose"));
+                }
             };
-            let threads = [scope.spawn(move || run(true)), scope.spawn(move || run(true))];
+            let threads = [scope.spawn(run), scope.spawn(run)];
             threads.map(|thread| thread.join().is_err())
         });
         assert_eq!(ends, [true, true]);

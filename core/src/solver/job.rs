@@ -69,9 +69,9 @@ impl<'a> Job<'a> {
 
     /// One pass over all contacts, color by color.
     #[inline(always)]
-    pub(super) fn each_color<V: Lanes>(&self, member: Member<'_>, pass: impl Pass) {
+    pub(super) fn each_color<V: Lanes>(&self, member: Member<'a>, pass: impl Pass) {
         for color in self.colors {
-            member.stage(color.slices, |slice| {
+            for slice in member.pieces(color.slices) {
                 let (singles, doubles) = color.slice(slice);
                 // SAFETY: the pieces of a stage are different groups, and contacts of one color share no body that moves;
                 // each piece has a body of its own that stands for statics.
@@ -85,24 +85,25 @@ impl<'a> Job<'a> {
                 for group in doubles {
                     pass.group::<V, 2>(group, bodies);
                 }
-            });
+            }
         }
     }
 
+    /// The bodies that fall to a member of the crew in one stage, range by range.
     #[inline(always)]
-    fn each_body(&self, member: Member<'_>, work: impl Fn(Range<usize>)) {
+    fn bodies(&self, member: Member<'a>) -> impl Iterator<Item = Range<usize>> {
         let bodies = self.velocity.len();
-        member.stage(bodies.div_ceil(BODIES_PER_PIECE) as u32, |piece| {
+        member.pieces(bodies.div_ceil(BODIES_PER_PIECE) as u32).map(move |piece| {
             let first = piece as usize * BODIES_PER_PIECE;
-            work(first..bodies.min(first + BODIES_PER_PIECE));
-        });
+            first..bodies.min(first + BODIES_PER_PIECE)
+        })
     }
 
     /// What moves bodies but contacts; then last substep's impulses once more, unless this is the first, and what ghosts
     /// are given.
     #[inline(always)]
-    pub(super) fn integrate_velocities<V: Lanes>(&self, member: Member<'_>, motion: &Motion, first: bool) {
-        self.each_body(member, |range| {
+    pub(super) fn integrate_velocities<V: Lanes>(&self, member: Member<'a>, motion: &Motion, first: bool) {
+        for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocities, starts) =
                 unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
@@ -133,7 +134,7 @@ impl<'a> Job<'a> {
                     }
                 }
             }
-        });
+        }
     }
 
     /// The ghosts among some bodies.
@@ -147,9 +148,9 @@ impl<'a> Job<'a> {
 
     /// Moves bodies by their velocities.
     #[inline(always)]
-    pub(super) fn integrate_positions<V: Lanes>(&self, member: Member<'_>, h: f32) {
+    pub(super) fn integrate_positions<V: Lanes>(&self, member: Member<'a>, h: f32) {
         let (h, one) = (V::splat(h), V::splat(1.0));
-        self.each_body(member, |range| {
+        for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocity, pose) = unsafe { (self.velocity.range(range.clone()), self.pose.range(range.clone())) };
             let weight = self.weight[range].as_chunks::<LANES>().0;
@@ -161,7 +162,7 @@ impl<'a> Job<'a> {
                 let (c, s) = turn_on(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
             }
-        });
+        }
     }
 }
 
