@@ -164,6 +164,11 @@ impl ContactCache {
         self.contacts.clear();
     }
 
+    pub(crate) fn append(&mut self, other: &mut Self) {
+        self.keys.append(&mut other.keys);
+        self.contacts.append(&mut other.contacts);
+    }
+
     /// Becomes a copy of another. Room is made for little more than is needed: there is one cache per tile.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.clear();

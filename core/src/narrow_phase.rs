@@ -6,61 +6,37 @@ use crate::manifold::{Manifold, collide};
 use crate::math::{Rot, dot, turn};
 use crate::setup::Setup;
 use crate::shape::{KindRow, Shape};
+use crate::team::Team;
 use crate::tile::Tile;
 use glam::Vec2;
 
 /// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
 const RECYCLE_COSINE: f32 = 0.98;
 
-/// Buffers and results of the narrow phase, shared by all tiles of a thread.
+/// Candidates, and pairs, in a piece of work, at least.
+const GRAIN: usize = 2048;
+
+/// The contacts of a tile, in canonical order: ascending by their bodies' slots, whatever order the pairs came in.
 #[derive(Default, Debug)]
 pub(crate) struct Contacts {
-    /// The contacts found, in canonical order: ascending by their bodies' slots, whatever order the pairs came in.
     pub(crate) cache: ContactCache,
     /// For each contact the separation of its points now.
     pub(crate) separation: Vec<[f32; 2]>,
     /// For each contact the indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
-    near: Vec<Pair>,
-    sorted: Vec<Pair>,
-    /// Per owned body where its pairs begin in `sorted`.
-    start: Vec<u32>,
 }
 
 impl Contacts {
-    /// Finds the contacts of a tile among candidate pairs.
-    pub(crate) fn find(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], setup: &Setup) {
-        self.cull(tile, proxies, candidates);
-        self.sort(tile.owned);
+    fn clear(&mut self) {
         self.cache.clear();
         self.separation.clear();
         self.bodies.clear();
-        let ghosts = tile.ghosts();
-        let mut old = 0;
-        for i in 0..self.sorted.len() {
-            let [low, high] = self.sorted[i];
-            let key = PairKey::new(
-                Slot::from_index(low as usize, tile.owned, ghosts),
-                Slot::from_index(high as usize, tile.owned, ghosts),
-            );
-            // Both lists ascend: one pass over the old contacts serves all pairs.
-            let keys = &tile.contacts.keys;
-            while old < keys.len() && keys[old] < key {
-                old += 1;
-            }
-            let known = (old < keys.len() && keys[old] == key).then(|| &tile.contacts.contacts[old]);
-            let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
-            let (a, b, pair) = if ids.0 < ids.1 { (low, high, ids) } else { (high, low, (ids.1, ids.0)) };
-            let strange = key.is_border()
-                || low as usize >= tile.arrived
-                || (high as usize) < tile.owned && high as usize >= tile.arrived;
-            let stray = if strange { tile.strays.find(pair) } else { None };
-            if let Some((contact, separation)) = touch(tile, [a, b], stray.or(known), setup) {
-                self.cache.push(key, contact);
-                self.separation.push(separation);
-                self.bodies.push([a, b]);
-            }
-        }
+    }
+
+    fn append(&mut self, other: &mut Self) {
+        self.cache.append(&mut other.cache);
+        self.separation.append(&mut other.separation);
+        self.bodies.append(&mut other.bodies);
     }
 
     /// Contacts, and border contacts, of which body A is owned: so that each is counted by one tile.
@@ -74,24 +50,66 @@ impl Contacts {
         }
         (all, border)
     }
+}
 
-    /// Keeps the candidates that are pairs. Every one is written down and counted or not: a branch here would be a coin
-    /// toss.
-    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair]) {
-        let position = &tile.bodies.position;
+/// Buffers of the narrow phase, shared by all tiles of a thread.
+#[derive(Default, Debug)]
+pub(crate) struct NarrowPhase {
+    near: Vec<Pair>,
+    sorted: Vec<Pair>,
+    /// Per owned body where its pairs begin in `sorted`.
+    start: Vec<u32>,
+    /// What each of several threads finds.
+    parts: Vec<Contacts>,
+}
+
+impl NarrowPhase {
+    /// Finds the contacts of a tile among candidate pairs.
+    pub(crate) fn find(
+        &mut self,
+        tile: &Tile,
+        proxies: &Proxies,
+        candidates: &[Pair],
+        setup: &Setup,
+        team: Team,
+        contacts: &mut Contacts,
+    ) {
+        self.cull(tile, proxies, candidates, team);
+        self.sort(tile.owned);
+        contacts.clear();
+        let (sorted, pieces) = (&self.sorted[..], team.pieces(self.sorted.len(), GRAIN));
+        if pieces == 1 {
+            return find_among(sorted, tile, setup, contacts);
+        }
+        self.parts.resize_with(pieces, Contacts::default);
+        let parts = self.parts.iter_mut().enumerate().collect();
+        team.for_each(parts, |(i, part): (usize, &mut Contacts)| {
+            find_among(&sorted[i * sorted.len() / pieces..(i + 1) * sorted.len() / pieces], tile, setup, part);
+        });
+        self.parts.iter_mut().for_each(|part| contacts.append(part));
+    }
+
+    /// Keeps the candidates that are pairs, and counts them by their lower index.
+    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], team: Team) {
+        self.near.clear();
+        if team.pieces(candidates.len(), GRAIN) == 1 {
+            self.near.resize(candidates.len(), [0, 0]);
+            let kept = cull(tile, proxies, candidates, &mut self.near);
+            self.near.truncate(kept);
+        } else {
+            let parts = team.map(candidates.len(), GRAIN, |range| {
+                let mut near = vec![[0, 0]; range.len()];
+                let kept = cull(tile, proxies, &candidates[range], &mut near);
+                near.truncate(kept);
+                near
+            });
+            parts.iter().for_each(|part| self.near.extend_from_slice(part));
+        }
         self.start.clear();
         self.start.resize(tile.owned + 2, 0);
-        self.near.clear();
-        self.near.resize(candidates.len(), [0, 0]);
-        let mut kept = 0;
-        for &pair in candidates {
-            let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
-            let near = proxies.is_pair(offset, pair);
-            self.near[kept] = pair;
-            kept += usize::from(near);
-            self.start[pair[0] as usize + 2] += u32::from(near);
+        for pair in &self.near {
+            self.start[pair[0] as usize + 2] += 1;
         }
-        self.near.truncate(kept);
     }
 
     /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
@@ -113,6 +131,49 @@ impl Contacts {
             if end - first > 1 {
                 self.sorted[first..end].sort_unstable();
             }
+        }
+    }
+}
+
+/// Copies the candidates that are pairs, and says how many. Every one is written down and counted or not: a branch here
+/// would be a coin toss.
+fn cull(tile: &Tile, proxies: &Proxies, candidates: &[Pair], near: &mut [Pair]) -> usize {
+    let position = &tile.bodies.position;
+    let mut kept = 0;
+    for &pair in candidates {
+        let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
+        near[kept] = pair;
+        kept += usize::from(proxies.is_pair(offset, pair));
+    }
+    kept
+}
+
+/// Appends the contacts among some sorted pairs.
+fn find_among(sorted: &[Pair], tile: &Tile, setup: &Setup, contacts: &mut Contacts) {
+    let ghosts = tile.ghosts();
+    let key_of = |[low, high]: Pair| {
+        let slot = |index: u32| Slot::from_index(index as usize, tile.owned, ghosts);
+        PairKey::new(slot(low), slot(high))
+    };
+    let keys = &tile.contacts.keys;
+    let mut old = sorted.first().map_or(0, |&first| keys.partition_point(|&key| key < key_of(first)));
+    for &[low, high] in sorted {
+        let key = key_of([low, high]);
+        // Both lists ascend: one pass over the old contacts serves all pairs.
+        while old < keys.len() && keys[old] < key {
+            old += 1;
+        }
+        let known = (old < keys.len() && keys[old] == key).then(|| &tile.contacts.contacts[old]);
+        let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
+        let (a, b, pair) = if ids.0 < ids.1 { (low, high, ids) } else { (high, low, (ids.1, ids.0)) };
+        let strange = key.is_border()
+            || low as usize >= tile.arrived
+            || (high as usize) < tile.owned && high as usize >= tile.arrived;
+        let stray = if strange { tile.strays.find(pair) } else { None };
+        if let Some((contact, separation)) = touch(tile, [a, b], stray.or(known), setup) {
+            contacts.cache.push(key, contact);
+            contacts.separation.push(separation);
+            contacts.bodies.push([a, b]);
         }
     }
 }

@@ -118,7 +118,7 @@ pub struct Params {
     /// Passes over all contacts in a step of [`Solver::Pgs`] (10). More make stacks stiffer; the solver's cost grows with
     /// them.
     pub iterations: u32,
-    /// Part of an overlap that [`Solver::Pgs`] pushes out in a step (0.2), at most `push_out_speed`. More resolves it
+    /// Part of an overlap that [`Solver::Pgs`] pushes out in a step (0.1), at most `push_out_speed`. More resolves it
     /// sooner, with more energy.
     pub baumgarte: f32,
     /// Overlap that [`Solver::Pgs`] leaves alone, in m (0.005), so that resting contacts do not flicker.
@@ -160,7 +160,7 @@ impl Default for Params {
             broad_phase: BroadPhase::default(),
             solver: Solver::default(),
             iterations: 10,
-            baumgarte: 0.2,
+            baumgarte: 0.1,
             linear_slop: 0.005,
             island_search: IslandSearch::default(),
             parallel: Parallel::default(),

@@ -32,12 +32,6 @@ impl Sleep {
         &self.still
     }
 
-    /// Whether an owned body sleeps.
-    #[inline(always)]
-    pub(crate) fn is_asleep(&self, body: usize) -> bool {
-        self.asleep.get(body).copied().unwrap_or(false)
-    }
-
     /// Makes room for bodies that were added; these have not rested yet.
     pub(crate) fn resize(&mut self, owned: usize) {
         self.still.resize(owned, 0.0);

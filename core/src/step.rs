@@ -8,7 +8,7 @@ use crate::params::Exchange;
 use crate::phase::Phase;
 use crate::solver;
 use crate::tile::Fault;
-use crate::world::{Bench, World};
+use crate::world::{Bench, Work, World};
 use std::ops::Range;
 
 /// What one step of one rank was like. Counts are of this rank's tiles.
@@ -132,7 +132,10 @@ fn collide(bench: &mut Bench<'_>) {
         b.work.pairs.clear();
         b.work.grid.find_pairs(&b.work.proxies, &mut b.work.pairs);
     });
-    bench.stage(Phase::NarrowPhase, |b| b.work.contacts.find(b.tile, &b.work.proxies, &b.work.pairs, b.setup));
+    bench.stage(Phase::NarrowPhase, |b| {
+        let Work { narrow_phase, proxies, pairs, contacts, .. } = &mut *b.work;
+        narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, contacts);
+    });
 }
 
 /// Islands, and who sleeps; constraints.

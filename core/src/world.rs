@@ -11,7 +11,7 @@ use crate::id::TileId;
 use crate::island::Islands;
 use crate::math::float_mode_is_default;
 use crate::migrate::MigrateWork;
-use crate::narrow_phase::Contacts;
+use crate::narrow_phase::{Contacts, NarrowPhase};
 use crate::params::Exchange;
 use crate::phase::{Phase, Stopwatch, Timings};
 use crate::setup::{Blueprint, Setup};
@@ -49,6 +49,7 @@ pub(crate) struct Work {
     pub(crate) proxies: Proxies,
     pub(crate) grid: Grid,
     pub(crate) pairs: Vec<Pair>,
+    pub(crate) narrow_phase: NarrowPhase,
     pub(crate) contacts: Contacts,
     pub(crate) islands: Islands,
     pub(crate) solver: Solver,

@@ -105,8 +105,7 @@ impl<'a> Job<'a> {
     pub(super) fn integrate_velocities<V: Lanes>(&self, member: Member<'a>, motion: &Motion, first: bool) {
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
-            let (velocities, starts) =
-                unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
+            let (velocities, starts) = unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
             let weights = self.weight[range.clone()].as_chunks::<LANES>().0;
             let (velocity, start) = (velocities.as_chunks_mut::<LANES>().0, starts.as_chunks_mut::<LANES>().0);
             for ((velocity, start), weight) in velocity.iter_mut().zip(start).zip(weights) {

@@ -67,13 +67,7 @@ impl Solver {
     }
 
     /// Puts the islands into batches, leaves those out that sleep (see [`crate::sleep`]), and takes their bodies in.
-    pub(crate) fn gather(
-        &mut self,
-        tile: &mut Tile,
-        contacts: &[Pair],
-        roots: &[u32],
-        setup: &Setup,
-    ) {
+    pub(crate) fn gather(&mut self, tile: &mut Tile, contacts: &[Pair], roots: &[u32], setup: &Setup) {
         let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
         self.batches.divide(contacts, self.bodies.places_mut(), roots, sleeps, setup.params.parallel);
         self.bodies.load(tile, &self.batches, setup);
@@ -96,7 +90,8 @@ impl Solver {
 
     /// Makes some substeps of all batches.
     pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
-        let alone = |job: Job<'_>| dispatch(Run { job: &job, member: Member::ALONE, substeps: substeps.clone(), setup });
+        let alone =
+            |job: Job<'_>| dispatch(Run { job: &job, member: Member::ALONE, substeps: substeps.clone(), setup });
         // Nothing to share: no list of jobs.
         if team.is_alone() || setup.params.parallel == Parallel::Serial {
             return self.jobs().for_each(alone);

@@ -75,7 +75,10 @@ impl Groups {
         };
         let each = batches.all.iter().flat_map(|batch| {
             let colors = &*colors;
-            batch.colors.clone().flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
+            batch
+                .colors
+                .clone()
+                .flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
         });
         if team.is_alone() {
             each.for_each(|(batch, color, slice)| next(batch, color, slice).write(source));
@@ -180,4 +183,3 @@ impl<'a> Constraint<'a> {
         -dot(velocity(1, anchor - self.contact.offset) - velocity(0, anchor), self.contact.normal)
     }
 }
-
