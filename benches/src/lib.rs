@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `step` | How long does a step of the reported experiment take, and how much memory? |
 //! | `growth` | Does a body cost more in a larger world? |
+//! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
 //!
 //! They print a table to stderr and one line of JSON per row to stdout, so that
 //! `cargo run --release -p atoll-benches --bin step > row.json` shows the one and keeps the other.

@@ -1,97 +1,176 @@
-//! Union-find against a search that walks.
+//! The searches against the definition, and against each other.
 
-use super::{IslandSizes, Islands, UnionFind};
+use super::parallel::ParallelUnionFind;
+use super::{IslandSizes, Islands};
 use crate::body::{Body, StaticBody};
 use crate::contact::SlotKind;
 use crate::id::{GlobalId, KindId, TileId};
 use crate::math::Rot;
-use crate::params::{Exchange, Params};
+use crate::params::{Exchange, IslandSearch, Params};
 use crate::partition::TileGrid;
 use crate::setup::Blueprint;
+use crate::team::Team;
 use crate::testing::{Loopback, cases, circle, rectangle};
 use crate::tile::Tile;
 use crate::world::World;
 use crate::{StepReport, step};
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Mutex, PoisonError};
 
-/// For every number the lowest one that a walk along the links leads to.
-fn depth_first(count: usize, links: &[(u32, u32)]) -> Vec<u32> {
-    let mut neighbours = vec![Vec::new(); count];
-    for &(a, b) in links {
-        neighbours[a as usize].push(b);
-        neighbours[b as usize].push(a);
-    }
-    let mut lowest = vec![u32::MAX; count];
-    for start in 0..count as u32 {
-        let mut stack = vec![start];
-        while let Some(at) = stack.pop() {
-            if lowest[at as usize] == u32::MAX {
-                lowest[at as usize] = start;
-                stack.extend_from_slice(&neighbours[at as usize]);
+/// Nodes, and links between them.
+type Graph = (usize, Vec<[u32; 2]>);
+
+/// Threads of the pool in which the searches are tried: more than a small machine has, so that they interrupt each other.
+const THREADS: usize = 4;
+
+fn pool() -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(THREADS).build().unwrap()
+}
+
+/// The roots of all nodes from the definition alone: each takes the lowest number its neighbours know, until nothing
+/// changes.
+fn spread(nodes: usize, links: &[[u32; 2]]) -> Vec<u32> {
+    let mut roots: Vec<_> = (0..nodes as u32).collect();
+    let mut changes = true;
+    while changes {
+        changes = false;
+        // There and back, so that chains in either direction take two rounds.
+        for &[a, b] in links.iter().chain(links.iter().rev()) {
+            let lowest = roots[a as usize].min(roots[b as usize]);
+            for node in [a, b] {
+                changes |= roots[node as usize] != lowest;
+                roots[node as usize] = lowest;
             }
         }
     }
-    lowest
+    roots
 }
 
-fn sizes(lowest: &[u32]) -> IslandSizes {
+fn sizes(roots: &[u32]) -> IslandSizes {
     let mut members = BTreeMap::<u32, u64>::new();
-    for &root in lowest {
+    for &root in roots {
         *members.entry(root).or_default() += 1;
     }
     IslandSizes { islands: members.len() as u64, largest: members.values().copied().max().unwrap_or(0) }
 }
 
-fn check(count: usize, links: &[(u32, u32)]) -> IslandSizes {
-    let expected = depth_first(count, links);
-    let mut sets = UnionFind::default();
-    sets.reset(count);
-    for &(a, b) in links {
-        sets.union(a, b);
+/// What every search, on one thread and on those of the pool, is tried with, the buffers used again and again.
+struct Searches {
+    pool: ThreadPool,
+    islands: Islands,
+    parallel: ParallelUnionFind,
+    roots: Vec<u32>,
+}
+
+impl Searches {
+    fn new() -> Self {
+        Self { pool: pool(), islands: Islands::default(), parallel: ParallelUnionFind::default(), roots: Vec::new() }
     }
-    let found: Vec<_> = (0..count as u32).map(|i| sets.find(i)).collect();
-    assert_eq!(found, expected);
-    let islands = Islands::default().find(count, links.iter().copied());
-    assert_eq!(islands, sizes(&expected));
-    islands
+
+    /// Checks that all find the same islands, the parallel one also if its work is cut finer than is worth while.
+    fn check(&mut self, nodes: usize, links: &[[u32; 2]]) -> IslandSizes {
+        let Self { pool, islands, parallel, roots } = self;
+        let expected = spread(nodes, links);
+        let sizes = sizes(&expected);
+        pool.install(|| {
+            for team in [Team::ALONE, Team::of_pool()] {
+                for search in [IslandSearch::UnionFind, IslandSearch::Dfs, IslandSearch::ParallelUnionFind] {
+                    assert_eq!(islands.find(search, nodes, links, team), sizes, "{search:?} {team:?}");
+                    assert_eq!(islands.roots(), expected, "{search:?} {team:?}");
+                }
+                for grain in [1, 7, 7, 7] {
+                    assert_eq!(parallel.find(nodes, links, team, grain, roots), sizes, "{team:?} {grain}");
+                    assert_eq!(*roots, expected, "{team:?} {grain}");
+                }
+            }
+        });
+        sizes
+    }
 }
 
-fn any_graph() -> impl Strategy<Value = (usize, Vec<(u32, u32)>)> {
-    (1_usize..300).prop_flat_map(|count| {
-        let node = 0..count as u32;
-        let link = (node.clone(), node);
-        (Just(count), prop::collection::vec(link, 0..2 * count))
-    })
+/// Chains side by side, their links in the order that is worst for union by index.
+fn chains(nodes: u32, strands: u32) -> Vec<[u32; 2]> {
+    (strands..nodes).rev().map(|i| [i - strands, i]).collect()
 }
 
-proptest! {
-    #![proptest_config(cases(256))]
+/// Every node linked to one.
+fn star(nodes: u32, middle: u32) -> Vec<[u32; 2]> {
+    (0..nodes).filter(|&i| i != middle).map(|i| [middle, i]).collect()
+}
 
-    #[test]
-    fn random_graphs((count, mut links) in any_graph()) {
-        let forward = check(count, &links);
+fn any_graph() -> impl Strategy<Value = Graph> {
+    let random = (1_usize..300).prop_flat_map(|nodes| {
+        let node = 0..nodes as u32;
+        let link = [node.clone(), node];
+        (Just(nodes), prop::collection::vec(link, 0..2 * nodes))
+    });
+    let shuffled = |links: Vec<_>| Just(links).prop_shuffle();
+    let chain = (1_u32..300, 1_u32..9).prop_flat_map(move |(nodes, strands)| {
+        let links = chains(nodes, strands);
+        (Just(nodes as usize), prop_oneof![Just(links.clone()), shuffled(links)])
+    });
+    let hub = (1_u32..300, any::<prop::sample::Index>()).prop_flat_map(move |(nodes, middle)| {
+        (Just(nodes as usize), shuffled(star(nodes, middle.index(nodes as usize) as u32)))
+    });
+    let single = (0_usize..50).prop_map(|nodes| (nodes, Vec::new()));
+    prop_oneof![4 => random, 2 => chain, 1 => hub, 1 => single]
+}
+
+#[test]
+fn random_graphs() {
+    let searches = Mutex::new(Searches::new());
+    let mut runner = TestRunner::new(cases(256));
+    let outcome = runner.run(&any_graph(), |(nodes, mut links)| {
+        let mut searches = searches.lock().unwrap_or_else(PoisonError::into_inner);
+        let forward = searches.check(nodes, &links);
         links.reverse();
-        prop_assert_eq!(check(count, &links), forward, "the order of the links shows");
-    }
+        prop_assert_eq!(searches.check(nodes, &links), forward, "the order of the links shows");
+        Ok(())
+    });
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
 }
 
 #[test]
 fn simple_graphs() {
-    let islands = |islands, largest| IslandSizes { islands, largest };
-    assert_eq!(check(0, &[]), islands(0, 0));
-    assert_eq!(check(3, &[]), islands(3, 1));
-    assert_eq!(check(4, &[(3, 3), (1, 2), (2, 1)]), islands(3, 2));
-    // The longest path there can be, in the worst order, and a star.
-    let path: Vec<_> = (0..9_999).rev().map(|i| (i, i + 1)).collect();
-    assert_eq!(check(10_000, &path), islands(1, 10_000));
-    let star: Vec<_> = (0..9_999).map(|i| (9_999, i)).collect();
-    assert_eq!(check(10_000, &star), islands(1, 10_000));
-    // What one search leaves behind does not show in the next, smaller one.
-    let mut reused = Islands::default();
-    reused.find(10_000, path.into_iter());
-    assert_eq!(reused.find(2, std::iter::empty()), islands(2, 1));
+    let mut searches = Searches::new();
+    let mut check = |nodes, links: &[[u32; 2]]| {
+        let IslandSizes { islands, largest } = searches.check(nodes, links);
+        (islands, largest)
+    };
+    // The longest path there can be, in the worst order, and stars: first, so that whatever they leave behind would show
+    // in the smaller ones.
+    assert_eq!(check(20_000, &chains(20_000, 1)), (1, 20_000));
+    assert_eq!(check(20_000, &chains(20_000, 3)), (3, 6_667));
+    assert_eq!(check(20_000, &star(20_000, 19_999)), (1, 20_000));
+    assert_eq!(check(20_000, &[]), (20_000, 1));
+    assert_eq!(check(0, &[]), (0, 0));
+    assert_eq!(check(3, &[]), (3, 1));
+    assert_eq!(check(4, &[[3, 3], [1, 2], [2, 1]]), (3, 2));
+}
+
+/// Threads that meet: links that all lead into one set, whose root moves all the time, over and over.
+#[test]
+fn threads_that_meet() {
+    let nodes = 50_000;
+    let links: Vec<_> = (0..nodes).map(|i| [(nodes - 1 - i) / 2, nodes - 1 - i]).chain(chains(nodes, 97)).collect();
+    let (mut parallel, mut roots) = (ParallelUnionFind::default(), Vec::new());
+    pool().install(|| {
+        for round in 0..50 {
+            let found = parallel.find(nodes as usize, &links, Team::of_pool(), 64, &mut roots);
+            assert_eq!(found, IslandSizes { islands: 1, largest: nodes.into() }, "round {round}");
+            assert!(roots.iter().all(|&root| root == 0), "round {round}");
+        }
+    });
+}
+
+#[test]
+#[should_panic(expected = "out of bounds")]
+fn a_link_to_no_node() {
+    Islands::default().find(IslandSearch::UnionFind, 2, &[[1, 2]], Team::ALONE);
 }
 
 /// Columns of bodies that fall onto a floor, on 2 x 2 tiles.
@@ -126,7 +205,7 @@ fn pile() -> World {
 }
 
 /// The islands of a tile from its contacts: bodies, owned or ghosts, that touch anything.
-fn of_tile(tile: &Tile) -> IslandSizes {
+fn of_tile(tile: &Tile, searches: &mut Searches) -> IslandSizes {
     let index = |kind| match kind {
         SlotKind::Owned(i) => Some(i as u32),
         SlotKind::Ghost(g) => Some((tile.owned + g) as u32),
@@ -142,18 +221,20 @@ fn of_tile(tile: &Tile) -> IslandSizes {
         }
     }
     let place = |body: u32| touching.range(..body).count() as u32;
-    let links: Vec<_> = links.into_iter().map(|(a, b)| (place(a), place(b))).collect();
-    check(touching.len(), &links)
+    let links: Vec<_> = links.into_iter().map(|(a, b)| [place(a), place(b)]).collect();
+    searches.check(touching.len(), &links)
 }
 
 #[test]
 fn the_islands_of_a_pile() {
     let mut world = pile();
+    let mut searches = Searches::new();
     let mut most = 0;
     for _ in 0..60 {
         let report = step(&mut world, &mut Loopback).unwrap();
         let mut expected = StepReport::default();
-        for islands in world.tile_states().iter().map(of_tile) {
+        for tile in world.tile_states() {
+            let islands = of_tile(tile, &mut searches);
             expected.islands += islands.islands;
             expected.largest_island = expected.largest_island.max(islands.largest);
         }
