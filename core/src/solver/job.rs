@@ -63,18 +63,32 @@ impl<'a> Job<'a> {
             ghosts: parts.ghosts,
             base: parts.base,
             frozen: parts.frozen,
-            large: parts.large,
+            large: parts.large && parts.colors.iter().any(|color| color.slices > 1),
         }
     }
 
-    /// One pass over all contacts, color by color.
+    /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
+    /// member: meeting costs more than they do.
     #[inline(always)]
     pub(super) fn each_color<V: Lanes>(&self, member: Member<'a>, pass: impl Pass) {
-        for color in self.colors {
-            for slice in member.pieces(color.slices) {
+        let mut colors = self.colors;
+        while let Some(first) = colors.first() {
+            let small = colors.iter().take_while(|color| color.slices == 1).count();
+            let (stage, rest) = colors.split_at(small.max(1));
+            for slice in member.pieces(first.slices) {
+                self.colors_of_stage::<V>(stage, slice, pass);
+            }
+            colors = rest;
+        }
+    }
+
+    /// One piece of a stage: a slice of one color, or several colors whole.
+    #[inline(always)]
+    fn colors_of_stage<V: Lanes>(&self, stage: &[Color], slice: u32, pass: impl Pass) {
+            for color in stage {
                 let (singles, doubles) = color.slice(slice);
-                // SAFETY: the pieces of a stage are different groups, and contacts of one color share no body that moves;
-                // each piece has a body of its own that stands for statics.
+                // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
+                // piece has a body of its own that stands for statics. A stage of several colors has one piece.
                 let (singles, doubles, bodies) = unsafe {
                     let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
                     (self.singles.range(singles), self.doubles.range(doubles), bodies)

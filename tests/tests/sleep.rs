@@ -1,0 +1,121 @@
+//! Islands that rest are left out, on one tile, and wake when something touches them.
+
+use atoll_core::{Exchange, GlobalId, Material, SetupError, Shape, TileId, World};
+use atoll_tests::scenes;
+use atoll_tests::world::{Cut, Scene, Sim};
+use glam::{DVec2, Vec2};
+
+const WHOLE: (Cut, Exchange) = (Cut::Whole, Exchange::Step);
+
+/// Two stacks of three boxes far from each other, and a ball that comes for the left one after some seconds.
+fn stacks_and_a_ball() -> (Scene, GlobalId) {
+    let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+    scene.params.sleep = true;
+    scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, Material::default());
+    let boxed = scene.kind(Shape::rectangle(0.5, 0.5), Material::default());
+    let ball = scene.kind(Shape::circle(0.3), Material { friction: 0.0, ..Material::default() });
+    for x in [-5.0, 5.0] {
+        for k in 0..3 {
+            scene.body(boxed, DVec2::new(x, 0.25 + 0.5 * f64::from(k)), Vec2::ZERO);
+        }
+    }
+    let ball = scene.body(ball, DVec2::new(-17.0, 0.3), Vec2::new(5.0, 0.0));
+    (scene, ball)
+}
+
+fn rest(sim: &mut Sim, steps: u32) {
+    sim.run(steps);
+    assert_eq!(sim.report.asleep, 6, "{:?}", sim.report);
+}
+
+#[test]
+fn what_rests_falls_asleep_and_does_not_move() {
+    let (scene, _) = stacks_and_a_ball();
+    let mut sim = scene.start(WHOLE);
+    sim.run(20);
+    assert_eq!(sim.report.asleep, 0);
+    rest(&mut sim, 60);
+    let before = sim.bodies();
+    rest(&mut sim, 20);
+    for (before, after) in before.iter().zip(sim.bodies()).take(6) {
+        assert_eq!(*before, after);
+        assert_eq!((after.velocity, after.angular_velocity), (Vec2::ZERO, 0.0));
+    }
+}
+
+#[test]
+fn a_touch_wakes_the_whole_island_and_no_other() {
+    let (scene, ball) = stacks_and_a_ball();
+    let mut sim = scene.start(WHOLE);
+    rest(&mut sim, 100);
+    let before = sim.bodies();
+    // The ball arrives after 11.45 m at 5 m/s.
+    sim.run(42);
+    assert_eq!(sim.report.asleep, 3, "{:?}", sim.report);
+    assert!(sim.body(ball).velocity.x < 4.9);
+    sim.run(8);
+    let after = sim.bodies();
+    for k in 0..3 {
+        assert!(after[k].velocity.length() > 0.1, "{:?}", after[k]);
+        assert_eq!(after[k + 3], before[k + 3]);
+    }
+}
+
+/// A stack that slept stands as one that did not; sleep saves work, not motion.
+#[test]
+fn a_stack_that_slept_and_woke_still_stands() {
+    let mut scene = scenes::stack(10);
+    scene.params.sleep = true;
+    let mut sim = scene.start(WHOLE);
+    sim.run(120);
+    assert_eq!(sim.report.asleep, 10);
+    let top = sim.bodies()[9].position;
+    // A push too weak to move it, strong enough to wake it.
+    let kind = scene.bodies[0].kind;
+    let id = GlobalId(99);
+    let body = atoll_core::Body { id, position: top + DVec2::new(0.0, 0.2), kind, ..scene.bodies[9] };
+    sim.world.add(body).unwrap();
+    sim.run(10);
+    assert_eq!(sim.report.asleep, 0);
+    sim.run(300);
+    assert_eq!(sim.report.asleep, 11);
+    assert!((sim.bodies()[9].position - top).length() < 0.01);
+}
+
+#[test]
+fn without_gravity_a_lone_body_at_rest_sleeps_too() {
+    let mut scene = Scene::new(DVec2::ZERO, 0.0);
+    scene.params.sleep = true;
+    let kind = scene.kind(Shape::circle(0.5), Material::default());
+    scene.body(kind, DVec2::ZERO, Vec2::ZERO);
+    scene.body(kind, DVec2::new(-6.0, 0.0), Vec2::new(4.0, 0.0));
+    let mut sim = scene.start(WHOLE);
+    sim.run(60);
+    assert_eq!(sim.report.asleep, 1);
+    sim.run(60);
+    assert_eq!(sim.report.asleep, 0);
+    assert!(sim.body(GlobalId(0)).velocity.x > 1.0);
+}
+
+/// How long a body has rested belongs to the future of the world, so to its hash.
+#[test]
+fn rest_shows_in_the_contact_hash() {
+    let mut scene = Scene::new(DVec2::ZERO, 0.0);
+    scene.params.sleep = true;
+    let kind = scene.kind(Shape::circle(0.5), Material::default());
+    scene.body(kind, DVec2::ZERO, Vec2::ZERO);
+    let hashes = |steps| {
+        let mut sim = scene.start(WHOLE);
+        sim.run(steps);
+        sim.hashes()
+    };
+    assert_eq!(hashes(3).state, hashes(4).state);
+    assert_ne!(hashes(3).contact, hashes(4).contact);
+}
+
+#[test]
+fn across_tiles_it_is_refused() {
+    let (scene, _) = stacks_and_a_ball();
+    let refused = World::new(&scene.blueprint((2, 1), Exchange::Step), &[TileId(0)]).unwrap_err();
+    assert_eq!(refused, SetupError::SleepAcrossTiles { tiles: 2 });
+}
