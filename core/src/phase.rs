@@ -10,7 +10,8 @@ pub enum Phase {
     Migrate,
     /// Waiting for, and carrying, messages.
     Exchange,
-    /// The broad phase's own order brought up to date: cells filled, or bodies that left their fat AABBs put in anew.
+    /// What the broad phase knows of the bodies brought up to date; with a quadtree, those that left their fat AABBs put
+    /// in anew. The grid's cells are filled in the next phase.
     Flush,
     /// Pairs of bodies that may touch.
     BroadPhase,

@@ -127,10 +127,19 @@ fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H
 
 /// Broad phase, narrow phase.
 fn collide(bench: &mut Bench<'_>) {
-    bench.stage(Phase::BroadPhase, |b| {
+    bench.stage(Phase::Flush, |b| {
         b.work.proxies.load(b.tile, b.setup);
-        b.work.pairs.clear();
-        b.work.grid.find_pairs(&b.work.proxies, &mut b.work.pairs);
+        if let Some(quadtree) = &mut b.tile.quadtree {
+            quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
+        }
+    });
+    bench.stage(Phase::BroadPhase, |b| {
+        let Work { grid, proxies, pairs, .. } = &mut *b.work;
+        pairs.clear();
+        match &b.tile.quadtree {
+            None => grid.find_pairs(proxies, pairs),
+            Some(quadtree) => quadtree.find_pairs(proxies, b.team, pairs),
+        }
     });
     bench.stage(Phase::NarrowPhase, |b| {
         let Work { narrow_phase, proxies, pairs, contacts, .. } = &mut *b.work;

@@ -1,10 +1,12 @@
 //! A tile: a rectangle of the domain, the bodies it owns, and what it remembers of their contacts.
 
 use crate::body::Bodies;
+use crate::broad_phase::quadtree::Quadtree;
 use crate::contact::{ContactCache, PairKey, Slot, Strays};
 use crate::halo::Unseen;
 use crate::hash::Hashes;
 use crate::id::{GlobalId, TileId};
+use crate::params::BroadPhase;
 use crate::partition::Region;
 use crate::setup::Setup;
 use crate::sleep::Sleep;
@@ -40,6 +42,8 @@ pub(crate) struct Tile {
     pub(crate) sleep: Sleep,
     /// How well the contacts of the last step were solved, if that was measured.
     pub(crate) violation: Violation,
+    /// The bodies by place, where the parameters ask for it. Never shows in a result.
+    pub(crate) quadtree: Option<Box<Quadtree>>,
     /// What happened in the step under way.
     pub(crate) counts: TileCounts,
 }
@@ -74,6 +78,7 @@ pub(crate) enum Fault {
 impl Tile {
     pub(crate) fn new(id: TileId, setup: &Setup) -> Self {
         let region = setup.grid.region(id);
+        let quadtree = || Box::new(Quadtree::new(setup.grid.tile_size().as_vec2().to_array()));
         Self {
             id,
             region,
@@ -89,6 +94,7 @@ impl Tile {
             strays: Strays::default(),
             sleep: Sleep::default(),
             violation: Violation::default(),
+            quadtree: (setup.params.broad_phase == BroadPhase::Quadtree).then(quadtree),
             counts: TileCounts::default(),
         }
     }

@@ -5,6 +5,7 @@
 //! coordinates, so two tiles that both see a pair agree on it.
 
 pub(crate) mod grid;
+pub(crate) mod quadtree;
 #[allow(unsafe_code)]
 mod search;
 #[cfg(test)]
@@ -37,6 +38,8 @@ pub(crate) struct Proxies {
     /// Local coordinates are rounded; comparing them needs this much more room for the body, in meters.
     pub(crate) slack: Vec<f32>,
     pub(crate) owned: usize,
+    /// Owned bodies and ghosts; statics come after them.
+    pub(crate) dynamic: usize,
     /// Width and height of the tile, in meters.
     pub(crate) size: [f32; 2],
     /// Length of a step, in seconds.
@@ -87,7 +90,7 @@ impl Proxies {
             reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
             boxy[i] = is_box;
         }
-        self.owned = tile.owned;
+        (self.owned, self.dynamic) = (tile.owned, dynamic);
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.dt = setup.params.dt;
     }

@@ -1,6 +1,7 @@
-//! The grid against trying every pair.
+//! The grid, and the quadtree, against trying every pair.
 
 use super::grid::Grid;
+use super::quadtree::Quadtree;
 use super::{Pair, Proxies};
 use crate::body::{Body, StaticBody};
 use crate::halo::Unseen;
@@ -10,12 +11,14 @@ use crate::params::Params;
 use crate::partition::TileGrid;
 use crate::setup::{Blueprint, Setup};
 use crate::shape::{Kind, Shape};
+use crate::team::Team;
 use crate::testing::{any_kind, any_rotation, cases, circle, distance, rectangle};
 use crate::tile::Tile;
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use std::cell::Cell;
 use std::collections::BTreeSet;
+use std::sync::OnceLock;
 
 thread_local! {
     /// Makes the search of this thread do without AVX2.
@@ -30,25 +33,36 @@ fn portable<R>(work: impl FnOnce() -> R) -> R {
 }
 
 /// A tile, stuffed by hand, and its setup.
-struct Stuffed {
+pub(super) struct Stuffed {
     setup: Setup,
-    tile: Tile,
-    proxies: Proxies,
+    pub(super) tile: Tile,
+    pub(super) proxies: Proxies,
 }
 
 impl Stuffed {
-    /// Of the given bodies the first `owned` part is owned, the others are ghosts. Nothing asks where they are: a tile
-    /// may hold any body anywhere.
-    fn new(size: Vec2, kinds: Vec<Kind>, mut bodies: Vec<Body>, owned: f64, statics: Vec<StaticBody>) -> Self {
+    /// Of the given bodies the first `owned` part is owned, the others are ghosts. They are named in this order.
+    pub(super) fn new(
+        size: Vec2,
+        kinds: Vec<Kind>,
+        mut bodies: Vec<Body>,
+        owned: f64,
+        statics: Vec<StaticBody>,
+    ) -> Self {
+        (1_000..).zip(&mut bodies).for_each(|(id, body)| body.id = GlobalId(id));
+        let owned = (owned * bodies.len() as f64) as usize;
+        Self::named(size, kinds, &bodies, owned, statics)
+    }
+
+    /// Of the given bodies so many are owned, the others are ghosts. Nothing asks where they are: a tile may hold any
+    /// body anywhere.
+    pub(super) fn named(size: Vec2, kinds: Vec<Kind>, bodies: &[Body], owned: usize, statics: Vec<StaticBody>) -> Self {
         let grid = TileGrid::new(DVec2::ZERO, 3.0 * size.as_dvec2(), 3, 3).unwrap();
         let blueprint = Blueprint { params: Params::default(), grid, kinds, statics };
         let setup = Setup::new(&blueprint).unwrap();
         let mut tile = Tile::new(TileId(4), &setup);
-        tile.owned = (owned * bodies.len() as f64) as usize;
-        for (id, body) in (1_000..).zip(&mut bodies) {
-            body.id = GlobalId(id);
-            body.position += tile.corner;
-            tile.bodies.push(*body);
+        tile.owned = owned;
+        for &body in bodies {
+            tile.bodies.push(Body { position: body.position + tile.corner, ..body });
         }
         tile.unseen.resize(bodies.len() - tile.owned, Unseen::default());
         tile.ghost_owners.resize(bodies.len() - tile.owned, TileId(5));
@@ -74,14 +88,35 @@ impl Stuffed {
         (0..self.tile.owned as u32).flat_map(move |a| (a + 1..bodies).map(move |b| [a, b]))
     }
 
-    fn brute_force(&self) -> BTreeSet<Pair> {
+    pub(super) fn brute_force(&self) -> BTreeSet<Pair> {
         self.twos().filter(|&pair| self.is_pair(pair)).collect()
     }
 
-    /// What the grid finds, whatever it found before, less the pairs that are none; refuses one found twice.
+    /// What the grid finds, whatever it found before.
     fn by_grid(&self, grid: &mut Grid) -> BTreeSet<Pair> {
         let mut found = Vec::new();
         grid.find_pairs(&self.proxies, &mut found);
+        self.pairs_among(found)
+    }
+
+    /// What a quadtree finds, whatever bodies it held before.
+    pub(super) fn by_quadtree(&self, quadtree: &mut Quadtree) -> BTreeSet<Pair> {
+        quadtree.flush(&self.proxies, &self.tile.bodies.id);
+        quadtree.check();
+        let mut found = Vec::new();
+        quadtree.find_pairs(&self.proxies, Team::ALONE, &mut found);
+        let mut shared = Vec::new();
+        threads().install(|| quadtree.find_pairs(&self.proxies, Team::of_pool(), &mut shared));
+        assert_eq!(shared, found, "three threads found something else");
+        self.pairs_among(found)
+    }
+
+    pub(super) fn new_quadtree(&self) -> Quadtree {
+        Quadtree::new(self.proxies.size)
+    }
+
+    /// What was found, less the pairs that are none; refuses one found twice.
+    fn pairs_among(&self, found: Vec<Pair>) -> BTreeSet<Pair> {
         let all: BTreeSet<Pair> = found.iter().copied().collect();
         assert_eq!(all.len(), found.len(), "a pair was found twice");
         for &[low, high] in &all {
@@ -89,9 +124,22 @@ impl Stuffed {
         }
         all.into_iter().filter(|&pair| self.is_pair(pair)).collect()
     }
+
+    /// What everybody finds; refuses if they disagree.
+    fn by_each(&self) -> BTreeSet<Pair> {
+        let pairs = self.by_grid(&mut Grid::default());
+        assert_eq!(self.by_quadtree(&mut self.new_quadtree()), pairs, "the quadtree disagrees with the grid");
+        pairs
+    }
 }
 
-fn body(kind: usize, position: DVec2) -> Body {
+/// Three threads.
+fn threads() -> &'static rayon::ThreadPool {
+    static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();
+    POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap())
+}
+
+pub(super) fn body(kind: usize, position: DVec2) -> Body {
     Body {
         id: GlobalId(0),
         position,
@@ -103,7 +151,7 @@ fn body(kind: usize, position: DVec2) -> Body {
 }
 
 /// Bodies in a tile of the unit square, to be stretched later: evenly, in a heap, or far outside.
-fn any_body() -> impl Strategy<Value = (prop::sample::Index, DVec2, Rot, Vec2, f32)> {
+pub(super) fn any_body() -> impl Strategy<Value = (prop::sample::Index, DVec2, Rot, Vec2, f32)> {
     let even = (-0.2..1.2, -0.2..1.2);
     let heap = (0.30..0.34, 0.70..0.74);
     let far = (-300.0..300.0, -300.0..300.0);
@@ -157,13 +205,13 @@ proptest! {
     #![proptest_config(cases(64))]
 
     #[test]
-    fn the_grid_finds_what_brute_force_finds(tile in any_tile(400, 6)) {
-        prop_assert_eq!(tile.by_grid(&mut Grid::default()), tile.brute_force());
+    fn grid_and_quadtree_find_what_brute_force_finds(tile in any_tile(400, 6)) {
+        prop_assert_eq!(tile.by_each(), tile.brute_force());
     }
 
     #[test]
     fn many_statics_are_no_different(tile in any_tile(60, 120)) {
-        prop_assert_eq!(tile.by_grid(&mut Grid::default()), tile.brute_force());
+        prop_assert_eq!(tile.by_each(), tile.brute_force());
     }
 
     #[test]
@@ -196,24 +244,25 @@ proptest! {
 #[test]
 fn nothing_and_little_have_no_pairs() {
     let kinds = || vec![circle(0.5), rectangle(1.0, 2.0)];
-    let mut grid = Grid::default();
     for bodies in [vec![], vec![body(0, DVec2::ONE)]] {
         let tile = Stuffed::new(Vec2::splat(10.0), kinds(), bodies, 1.0, vec![]);
-        assert!(tile.by_grid(&mut grid).is_empty());
+        assert!(tile.by_each().is_empty());
     }
     // Two ghosts upon one another are nobody's business here.
     let tile = Stuffed::new(Vec2::splat(10.0), kinds(), vec![body(0, DVec2::ONE); 2], 0.0, vec![]);
-    assert!(tile.by_grid(&mut grid).is_empty());
+    assert!(tile.by_each().is_empty());
 }
 
 #[test]
 fn a_heap_upon_one_spot_pairs_everybody() {
     let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.5)], vec![body(0, DVec2::ONE); 300], 0.5, vec![]);
-    let mut grid = Grid::default();
+    let (mut grid, mut quadtree) = (Grid::default(), tile.new_quadtree());
     assert_eq!(tile.by_grid(&mut grid).len(), 150 * 149 / 2 + 150 * 150);
+    assert_eq!(tile.by_quadtree(&mut quadtree).len(), 150 * 149 / 2 + 150 * 150);
     // Buffers of a larger search leave no traces in a smaller one.
     let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.5)], vec![body(0, DVec2::ONE); 30], 1.0, vec![]);
     assert_eq!(tile.by_grid(&mut grid).len(), 30 * 29 / 2);
+    assert_eq!(tile.by_quadtree(&mut quadtree).len(), 30 * 29 / 2);
 }
 
 #[test]
@@ -223,7 +272,7 @@ fn a_body_larger_than_the_tile_meets_all_within() {
         (0..200).map(|i| body(0, DVec2::new(f64::from(i % 20), f64::from(i / 20)) * 0.5)).collect();
     bodies.push(body(1, DVec2::new(-30.0, 5.0)));
     let tile = Stuffed::new(Vec2::splat(10.0), kinds, bodies, 1.0, vec![]);
-    let pairs = tile.by_grid(&mut Grid::default());
+    let pairs = tile.by_each();
     assert_eq!(pairs, tile.brute_force());
     assert_eq!(pairs.iter().filter(|pair| pair[1] == 200).count(), 200);
 }
@@ -238,7 +287,7 @@ fn a_wall_pairs_only_with_what_is_near_it() {
     };
     let bodies = (0..400).map(|i| body(0, DVec2::new(f64::from(i % 20), f64::from(i / 20)) * 0.5)).collect();
     let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.1)], bodies, 1.0, vec![wall]);
-    let pairs = tile.by_grid(&mut Grid::default());
+    let pairs = tile.by_each();
     assert_eq!(pairs, tile.brute_force());
     assert_eq!(pairs.iter().filter(|pair| pair[1] == 400).count(), 20, "the lowest row stands upon the wall");
 }

@@ -85,20 +85,19 @@ impl<'a> Job<'a> {
     /// One piece of a stage: a slice of one color, or several colors whole.
     #[inline(always)]
     fn colors_of_stage<V: Lanes>(&self, stage: &[Color], slice: u32, pass: impl Pass) {
-            for color in stage {
-                let (singles, doubles) = color.slice(slice);
-                // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
-                // piece has a body of its own that stands for statics. A stage of several colors has one piece.
-                let (singles, doubles, bodies) = unsafe {
-                    let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
-                    (self.singles.range(singles), self.doubles.range(doubles), bodies)
-                };
-                for group in singles {
-                    pass.group::<V, 1>(group, bodies);
-                }
-                for group in doubles {
-                    pass.group::<V, 2>(group, bodies);
-                }
+        for color in stage {
+            let (singles, doubles) = color.slice(slice);
+            // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
+            // piece has a body of its own that stands for statics. A stage of several colors has one piece.
+            let (singles, doubles, bodies) = unsafe {
+                let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
+                (self.singles.range(singles), self.doubles.range(doubles), bodies)
+            };
+            for group in singles {
+                pass.group::<V, 1>(group, bodies);
+            }
+            for group in doubles {
+                pass.group::<V, 2>(group, bodies);
             }
         }
     }
