@@ -286,6 +286,16 @@ impl Inbox {
         Self { bags, places, kinds: kinds as u32, ..Self::default() }
     }
 
+    /// All messages received so far: by tile, and for one tile in the order they came in.
+    pub fn messages(&self) -> impl Iterator<Item = &Message> {
+        self.bags.iter().flat_map(Mailbag::messages)
+    }
+
+    /// What has been heard so far, all verdicts joined.
+    pub fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
     /// Whether a tile lives in this world.
     pub fn holds(&self, tile: TileId) -> bool {
         self.places.get(tile.0 as usize).is_some_and(|&place| place != ELSEWHERE)

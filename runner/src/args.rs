@@ -2,7 +2,7 @@
 //! here.
 
 use crate::config::Origin;
-use crate::config::{ConfigError, Override, Place};
+use crate::config::{ConfigError, OneLine, Override, Place};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -106,7 +106,8 @@ pub fn one_line(error: &clap::Error) -> String {
         |line: &&str| !(line.is_empty() || line.starts_with("Usage:") || line.starts_with("For more information"));
     let lines: Vec<&str> = text.lines().map(str::trim).filter(said).collect();
     let line = lines.join(" ").replace(" tip: ", "; ");
-    format!("{}; see atoll run --help", line.strip_prefix("error: ").unwrap_or(&line))
+    // What was typed is quoted as it was typed.
+    format!("{}; see atoll run --help", OneLine(line.strip_prefix("error: ").unwrap_or(&line)))
 }
 
 #[cfg(test)]
@@ -152,5 +153,7 @@ mod tests {
             let text = one_line(&parse(line).unwrap_err());
             assert!(text.starts_with(expected) && !text.contains('\n'), "{text}");
         }
+        let error = Cli::try_parse_from(["atoll", "ru\r\u{1b}[2Jn"]).unwrap_err();
+        assert!(one_line(&error).starts_with("unrecognized subcommand 'ru n'"), "{}", one_line(&error));
     }
 }

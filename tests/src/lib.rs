@@ -1,5 +1,6 @@
 //! What the integration tests share. The tests themselves are in `tests/`, one file per subject.
 
+pub mod fuzz;
 pub mod program;
 pub mod ranks;
 pub mod scenes;

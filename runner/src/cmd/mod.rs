@@ -3,6 +3,7 @@
 pub mod run;
 
 use crate::args::{self, Cli, Command};
+use crate::config::OneLine;
 use crate::error::Exit;
 use crate::telemetry;
 use clap::Parser;
@@ -20,8 +21,7 @@ pub fn main() -> ExitCode {
     });
     let exit = result.unwrap_or_else(|error| {
         // On one line, whatever names and values the user has given.
-        let lines = error.to_string();
-        eprintln!("atoll: {}", lines.lines().collect::<Vec<_>>().join(" "));
+        eprintln!("atoll: {}", OneLine(&error.to_string()));
         error.exit()
     });
     ExitCode::from(exit as u8)

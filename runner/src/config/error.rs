@@ -1,7 +1,25 @@
 //! What can be wrong with a configuration: always one line that names the place, the value, and what is allowed.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use thiserror::Error;
+
+/// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
+/// control characters becomes a space.
+#[derive(Clone, Copy, Debug)]
+pub struct OneLine<'a>(pub &'a str);
+
+impl fmt::Display for OneLine<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let broken = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+        for (i, part) in self.0.split(broken).filter(|part| !part.is_empty()).enumerate() {
+            if i > 0 {
+                f.write_char(' ')?;
+            }
+            f.write_str(part)?;
+        }
+        Ok(())
+    }
+}
 
 /// Where a value came from.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -29,9 +47,9 @@ pub struct Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { origin, key, value } = self;
+        let (origin, key, value) = (&self.origin, OneLine(&self.key), OneLine(&self.value));
         match origin {
-            Origin::File(file) => write!(f, "{file}: {key} = {value}"),
+            Origin::File(file) => write!(f, "{}: {key} = {value}", OneLine(file)),
             Origin::Set => write!(f, "--set {key}={value}"),
             Origin::Option(option) => write!(f, "{option} {value}"),
             Origin::Default => write!(f, "{key} = {value} (the default)"),
@@ -43,7 +61,7 @@ impl fmt::Display for Place {
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{file}: cannot read this configuration: {reason}")]
+    #[error("{}: cannot read this configuration: {}", OneLine(.file), OneLine(.reason))]
     Read {
         /// Its path.
         file: String,
@@ -51,7 +69,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// The file is not TOML.
-    #[error("{file}, line {line}: {message}")]
+    #[error("{}, line {line}: {}", OneLine(.file), OneLine(.message))]
     Syntax {
         /// Its path.
         file: String,
@@ -69,7 +87,7 @@ pub enum ConfigError {
         suggestion: Option<String>,
     },
     /// There is no such section.
-    #[error("{file}: unknown section [{section}]{}", did_you_mean(.suggestion))]
+    #[error("{}: unknown section [{}]{}", OneLine(.file), OneLine(.section), did_you_mean(.suggestion))]
     UnknownSection {
         /// The file.
         file: String,
@@ -87,13 +105,13 @@ pub enum ConfigError {
         candidates: Vec<String>,
     },
     /// A `--set` without an equals sign.
-    #[error("--set {text}: write key=value, such as --set physics.substeps=8")]
+    #[error("--set {}: write key=value, such as --set physics.substeps=8", OneLine(.text))]
     NotAnAssignment {
         /// What was written.
         text: String,
     },
     /// A key that must be there is not.
-    #[error("{file}: {key} is missing: must be {must}")]
+    #[error("{}: {key} is missing: must be {must}", OneLine(.file))]
     Missing {
         /// The file.
         file: String,

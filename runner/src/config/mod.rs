@@ -8,7 +8,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use error::{ConfigError, Origin, Place};
+pub use error::{ConfigError, OneLine, Origin, Place};
 pub use settings::Override;
 
 use crate::scene::rooms;

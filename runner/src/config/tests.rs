@@ -202,3 +202,17 @@ fn options_are_named_as_they_were_written() {
         Some("--set solver: write key=value, such as --set physics.substeps=8")
     );
 }
+
+#[test]
+fn what_the_user_wrote_stays_on_one_line() {
+    let error = read(ROOMS, &[("peer_timeout", "'''\na\r\nb'''")]).unwrap_err();
+    assert!(error.starts_with("--set run.peer_timeout=''' a b''': must be "), "{error}");
+    let error = read(ROOMS, &[("a\rb\u{1b}", "1")]).unwrap_err();
+    assert!(error.starts_with("--set a b=1: unknown key"), "{error}");
+    for text in ["\"a\\nb\" = 1", "[\"a\\nb\"]", "[run]\n\"a\\r\\nb\" = 1"] {
+        let error = read(text, &[]).unwrap_err();
+        assert!(error.contains("a b") && !error.contains('\r'), "{error}");
+    }
+    let error = Override::parse("a\nb").unwrap_err().to_string();
+    assert!(error.starts_with("--set a b: write key=value"), "{error}");
+}

@@ -1,0 +1,7 @@
+//! Command lines.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    atoll_tests::fuzz::arguments(bytes);
+});

@@ -1,0 +1,7 @@
+//! Configurations.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    atoll_tests::fuzz::config(bytes);
+});

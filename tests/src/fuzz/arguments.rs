@@ -1,0 +1,48 @@
+//! Command lines.
+
+use super::assert_one_line;
+use crate::program;
+use atoll::Config;
+use atoll::args::{Cli, Command, one_line};
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::ffi::OsString;
+use std::iter::once;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+/// The configuration that every command line is given, whatever file it names: files of any name are not for reading.
+static CONFIG: LazyLock<PathBuf> = LazyLock::new(|| program::root().join("configs/quickstart.toml"));
+
+#[cfg(unix)]
+fn argument(bytes: &[u8]) -> OsString {
+    std::os::unix::ffi::OsStringExt::from_vec(bytes.to_vec())
+}
+
+#[cfg(not(unix))]
+fn argument(bytes: &[u8]) -> OsString {
+    String::from_utf8_lossy(bytes).into_owned().into()
+}
+
+/// Arguments, the name of the program left out, with a zero byte between any two. They are refused in one line, they
+/// ask for help, or they make a configuration.
+pub fn arguments(bytes: &[u8]) -> bool {
+    let given = bytes.split(|&byte| byte == 0).map(argument);
+    let cli = match Cli::try_parse_from(once(OsString::from("atoll")).chain(given)) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let text = one_line(&error);
+            match error.kind() {
+                ErrorKind::DisplayHelp
+                | ErrorKind::DisplayVersion
+                | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {}
+                _ => assert_one_line(text),
+            }
+            return false;
+        }
+    };
+    let Command::Run(args) = cli.command;
+    let config = args.overrides().and_then(|overrides| Config::load(&CONFIG, &overrides));
+    config.as_ref().err().into_iter().for_each(assert_one_line);
+    config.is_ok()
+}

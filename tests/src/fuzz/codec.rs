@@ -1,0 +1,89 @@
+//! Frames of another rank, as `Inbox::decode` reads them.
+
+use super::assert_one_line;
+use atoll_core::{
+    Blueprint, Exchange, FORMAT, Halo, Inbox, Kind, Material, Message, Outbox, Params, Shape, StepError, TileGrid,
+    TileId, Verdict, World, step,
+};
+use bytemuck::cast_slice;
+use glam::DVec2;
+
+/// Tiles of the world that [`receive`] builds; it holds tile 0 alone.
+pub const TILES: u32 = 4;
+
+/// A halo that lets somebody else read the first frames, and then ends the step.
+struct Ear<F, R> {
+    listen: Option<F>,
+    heard: Option<R>,
+}
+
+impl<F: FnOnce(&mut Inbox) -> R, R> Halo for Ear<F, R> {
+    type Error = ();
+
+    fn exchange(&mut self, _: &mut Outbox, inbox: &mut Inbox) -> Result<(), ()> {
+        self.heard = self.listen.take().map(|listen| listen(inbox));
+        Err(())
+    }
+}
+
+/// Gives a new, empty inbox to `listen`: that of a rank which holds the first of [`TILES`] tiles, knows one kind of
+/// body, and waits for the frames of step 0, sync point 0.
+pub fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
+    let blueprint = Blueprint {
+        params: Params { exchange: Exchange::Substep, ..Params::default() },
+        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(20.0), 2, TILES / 2).expect("a domain with a size"),
+        kinds: vec![Kind { shape: Shape::circle(0.2), material: Material::default() }],
+        statics: Vec::new(),
+    };
+    let mut world = World::new(&blueprint, &[TileId(0)]).expect("a world that can be built");
+    let mut ear = Ear { listen: Some(listen), heard: None };
+    let end = step(&mut world, &mut ear);
+    assert!(matches!(end, Err(StepError::Halo(()))), "the halo ends the step");
+    ear.heard.expect("a step begins with an exchange")
+}
+
+/// A frame of step 0, sync point 0, written after the description of the format alone: what `Outbox::encode` would
+/// write.
+pub fn frame<'a>(verdict: Verdict, messages: impl Iterator<Item = &'a Message> + Clone) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let count = |length: usize| (length as u32).to_le_bytes();
+    bytes.extend(FORMAT.to_le_bytes());
+    bytes.extend(0_u64.to_le_bytes());
+    bytes.extend(0_u32.to_le_bytes());
+    bytes.push(u8::from(verdict.stop));
+    bytes.push(u8::from(verdict.failure.is_some()));
+    if let Some((step, id)) = verdict.failure {
+        bytes.extend(step.to_le_bytes());
+        bytes.extend(id.0.to_le_bytes());
+    }
+    bytes.extend(count(messages.clone().count()));
+    for Message { from, to, migrants, contacts, ghosts, refreshes, impulses } in messages.clone() {
+        let records = [migrants.len(), contacts.len(), ghosts.len(), refreshes.len(), impulses.len()];
+        bytes.extend([from.0.to_le_bytes(), to.0.to_le_bytes()].concat());
+        bytes.extend(records.map(count).concat());
+    }
+    for Message { migrants, contacts, ghosts, refreshes, impulses, .. } in messages {
+        let records: [&[u8]; 5] = [
+            cast_slice(migrants),
+            cast_slice(contacts),
+            cast_slice(ghosts),
+            cast_slice(refreshes),
+            cast_slice(impulses),
+        ];
+        bytes.extend(records.concat());
+    }
+    bytes
+}
+
+/// A frame is refused in one line, or it means what it says: written again, it is the same bytes.
+pub fn codec(bytes: &[u8]) -> bool {
+    let decoded = receive(|inbox| {
+        let result = inbox.decode(bytes);
+        result.map(|()| frame(inbox.verdict(), inbox.messages().collect::<Vec<_>>().into_iter()))
+    });
+    match &decoded {
+        Ok(again) => assert!(again == bytes, "{bytes:02x?} were taken for {again:02x?}"),
+        Err(error) => assert_one_line(error),
+    }
+    decoded.is_ok()
+}
