@@ -5,9 +5,13 @@
 //! | `step` | How long does a step of the reported experiment take, and how much memory? |
 //! | `growth` | Does a body cost more in a larger world? |
 //! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
+//! | `peers` | How do Box2D and rapier2d do on the same scene? With `--features peers` only. |
 //!
 //! They print a table to stderr and one line of JSON per row to stdout, so that
 //! `cargo run --release -p atoll-benches --bin step > row.json` shows the one and keeps the other.
+
+#[cfg(feature = "peers")]
+pub mod peers;
 
 use atoll::{Config, Summary};
 

@@ -1,0 +1,108 @@
+//! The scene in rapier2d.
+
+use super::Simulation;
+use super::case::Case;
+use ::atoll::scene::Scene;
+use ::atoll_core::{Body, Kind, Params, Rot, Shape};
+use rapier2d::dynamics::SpringCoefficients;
+use rapier2d::prelude::{
+    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    Vector,
+};
+
+/// The version of rapier2d.
+pub fn version() -> String {
+    rapier2d::VERSION.to_owned()
+}
+
+/// A scene in one world of rapier2d.
+pub struct Simulated<'a> {
+    world: PhysicsWorld,
+    scene: &'a Scene,
+    /// In the order of the ids.
+    handles: Vec<RigidBodyHandle>,
+}
+
+impl<'a> Simulated<'a> {
+    /// Builds it; steps use the rayon pool they are called in.
+    pub fn new(case: &'a Case) -> Self {
+        let (scene, blueprint) = (&case.plan.scene, &case.plan.blueprint);
+        let params = &blueprint.params;
+        let gravity = Vector::new(params.gravity.x, params.gravity.y);
+        let integration_parameters = integration_parameters(params);
+        let mut world = PhysicsWorld { gravity, integration_parameters, ..PhysicsWorld::default() };
+        for fixed in scene.statics() {
+            let body = RigidBodyBuilder::fixed()
+                .translation(Vector::new(fixed.position.x as f32, fixed.position.y as f32))
+                .rotation(fixed.rotation.angle());
+            world.insert(body, collider(&fixed.kind));
+        }
+        let place = |body: Body| {
+            let dynamic = RigidBodyBuilder::dynamic()
+                .translation(Vector::new(body.position.x as f32, body.position.y as f32))
+                .rotation(body.rotation.angle())
+                .linvel(Vector::new(body.velocity.x, body.velocity.y))
+                .angvel(body.angular_velocity)
+                .linear_damping(params.linear_damping)
+                .angular_damping(params.angular_damping)
+                .can_sleep(false)
+                .ccd_enabled(false);
+            world.insert(dynamic, collider(&blueprint.kinds[body.kind.0 as usize])).0
+        };
+        let handles = scene.iter().map(place).collect();
+        Self { world, scene, handles }
+    }
+}
+
+fn integration_parameters(params: &Params) -> IntegrationParameters {
+    let softness = |hertz| SpringCoefficients { natural_frequency: hertz, damping_ratio: params.contact_damping_ratio };
+    let usual = IntegrationParameters::default();
+    IntegrationParameters {
+        dt: params.dt,
+        num_solver_iterations: params.substeps as usize,
+        contact_softness: softness(params.contact_hertz),
+        static_contact_softness: softness(2.0 * params.contact_hertz),
+        normalized_max_corrective_velocity: params.push_out_speed,
+        normalized_max_linear_velocity: usual.normalized_max_linear_velocity.min(params.max_linear_speed),
+        ..usual
+    }
+}
+
+fn collider(kind: &Kind) -> ColliderBuilder {
+    let shape = match kind.shape {
+        Shape::Circle { radius } => ColliderBuilder::ball(radius),
+        Shape::Box { half } => ColliderBuilder::cuboid(half.x, half.y),
+    };
+    shape
+        .density(kind.material.density)
+        .friction(kind.material.friction)
+        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+        .restitution(kind.material.restitution)
+        .restitution_combine_rule(CoefficientCombineRule::Max)
+}
+
+impl Simulation for Simulated<'_> {
+    fn step(&mut self) -> Result<(), String> {
+        self.world.step();
+        Ok(())
+    }
+
+    fn mass(&self) -> f64 {
+        self.handles.iter().map(|&handle| f64::from(self.world.bodies[handle].mass())).sum()
+    }
+
+    fn bodies(&self) -> Vec<Body> {
+        let state = |(start, &handle): (Body, &RigidBodyHandle)| {
+            let body = &self.world.bodies[handle];
+            let (place, turned, velocity) = (body.translation(), body.rotation(), body.linvel());
+            Body {
+                position: [f64::from(place.x), f64::from(place.y)].into(),
+                rotation: Rot { c: turned.cos(), s: turned.sin() },
+                velocity: [velocity.x, velocity.y].into(),
+                angular_velocity: body.angvel(),
+                ..start
+            }
+        };
+        self.scene.iter().zip(&self.handles).map(state).collect()
+    }
+}
