@@ -128,7 +128,7 @@ fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H
 /// Broad phase, narrow phase.
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
-        b.work.proxies.load(b.tile, b.setup);
+        b.work.proxies.load(b.tile, b.setup, b.team);
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
         }
@@ -137,7 +137,7 @@ fn collide(bench: &mut Bench<'_>) {
         let Work { grid, proxies, pairs, .. } = &mut *b.work;
         pairs.clear();
         match &b.tile.quadtree {
-            None => grid.find_pairs(proxies, pairs),
+            None => grid.find_pairs(proxies, b.team, pairs),
             Some(quadtree) => quadtree.find_pairs(proxies, b.team, pairs),
         }
     });

@@ -11,6 +11,10 @@
 use super::search::{Search, Sorted, emit};
 use super::{Pair, Proxies};
 use crate::math;
+use crate::team::Team;
+
+/// Bodies in a piece of work, at least.
+const GRAIN: usize = 4096;
 
 /// Up to this many bodies are simply tried against each other.
 const FEW: usize = 24;
@@ -68,7 +72,7 @@ impl Layout {
 
 impl Grid {
     /// Appends every pair, and some that are none (see the contract in [`super`]).
-    pub(crate) fn find_pairs(&mut self, proxies: &Proxies, pairs: &mut Vec<Pair>) {
+    pub(crate) fn find_pairs(&mut self, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
         self.rest.clear();
         self.rest.extend(0..proxies.len() as u32);
         while self.rest.len() > FEW {
@@ -84,7 +88,7 @@ impl Grid {
                 small
             });
             let layout = self.bin(proxies, limit);
-            self.pair_small(&layout, proxies, pairs);
+            self.pair_small(&layout, proxies, team, pairs);
             self.pair_large(&layout, proxies, limit, pairs);
             std::mem::swap(&mut self.rest, &mut self.large);
         }
@@ -127,9 +131,20 @@ impl Grid {
         layout
     }
 
-    fn pair_small(&self, layout: &Layout, proxies: &Proxies, pairs: &mut Vec<Pair>) {
-        let search = Search { sorted: &self.sorted, dt: proxies.dt, owned: proxies.owned, pairs };
-        search.neighbours(&self.start, layout.columns);
+    fn pair_small(&self, layout: &Layout, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
+        let (sorted, dt, owned) = (&self.sorted, proxies.dt, proxies.owned);
+        let search = |places, pairs: &mut Vec<Pair>| {
+            Search { sorted, dt, owned, places, pairs }.neighbours(&self.start, layout.columns);
+        };
+        if team.pieces(sorted.len, GRAIN) == 1 {
+            return search(0..sorted.len, pairs);
+        }
+        let parts = team.map(sorted.len, GRAIN, |places| {
+            let mut pairs = Vec::new();
+            search(places, &mut pairs);
+            pairs
+        });
+        parts.iter().for_each(|part| pairs.extend_from_slice(part));
     }
 
     fn pair_large(&self, layout: &Layout, proxies: &Proxies, limit: f32, pairs: &mut Vec<Pair>) {

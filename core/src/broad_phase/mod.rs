@@ -13,8 +13,13 @@ mod tests;
 
 use crate::math::{self, dot};
 use crate::setup::Setup;
+use crate::team::Team;
 use crate::tile::Tile;
 use glam::Vec2;
+use std::ops::Range;
+
+/// Bodies in a piece of work, at least.
+const GRAIN: usize = 8192;
 
 /// A pair of indices into owned, ghosts and statics; the lower first.
 pub(crate) type Pair = [u32; 2];
@@ -52,9 +57,8 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies.
-    pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup) {
-        let bodies = &tile.bodies;
-        let (total, dynamic) = (bodies.len(), tile.owned + tile.ghosts());
+    pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup, team: Team) {
+        let total = tile.bodies.len();
         let columns = [
             &mut self.x,
             &mut self.y,
@@ -66,31 +70,18 @@ impl Proxies {
             &mut self.boxy,
             &mut self.slack,
         ];
-        let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy, slack] = columns.map(|column| {
+        let mut rest = columns.map(|column| {
             column.resize(total, 0.0);
             &mut column[..total]
         });
-        let (position, velocity, rotation) =
-            (&bodies.position[..total], &bodies.velocity[..total], &bodies.rotation[..total]);
-        let (angular_velocity, kinds) = (&bodies.angular_velocity[..total], &bodies.kind[..total]);
-        for i in 0..total {
-            let kind = setup.kind(kinds[i]);
-            let local = (position[i] - tile.corner).as_vec2();
-            (x[i], y[i]) = (local.x, local.y);
-            slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
-            let mut half = kind.half_extents(rotation[i]);
-            if i < dynamic {
-                half += Vec2::splat(setup.margin(velocity[i]));
-            }
-            (half_x[i], half_y[i]) = (half.x, half.y);
-            (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
-            // Turning brings no point of a circle nearer.
-            let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
-            let sweep = is_box * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
-            reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
-            boxy[i] = is_box;
-        }
-        (self.owned, self.dynamic) = (tile.owned, dynamic);
+        let pieces = team.pieces(total, GRAIN);
+        let parts = (0..pieces).map(|i| {
+            let range = i * total / pieces..(i + 1) * total / pieces;
+            let part = rest.each_mut().map(|column| column.split_off_mut(..range.len()).expect("as many are left"));
+            (range, part)
+        });
+        team.for_each(parts.collect(), |(range, part)| load(tile, setup, range, part));
+        self.owned = tile.owned;
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.dt = setup.params.dt;
     }
@@ -129,5 +120,33 @@ impl Proxies {
             if self.boxy[a] + self.boxy[b] > 0.0 { speed * distance } else { math::max(-dot(between, offset), 0.0) };
         let within = (self.reach[a] + self.reach[b]) * distance + self.dt * closing;
         overlap & (square <= within * 1.0001)
+    }
+}
+
+/// Fills in the proxies of some bodies: the columns of [`Proxies`], in their order.
+fn load(tile: &Tile, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9]) {
+    let (bodies, count) = (&tile.bodies, range.len());
+    let dynamic = (tile.owned + tile.ghosts()).saturating_sub(range.start);
+    // One length for all columns: each index is checked once, not once per column.
+    let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy, slack] = columns.map(|column| &mut column[..count]);
+    let (position, velocity, rotation) =
+        (&bodies.position[range.clone()], &bodies.velocity[range.clone()], &bodies.rotation[range.clone()]);
+    let (angular_velocity, kinds) = (&bodies.angular_velocity[range.clone()], &bodies.kind[range]);
+    for i in 0..count {
+        let kind = setup.kind(kinds[i]);
+        let local = (position[i] - tile.corner).as_vec2();
+        (x[i], y[i]) = (local.x, local.y);
+        slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
+        let mut half = kind.half_extents(rotation[i]);
+        if i < dynamic {
+            half += Vec2::splat(setup.margin(velocity[i]));
+        }
+        (half_x[i], half_y[i]) = (half.x, half.y);
+        (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
+        // Turning brings no point of a circle nearer.
+        let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
+        let sweep = is_box * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
+        reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
+        boxy[i] = is_box;
     }
 }

@@ -5,6 +5,7 @@
 //! a little more generously than [`Proxies::is_pair`] does, which has the last word.
 
 use super::{Pair, Proxies};
+use std::ops::Range;
 
 /// Bodies in cell order: copies of what the search compares, so that it reads memory in order.
 #[derive(Default, Debug)]
@@ -16,7 +17,7 @@ pub(super) struct Sorted {
     reach: Vec<f32>,
     pub(super) body: Vec<u32>,
     cell: Vec<u32>,
-    len: usize,
+    pub(super) len: usize,
 }
 
 /// Entries behind the last one, so that eight can be read from any.
@@ -61,6 +62,8 @@ pub(super) struct Search<'a> {
     pub(super) owned: usize,
     /// Length of a step, in seconds.
     pub(super) dt: f32,
+    /// Whose neighbours are looked for, as places in cell order.
+    pub(super) places: Range<usize>,
     pub(super) pairs: &'a mut Vec<Pair>,
 }
 
@@ -93,14 +96,14 @@ fn portable_wanted() -> bool {
 }
 
 impl Search<'_> {
-    /// Every pair of neighbours. `start` holds where each cell begins, `columns` how many cells a row has.
+    /// Every pair of neighbours of which one, the first in cell order, is among `places`. `start` holds where each cell begins, `columns` how many cells a row has.
     pub(super) fn neighbours(mut self, start: &[u32], columns: usize) {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && !portable_wanted() {
             // SAFETY: the processor has just said that it has AVX2.
             return unsafe { self.neighbours_avx2(start, columns) };
         }
-        for place in 0..self.sorted.len {
+        for place in self.places.clone() {
             for (first, end) in runs(start, columns, self.sorted.cell[place] as usize, place) {
                 for other in first..end {
                     if self.may_touch(place, other) {
@@ -136,7 +139,7 @@ impl Search<'_> {
         let (velocities_x, velocities_y) = (&sorted.velocity_x[..padded], &sorted.velocity_y[..padded]);
         let cells = &sorted.cell[..padded];
         let (dt, more) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE));
-        for place in 0..sorted.len {
+        for place in self.places.clone() {
             let one = |column: &[f32]| _mm256_set1_ps(column[place]);
             let (x, y, reach) = (one(xs), one(ys), one(reaches));
             let (velocity_x, velocity_y) = (one(velocities_x), one(velocities_y));

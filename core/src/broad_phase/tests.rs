@@ -70,7 +70,7 @@ impl Stuffed {
             tile.bodies.push(*body);
         }
         let mut proxies = Proxies::default();
-        proxies.load(&tile, &setup);
+        proxies.load(&tile, &setup, Team::ALONE);
         Self { setup, tile, proxies }
     }
 
@@ -95,7 +95,7 @@ impl Stuffed {
     /// What the grid finds, whatever it found before.
     fn by_grid(&self, grid: &mut Grid) -> BTreeSet<Pair> {
         let mut found = Vec::new();
-        grid.find_pairs(&self.proxies, &mut found);
+        grid.find_pairs(&self.proxies, Team::ALONE, &mut found);
         self.pairs_among(found)
     }
 
