@@ -222,14 +222,20 @@ mod avx2 {
         }
         #[inline(always)]
         fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
+            // Written out, here and below: closures that a library function calls might be compiled without AVX2.
             let quad = |l: usize| from[index[l] as usize].as_ptr().cast_const();
-            let rows = std::array::from_fn(|l| two_quads(quad(l), quad(l + 4)));
-            transpose(rows).map(Self)
+            let [a, b, c, d] = transpose([
+                two_quads(quad(0), quad(4)),
+                two_quads(quad(1), quad(5)),
+                two_quads(quad(2), quad(6)),
+                two_quads(quad(3), quad(7)),
+            ]);
+            [Self(a), Self(b), Self(c), Self(d)]
         }
         #[inline(always)]
         fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
-            let rows = transpose(columns.map(|column| column.0));
-            for (l, row) in rows.into_iter().enumerate() {
+            let [a, b, c, d] = columns;
+            for (l, row) in transpose([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
                 // SAFETY: AVX2 is there; the slices are bounds-checked and cover four floats each.
                 unsafe {
                     _mm_storeu_ps(to[index[l] as usize].as_ptr().cast(), _mm256_castps256_ps128(row));
@@ -239,13 +245,18 @@ mod avx2 {
         }
         #[inline(always)]
         fn load_quads(from: &[Quad; LANES]) -> [Self; 4] {
-            let rows = std::array::from_fn(|l| two_quads(&from[l], &from[l + 4]));
-            transpose(rows).map(Self)
+            let [a, b, c, d] = transpose([
+                two_quads(&from[0], &from[4]),
+                two_quads(&from[1], &from[5]),
+                two_quads(&from[2], &from[6]),
+                two_quads(&from[3], &from[7]),
+            ]);
+            [Self(a), Self(b), Self(c), Self(d)]
         }
         #[inline(always)]
         fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]) {
-            let rows = transpose(columns.map(|column| column.0));
-            for (l, row) in rows.into_iter().enumerate() {
+            let [a, b, c, d] = columns;
+            for (l, row) in transpose([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
                 // SAFETY: AVX2 is there; each quad covers four floats.
                 unsafe {
                     _mm_storeu_ps(to[l].as_mut_ptr(), _mm256_castps256_ps128(row));

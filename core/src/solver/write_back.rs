@@ -150,7 +150,7 @@ fn fly<V: Lanes>(owned: &mut Owned<'_>, block: &[u32], motion: &Motion, substeps
         (rows[0][lane], rows[1][lane], rows[2][lane]) = (velocity.x, velocity.y, owned.angular_velocity[i]);
     }
     let (h, one, zero) = (V::splat(motion.h), V::splat(1.0), V::splat(0.0));
-    let mut velocity = rows.each_ref().map(V::load);
+    let mut velocity = [V::load(&rows[0]), V::load(&rows[1]), V::load(&rows[2])];
     let (mut x, mut y, mut c, mut s) = (zero, zero, one, zero);
     for _ in 0..substeps {
         velocity = motion.accelerate(velocity, one, one);
