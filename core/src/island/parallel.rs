@@ -1,24 +1,25 @@
 //! Disjoint sets, joined by all threads at once and without locks (the report's future work).
 //!
-//! Every node has a parent, itself if it is a root. To join two nodes a thread walks up to their roots and puts the
-//! greater one under the lesser with a compare-and-swap, which fails if another thread has put it under something
-//! meanwhile; then it walks on. Walks halve their path with compare-and-swaps that may fail. Sources: R. Anderson and
+//! Every node has a parent, itself if it is a root. To join two nodes a thread walks up from both until it comes to one
+//! parent, or to a root with a greater number than the parent on the other side; it puts that root under this parent with
+//! a compare-and-swap, which fails if another thread has put it under something meanwhile; then it walks on. Walks halve
+//! their paths with compare-and-swaps that may fail (plain stores were measured to be no faster). Sources: R. Anderson and
 //! H. Woll, "Wait-free parallel algorithms for the union-find problem", 1991; S. Jayanti and R. Tarjan, "A randomized
 //! concurrent algorithm for disjoint set union", 2016. They link at random or by rank, for the sake of the worst case;
 //! here the index decides, for the sake of the result.
 //!
 //! # Why the result does not depend on who comes first
 //!
-//! A node's parent only ever gets lower: a root's goes from itself to a lesser root, any other's to a parent of its
+//! A node's parent only ever gets lower: a root's goes from itself to a lesser node, any other's to a parent of its
 //! parent. So there are no cycles, and a tree's only root is its lowest node. It remains that the trees at the end are the
 //! islands. A tree holds no two islands, since only linked nodes are joined and halving stays within a tree.
 //!
 //! For the other half, *everything that was ever the parent of `i` ends up in the tree of `i`*, by induction on `i`: the
 //! parents of `i` are, one after the other, `i` itself and some p, q, ..., z. Each of them after p came from halving, so
 //! it was once the parent of the one before it, which is less than `i`; hence they all end up in one tree. That of z is
-//! that of `i`, since z stays. A thread is done with a link when it has walked from both its ends to one root, or has
-//! put one's root under the other's; it saw only parents, each once the parent of the one before, and so both ends end
-//! up in one tree.
+//! that of `i`, since z stays. A thread is done with a link when it has walked from both its ends to one node, or has put
+//! what it came to from one end under what it came to from the other; it saw only parents, each once the parent of the one
+//! before, and so both ends end up in one tree.
 //!
 //! # Why `Relaxed` is enough
 //!
@@ -99,37 +100,44 @@ impl ParallelUnionFind {
     }
 }
 
-/// Joins the sets of two nodes.
+/// Joins the sets of two nodes. It walks up from both, always on the side whose parent is greater, and so meets where
+/// the paths do, often below the root.
 #[inline]
 fn join(parents: &[AtomicU32], mut a: u32, mut b: u32) {
-    loop {
-        (a, b) = (root_of(parents, a), root_of(parents, b));
-        if a == b {
-            return;
+    let [mut above_a, mut above_b] = [a, b].map(|node| parents[node as usize].load(Relaxed));
+    while above_a != above_b {
+        if above_a < above_b {
+            (a, above_a, b, above_b) = (b, above_b, a, above_a);
         }
-        if a < b {
-            (a, b) = (b, a);
-        }
-        if parents[a as usize].compare_exchange(a, b, Relaxed, Relaxed).is_ok() {
-            return;
+        if a == above_a {
+            match parents[a as usize].compare_exchange(a, above_b, Relaxed, Relaxed) {
+                Ok(_) => return,
+                Err(now) => above_a = now,
+            }
+        } else {
+            (a, above_a) = halve(parents, a, above_a);
         }
     }
 }
 
-/// A node above `i`, or itself, that is or was a root.
+/// One step up from `node`, on whose parent it puts the parent's parent. Returns the parent, and the parent's parent.
 #[inline]
-fn root_of(parents: &[AtomicU32], mut i: u32) -> u32 {
-    let mut parent = parents[i as usize].load(Relaxed);
-    while parent != i {
-        let above = parents[parent as usize].load(Relaxed);
-        if above == parent {
-            return parent;
-        }
+fn halve(parents: &[AtomicU32], node: u32, parent: u32) -> (u32, u32) {
+    let above = parents[parent as usize].load(Relaxed);
+    if above != parent {
         // If it fails, another thread has made the path shorter.
-        let _ = parents[i as usize].compare_exchange_weak(parent, above, Relaxed, Relaxed);
-        (i, parent) = (above, parents[above as usize].load(Relaxed));
+        let _ = parents[node as usize].compare_exchange_weak(parent, above, Relaxed, Relaxed);
     }
-    i
+    (parent, above)
+}
+
+/// The root above `node`, once all links are joined.
+fn root_of(parents: &[AtomicU32], mut node: u32) -> u32 {
+    let mut parent = parents[node as usize].load(Relaxed);
+    while parent != node {
+        (node, parent) = halve(parents, node, parent);
+    }
+    node
 }
 
 /// The roots of a range of nodes that starts at `start`, once all links are joined, and how many nodes of the range each

@@ -152,17 +152,20 @@ fn simple_graphs() {
     assert_eq!(check(4, &[[3, 3], [1, 2], [2, 1]]), (3, 2));
 }
 
-/// Threads that meet: links that all lead into one set, whose root moves all the time, over and over.
+/// Threads that meet: the links of every node to two lesser ones lie half the list apart, so that two threads often want
+/// to put one root under something at the same time. Each link counts: one that gets lost parts an island.
 #[test]
 fn threads_that_meet() {
-    let nodes = 50_000;
-    let links: Vec<_> = (0..nodes).map(|i| [(nodes - 1 - i) / 2, nodes - 1 - i]).chain(chains(nodes, 97)).collect();
+    let threes = 40_000;
+    let links: Vec<_> = (0..2).flat_map(|low| (0..threes).map(move |i| [3 * i + 2, 3 * i + low])).collect();
     let (mut parallel, mut roots) = (ParallelUnionFind::default(), Vec::new());
-    pool().install(|| {
-        for round in 0..50 {
-            let found = parallel.find(nodes as usize, &links, Team::of_pool(), 64, &mut roots);
-            assert_eq!(found, IslandSizes { islands: 1, largest: nodes.into() }, "round {round}");
-            assert!(roots.iter().all(|&root| root == 0), "round {round}");
+    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    pool.install(|| {
+        for round in 0..200 {
+            let grain = links.len() / 2;
+            let found = parallel.find(3 * threes as usize, &links, Team::of_pool(), grain, &mut roots);
+            assert_eq!(found, IslandSizes { islands: threes.into(), largest: 3 }, "round {round}");
+            assert!(roots.iter().enumerate().all(|(i, &root)| root as usize == i / 3 * 3), "round {round}");
         }
     });
 }
