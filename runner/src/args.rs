@@ -58,6 +58,9 @@ pub struct RunArgs {
     /// Write the summary to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Write where the time of each rank went to this file, as CSV.
+    #[arg(long, value_name = "FILE")]
+    pub timings: Option<PathBuf>,
     /// Record the trajectory to this folder (not in this version yet).
     #[arg(long, value_name = "DIR")]
     pub out: Option<String>,

@@ -97,6 +97,9 @@ fn run<T: Transport>(
         if observer.stop.is_requested() {
             world.request_stop();
         }
+        if world.step_count() + 1 == plan.config.run.steps {
+            world.measure_next_step();
+        }
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
         *complete = world.step_count();

@@ -60,8 +60,10 @@ pub enum RunError {
         reason: String,
     },
     /// A path to write to, found unusable before the run.
-    #[error("--json {}: {reason}; give a path that can be written", .path.display())]
+    #[error("{option} {}: {reason}; give a path that can be written", .path.display())]
     BadOutput {
+        /// What it was given with.
+        option: &'static str,
         /// The path.
         path: PathBuf,
         /// What the system said.
@@ -135,7 +137,7 @@ pub enum RunError {
         /// At the end.
         found: u64,
     },
-    /// The summary could not be written after the run.
+    /// A result could not be written after the run.
     #[error("cannot write {}: {reason}", .path.display())]
     Output {
         /// The path.

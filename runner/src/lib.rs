@@ -30,6 +30,7 @@ pub mod scene;
 pub mod summary;
 pub mod telemetry;
 pub mod tiles;
+pub mod timings;
 
 pub use config::Config;
 pub use error::RunError;

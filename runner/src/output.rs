@@ -1,43 +1,43 @@
-//! The summary as a file: whole or not at all.
+//! Files that are written when a run is over: each whole or not at all.
 
 use crate::error::RunError;
-use crate::summary::Summary;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A path that JSON is to be written to when the run is over.
+/// A path that is to be written to when the run is over.
 #[derive(Debug)]
-pub struct JsonFile {
+pub struct WholeFile {
     path: PathBuf,
 }
 
-impl JsonFile {
-    /// Makes sure, before anything heavy starts, that the path can be written. Leaves nothing behind.
+impl WholeFile {
+    /// Makes sure, before anything heavy starts, that the path can be written. Leaves nothing behind. `option` is what it
+    /// was given with.
     ///
     /// # Errors
     /// If it cannot.
-    pub fn check(path: &Path) -> Result<Self, RunError> {
+    pub fn check(option: &'static str, path: &Path) -> Result<Self, RunError> {
         let file = Self { path: path.to_owned() };
-        file.probe().map_err(|error| RunError::BadOutput { path: path.to_owned(), reason: error.to_string() })?;
-        Ok(file)
+        match file.probe() {
+            Ok(()) => Ok(file),
+            Err(error) => Err(RunError::BadOutput { option, path: path.to_owned(), reason: error.to_string() }),
+        }
     }
 
-    /// Writes the summary.
+    /// Writes this and nothing else.
     ///
     /// # Errors
     /// If the path can no longer be written.
-    pub fn write(&self, summary: &Summary) -> Result<(), RunError> {
+    pub fn write(&self, content: &[u8]) -> Result<(), RunError> {
         let write = || {
-            let mut text = serde_json::to_vec_pretty(summary)?;
-            text.push(b'\n');
             if self.is_special() {
-                return File::create(&self.path)?.write_all(&text);
+                return File::create(&self.path)?.write_all(content);
             }
             let temporary = self.temporary();
             let written = File::create(&temporary).and_then(|mut file| {
-                file.write_all(&text)?;
+                file.write_all(content)?;
                 file.sync_all()
             });
             let renamed = written.and_then(|()| fs::rename(&temporary, &self.path));

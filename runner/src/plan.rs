@@ -105,6 +105,14 @@ mod tests {
     }
 
     #[test]
+    fn islands_sleep_within_one_tile() {
+        let config = |overrides| Config::from_toml_str("test", ROOMS, overrides).unwrap();
+        let error = Plan::new(&config(&[("sleep", "true"), ("tiles", "2x3")])).unwrap_err();
+        assert!(error.to_string().contains("sleep = true on 6 tiles"), "{error}");
+        assert_eq!(plan(&[("sleep", "true"), ("bodies", "50000")]).tiles, [1, 1]);
+    }
+
+    #[test]
     fn the_hash_leaves_out_how_and_keeps_what() {
         let hash = |overrides: &[(&str, &str)]| {
             let plan = plan(overrides);
@@ -112,8 +120,16 @@ mod tests {
         };
         let usual = hash(&[]);
         assert_eq!(usual.len(), 32);
-        for how in [("ranks", "3"), ("threads", "2"), ("transport", "channel"), ("peer_timeout", "5"), ("tiles", "1x1")]
-        {
+        for how in [
+            ("ranks", "3"),
+            ("threads", "2"),
+            ("transport", "channel"),
+            ("peer_timeout", "5"),
+            ("tiles", "1x1"),
+            ("broad_phase", "quadtree"),
+            ("islands", "dfs"),
+            ("parallel", "coloring"),
+        ] {
             assert_eq!(hash(&[how]), usual, "{how:?}");
         }
         for what in

@@ -2,6 +2,7 @@
 
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::timings::RankTimings;
 use atoll_core::{Facts, Hashes, Phase, StepReport, TileFacts, World};
 use bytemuck::{Pod, Zeroable};
 use serde::{Serialize, Serializer};
@@ -31,6 +32,10 @@ pub struct RankFacts {
     pub islands: u64,
     /// Bodies in the largest of them.
     pub largest_island: u64,
+    /// Bodies whose islands sleep after the last step.
+    pub asleep: u64,
+    /// Colors of the contacts of one tile in the last step, at most.
+    pub colors: u64,
     /// Bytes sent to other ranks by steps.
     pub bytes_sent: u64,
     /// Messages sent to other ranks by steps.
@@ -59,9 +64,18 @@ impl RankFacts {
             ghosts: last.ghosts,
             islands: last.islands,
             largest_island: last.largest_island,
+            asleep: last.asleep,
+            colors: last.colors,
             phase_nanos: Phase::ALL.map(|phase| world.timings().total(phase).as_nanos() as u64),
             ..Self::default()
         }
+    }
+
+    fn timings(&self, rank: usize, threads: usize) -> RankTimings {
+        let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum());
+        let names = Phase::ALL.iter().map(|phase| phase.name());
+        let phases = names.zip(self.phase_nanos).chain([("other", rest)]).collect();
+        RankTimings { rank, threads, steps: self.steps, wall_nanos: self.wall_nanos, phases }
     }
 
     fn hashes(&self) -> Hashes {
@@ -132,6 +146,10 @@ pub struct Summary {
     pub islands: u64,
     /// Bodies in the largest of them.
     pub largest_island: u64,
+    /// Bodies whose islands sleep after the last step.
+    pub asleep: u64,
+    /// Colors of the contacts of one tile in the last step, at most; zero where they are not colored.
+    pub colors: u64,
     /// Bytes sent from rank to rank by steps.
     pub bytes_sent: u64,
     /// Messages sent from rank to rank by steps.
@@ -150,11 +168,18 @@ pub struct Summary {
     pub max_penetration: f64,
     /// Mean over overlapping contact points, in m.
     pub mean_penetration: f64,
+    /// Mean speed at which contact points still came nearer than they may after the last solve, in m/s.
+    pub constraint_violation: f64,
+    /// The greatest, in m/s.
+    pub max_constraint_violation: f64,
     /// Time of each phase; `other` is what no phase accounts for, such as threads out of work.
     #[serde(serialize_with = "as_map")]
     pub phases: Vec<(&'static str, PhaseTime)>,
     /// The most memory held, summed over processes.
     pub peak_rss_bytes: u64,
+    /// The time of each rank, for a file of its own.
+    #[serde(skip)]
+    pub timings: Vec<RankTimings>,
 }
 
 impl Summary {
@@ -165,6 +190,8 @@ impl Summary {
         let facts = Facts::total(tiles);
         let hashes = ranks.iter().map(RankFacts::hashes).fold(Hashes::default(), Hashes::merge);
         let steps = most(|rank| rank.steps);
+        let threads = plan.config.run.threads;
+        let timings: Vec<_> = ranks.iter().enumerate().map(|(rank, facts)| facts.timings(rank, threads)).collect();
         let wall_s = most(|rank| rank.wall_nanos) as f64 * 1e-9;
         let fraction = |part: u64, whole: u64| if whole > 0 { part as f64 / whole as f64 } else { 0.0 };
         Self {
@@ -176,7 +203,7 @@ impl Summary {
             steps,
             interrupted: most(|rank| rank.interrupted) > 0,
             ranks: ranks.len(),
-            threads: plan.config.run.threads,
+            threads,
             tiles: plan.tiles,
             transport: plan.transport.name(),
             build_s: most(|rank| rank.build_nanos) as f64 * 1e-9,
@@ -192,6 +219,8 @@ impl Summary {
             migrations: sum(|rank| rank.migrations),
             islands: sum(|rank| rank.islands),
             largest_island: most(|rank| rank.largest_island),
+            asleep: sum(|rank| rank.asleep),
+            colors: most(|rank| rank.colors),
             bytes_sent: sum(|rank| rank.bytes_sent),
             messages_sent: sum(|rank| rank.messages_sent),
             mass: facts.mass,
@@ -201,24 +230,33 @@ impl Summary {
             momentum: facts.momentum,
             max_penetration: facts.max_penetration,
             mean_penetration: facts.mean_penetration,
-            phases: phases(ranks, steps),
+            constraint_violation: facts.mean_violation,
+            max_constraint_violation: facts.max_violation,
+            phases: phases(&timings),
             peak_rss_bytes: sum(|rank| rank.peak_rss_bytes),
+            timings,
         }
+    }
+
+    /// As JSON, with a line for each key.
+    pub fn to_json(&self) -> Vec<u8> {
+        let mut text = serde_json::to_vec_pretty(self).expect("figures and words, under names");
+        text.push(b'\n');
+        text
     }
 }
 
-/// The phases of the step, and the rest of each rank's time.
-fn phases(ranks: &[RankFacts], steps: u64) -> Vec<(&'static str, PhaseTime)> {
-    let rest = |rank: &RankFacts| rank.wall_nanos.saturating_sub(rank.phase_nanos.iter().sum());
-    let time = |nanos: &dyn Fn(&RankFacts) -> u64| {
-        let per_step = |nanos: u64| nanos as f64 * 1e-6 / steps.max(1) as f64;
-        let total = ranks.iter().map(nanos).sum::<u64>();
-        let most = ranks.iter().map(nanos).max().unwrap_or(0);
-        let slowest_rank = ranks.iter().position(|rank| nanos(rank) == most).unwrap_or(0);
-        PhaseTime { mean_ms: per_step(total) / ranks.len().max(1) as f64, max_rank_ms: per_step(most), slowest_rank }
+/// Each phase over all ranks.
+fn phases(ranks: &[RankTimings]) -> Vec<(&'static str, PhaseTime)> {
+    let names = ranks.first().map_or(&[][..], |rank| &rank.phases);
+    let time = |phase: usize| {
+        let ms = |rank: &RankTimings| rank.mean_ms(rank.phases[phase].1);
+        let most = ranks.iter().map(ms).fold(0.0, f64::max);
+        let slowest_rank = ranks.iter().position(|rank| ms(rank) == most).unwrap_or(0);
+        let mean_ms = ranks.iter().map(ms).sum::<f64>() / ranks.len() as f64;
+        PhaseTime { mean_ms, max_rank_ms: most, slowest_rank }
     };
-    let named = Phase::ALL.iter().enumerate().map(|(i, phase)| (phase.name(), time(&|rank| rank.phase_nanos[i])));
-    named.chain([("other", time(&rest))]).collect()
+    names.iter().enumerate().map(|(i, &(name, _))| (name, time(i))).collect()
 }
 
 fn as_map<S: Serializer>(phases: &[(&'static str, PhaseTime)], serializer: S) -> Result<S::Ok, S::Error> {
@@ -265,7 +303,11 @@ impl Summary {
         row(f, "contacts", format_args!("{} touching, {border:.2} % across tiles", self.contacts))?;
         let (mean, most) = (self.mean_penetration, self.max_penetration);
         row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
-        row(f, "islands", format_args!("{}, the largest of {} bodies", self.islands, self.largest_island))?;
+        let (mean, most) = (self.constraint_violation, self.max_constraint_violation);
+        row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
+        let (islands, largest, colors) = (self.islands, self.largest_island, self.colors);
+        let asleep = if self.asleep > 0 { format!(", {} bodies asleep", self.asleep) } else { String::new() };
+        row(f, "islands", format_args!("{islands}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
         let (half_v2, spin2) = (self.mean_half_v2, self.mean_spin2);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;

@@ -14,7 +14,9 @@ fn files() -> Vec<PathBuf> {
 fn each_runs_a_step_at_a_small_size() {
     for path in files() {
         let config = Config::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        assert!(config.scene.bodies >= 20_000, "{}", path.display());
+        // Large worlds, but for the two that show a handful of boxes.
+        let few = ["stack", "slope"].contains(&config.scene.kind.name());
+        assert_eq!(config.scene.bodies < 20_000, few, "{}", path.display());
         let text = std::fs::read_to_string(&path).unwrap();
         let config = Config::from_toml_str("small", &text, &[("bodies", "300"), ("steps", "1")]).unwrap();
         let summary = atoll::run(&config).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

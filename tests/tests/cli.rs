@@ -12,6 +12,9 @@ const SMALL: &str = "[scene]\nkind = \"rooms\"\nbodies = 400\n\n[run]\nsteps = 5
 /// A world nobody waits for. What is refused with it is refused before anything heavy starts, or runs out of time.
 const ENDLESS: &str = "[scene]\nkind = \"rooms\"\nbodies = 5_000_000\n\n[run]\nsteps = 4_000_000_000\nranks = 2\n";
 
+/// What a scene may be called.
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack" or "slope""#;
+
 /// A folder with one configuration in it.
 struct Desk(TempDir);
 
@@ -123,8 +126,8 @@ fn physics_must_make_sense() {
 
 #[test]
 fn unknown_names_come_with_a_suggestion() {
-    refused("--set scene.kind=room", "--set scene.kind=room: must be \"rooms\" or \"pile\"; did you mean rooms?");
-    refused("--set kind=ocean", "--set scene.kind=ocean: must be \"rooms\" or \"pile\"");
+    refused("--set scene.kind=room", &format!("--set scene.kind=room: must be {KINDS}; did you mean rooms?"));
+    refused("--set kind=ocean", &format!("--set scene.kind=ocean: must be {KINDS}"));
     refused("--set sovler=soft-step", "--set sovler=soft-step: unknown key; did you mean physics.solver?");
     refused("--set physics.substep=3", "--set physics.substep=3: unknown key; did you mean physics.substeps?");
     refused("--set run.bodies=3", "--set run.bodies=3: unknown key; did you mean scene.bodies?");
@@ -138,12 +141,12 @@ fn unknown_names_come_with_a_suggestion() {
 
     file_refused(
         "[scene]\nkind = \"piel\"\n",
-        ": scene.kind = \"piel\": must be \"rooms\" or \"pile\"; did you mean pile?",
+        &format!(": scene.kind = \"piel\": must be {KINDS}; did you mean pile?"),
     );
     file_refused("[scene]\nknid = \"pile\"\n", ": scene.knid = \"pile\": unknown key; did you mean scene.kind?");
     file_refused("[sceen]\nkind = \"pile\"\n", ": unknown section [sceen]; did you mean [scene]?");
     file_refused("kind = \"pile\"\n", ": kind = \"pile\": unknown key; did you mean scene.kind?");
-    file_refused("[run]\nsteps = 5\n", ": scene.kind is missing: must be \"rooms\" or \"pile\"");
+    file_refused("[run]\nsteps = 5\n", &format!(": scene.kind is missing: must be {KINDS}"));
 }
 
 #[test]
@@ -151,6 +154,18 @@ fn values_that_do_not_go_together_are_refused() {
     refused("--transport local --ranks 2", "--transport local: one rank at most, and this run has 2");
     refused("--set jitter=0.1", "--set scene.jitter=0.1: scenes of this kind have no scene.jitter");
     refused("--set kind=pile --set power=2", "--set scene.power=2: scenes of this kind have no scene.power");
+    refused("--set base=5", "--set scene.base=5: scenes of this kind have no scene.base");
+    refused("--set kind=slope --set angle=90", "--set scene.angle=90: must be a number within 0 to 60");
+    let frozen = "--set physics.ghosts=frozen: must be \"dynamic\" with exchange = \"substep\"";
+    refused("--set ghosts=frozen --set exchange=substep", &format!("{frozen}; or use exchange = \"step\""));
+    // Nobody asked for it: the scene does.
+    let by_default = format!("{frozen}, the default of this scene; or use exchange = \"step\"");
+    refused("--set ghosts=frozen --set kind=pile", &by_default);
+    refused(
+        "--set sleep=true --tiles 2x2",
+        "this configuration makes no world: sleep = true on 4 tiles: an island that sleeps must lie in one tile; use \
+         tiles = [1, 1], or sleep = false",
+    );
     refused("--set margin_floor=2", "physics.margin_cap = 0.5 (the default): must be finite and at least margin_floor");
 }
 
@@ -211,6 +226,9 @@ fn a_path_that_cannot_be_written_is_refused_before_anything_heavy() {
     refused("--json no/such/folder/summary.json", "--json no/such/folder/summary.json: ");
     refused("--json .", "--json .: it is a directory");
     refused("--json world.toml/summary.json", "--json world.toml/summary.json: ");
+    refused("--timings no/such/folder/times.csv", "--timings no/such/folder/times.csv: ");
+    refused("--timings .", "--timings .: it is a directory");
+    refused("--json out --timings out", "--timings out: --json writes to the same file");
 }
 
 #[test]
@@ -231,6 +249,42 @@ fn output_that_cannot_be_written_in_the_end_gives_exit_code_5() {
     let ended = run(&mut desk.atoll(["--quiet", "--json", "/dev/full"]));
     assert_eq!((ended.code, ended.complaints().len()), (Some(5), 1), "{ended}");
     assert!(ended.stderr.starts_with("atoll: cannot write /dev/full: "), "{ended}");
+    // The other file is written all the same.
+    let ended = run(&mut desk.atoll(["--quiet", "--timings", "/dev/full", "--json", "summary.json"]));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(5), 1), "{ended}");
+    assert!(ended.stderr.starts_with("atoll: cannot write /dev/full: "), "{ended}");
+    assert_eq!(desk.files(), ["summary.json", "world.toml"]);
+}
+
+/// A header, then for each rank a line per phase and one for the whole step, which they add up to.
+#[test]
+fn timings_tell_where_the_time_of_each_rank_went() {
+    let desk = Desk::new(SMALL);
+    let options = ["--quiet", "--ranks", "2", "--threads", "2", "--timings", "times.csv"];
+    let json = program::run_to_summary(&mut desk.atoll(options), &desk.path().join("summary.json"));
+    let text = fs::read_to_string(desk.path().join("times.csv")).unwrap();
+    assert_eq!(desk.files(), ["summary.json", "times.csv", "world.toml"]);
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("rank,threads,steps,phase,mean_ms,share"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let mut phases: Vec<&str> = json["phases"].as_object().unwrap().keys().map(String::as_str).collect();
+    phases.sort_unstable();
+    for rank in ["0", "1"] {
+        let mine: Vec<_> = rows.iter().filter(|row| row[0] == rank).collect();
+        assert!(mine.iter().all(|row| row.len() == 6 && row[1..3] == ["2", "5"]), "{text}");
+        let (step, parts) = mine.split_last().unwrap();
+        let mut named: Vec<&str> = parts.iter().map(|row| row[3]).collect();
+        named.sort_unstable();
+        assert_eq!((step[3], named), ("step", phases.clone()), "{text}");
+        for column in [4, 5] {
+            let number = |row: &[&str]| row[column].parse::<f64>().unwrap();
+            let sum: f64 = parts.iter().map(|row| number(row)).sum();
+            let whole = number(step);
+            // Rounded to six places each.
+            assert!(whole > 0.0 && (sum - whole).abs() <= 1e-4, "{sum} of {whole} in\n{text}");
+        }
+    }
+    assert_eq!(rows.len(), 2 * (phases.len() + 1), "{text}");
 }
 
 /// What a value must be.
@@ -263,7 +317,7 @@ fn the_summary_has_all_its_keys() {
         };
         value.as_object().is_some_and(|phases| !phases.is_empty() && phases.values().all(times))
     };
-    let keys: [(&str, Holds); 25] = [
+    let keys: [(&str, Holds); 31] = [
         ("bodies", &|value| *value == 400),
         ("steps", &|value| *value == 5),
         ("ranks", &|value| *value == 2),
@@ -288,6 +342,12 @@ fn the_summary_has_all_its_keys() {
         ("momentum", &pair),
         ("max_penetration", &number),
         ("mean_penetration", &number),
+        ("constraint_violation", &number),
+        ("max_constraint_violation", &number),
+        ("islands", &count),
+        ("largest_island", &count),
+        ("asleep", &count),
+        ("colors", &count),
         ("phases", &phases),
     ];
     for (key, holds) in keys {
@@ -451,6 +511,7 @@ fn help_and_version() {
         "--out",
         "--record-every",
         "--json",
+        "--timings",
     ] {
         assert!(help.contains(option), "{option} is not in the help:\n{help}");
     }

@@ -4,23 +4,21 @@
 
 mod error;
 mod keys;
+mod scene;
 mod settings;
 #[cfg(test)]
 mod tests;
 
 pub use error::{ConfigError, OneLine, Origin, Place};
+pub use scene::{SceneConfig, SceneKind};
 pub use settings::Override;
 
-use crate::scene::rooms;
 use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, SetupError, Solver};
-use glam::Vec2;
-use settings::{Settings, one_of};
+use settings::Settings;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-/// More bodies than this are taken for a slip of the finger.
-const MOST_BODIES: u64 = 10_000_000_000;
 /// More tiles along an axis cannot be named in 32 bits for both.
 const MOST_TILES: u32 = 65_535;
 
@@ -33,42 +31,6 @@ pub struct Config {
     pub run: RunConfig,
     /// The numbers of a step.
     pub params: Params,
-}
-
-/// `[scene]`
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct SceneConfig {
-    /// Which scene.
-    pub kind: SceneKind,
-    /// How many dynamic bodies.
-    pub bodies: u64,
-    /// Chooses among the random variants of the scene.
-    pub seed: u64,
-}
-
-/// A scene and what only it has.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum SceneKind {
-    /// The reported experiment.
-    Rooms {
-        /// Relative coordinates are raised to this power: above 1, the low corner is denser.
-        power: f64,
-    },
-    /// A heap between two walls.
-    Pile {
-        /// Greatest shift of a body along x at the start, in meters.
-        jitter: f64,
-    },
-}
-
-impl SceneKind {
-    /// As in a configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rooms { .. } => "rooms",
-            Self::Pile { .. } => "pile",
-        }
-    }
 }
 
 /// `[run]`
@@ -133,7 +95,7 @@ impl Config {
     /// The keys in the order of the documentation.
     fn read(name: &str, text: &str, overrides: &[Override]) -> Result<Self, ConfigError> {
         let mut settings = Settings::new(name, text, overrides)?;
-        let scene = read_scene(&mut settings)?;
+        let scene = SceneConfig::read(&mut settings)?;
         let run = read_run(&mut settings)?;
         let params = read_params(&mut settings, scene.kind)?;
         settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
@@ -146,8 +108,8 @@ impl Config {
         self.run.transport.unwrap_or(suitable)
     }
 
-    /// Everything that the result depends on, in a fixed order: not ranks, threads or transport. `tiles` is the grid
-    /// that is really used.
+    /// Everything that the result depends on, in a fixed order: not ranks, threads or transport, nor the ways of
+    /// computing that change no bit. `tiles` is the grid that is really used.
     pub fn canonical(&self, tiles: [u32; 2]) -> String {
         let SceneConfig { kind, bodies, seed } = self.scene;
         // By name, so that a parameter added later cannot be forgotten here.
@@ -169,13 +131,13 @@ impl Config {
             margin_cap,
             sort_interval,
             exchange,
-            broad_phase,
+            broad_phase: _,
             solver,
             iterations,
             baumgarte,
             linear_slop,
-            island_search,
-            parallel,
+            island_search: _,
+            parallel: _,
             ghosts,
             sleep,
             sleep_speed,
@@ -196,9 +158,8 @@ impl Config {
         line!(speculative_distance = speculative_distance, recycle_distance = recycle_distance);
         line!(restitution_threshold = restitution_threshold);
         line!(margin_floor = margin_floor, margin_cap = margin_cap, sort_interval = sort_interval);
-        line!(exchange = exchange, ghosts = ghosts, broad_phase = broad_phase, solver = solver);
+        line!(exchange = exchange, ghosts = ghosts, solver = solver);
         line!(iterations = iterations, baumgarte = baumgarte, linear_slop = linear_slop);
-        line!(islands = island_search, parallel = parallel);
         line!(sleep = sleep, sleep_speed = sleep_speed, sleep_time = sleep_time);
         text
     }
@@ -207,29 +168,6 @@ impl Config {
     pub fn hash(&self, tiles: [u32; 2]) -> String {
         format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
     }
-}
-
-fn read_scene(settings: &mut Settings) -> Result<SceneConfig, ConfigError> {
-    #[derive(Clone, Copy)]
-    enum Name {
-        Rooms,
-        Pile,
-    }
-    let names = [("rooms", Name::Rooms), ("pile", Name::Pile)];
-    let name = settings.choice("scene.kind", &names)?.ok_or_else(|| settings.missing("scene.kind", one_of(&names)))?;
-    let (kind, least, usual) = match name {
-        Name::Rooms => {
-            let power = settings.number("scene.power", 0.1..=10.0, 1.0)?;
-            (SceneKind::Rooms { power }, rooms::LEAST_BODIES, 700_000)
-        }
-        Name::Pile => {
-            let jitter = settings.number("scene.jitter", 0.0..=0.25, 0.01)?;
-            (SceneKind::Pile { jitter }, 1, 100_000)
-        }
-    };
-    let bodies = settings.integer("scene.bodies", least..=MOST_BODIES, usual)?;
-    let seed = settings.integer("scene.seed", 0..=i64::MAX as u64, 1)?;
-    Ok(SceneConfig { kind, bodies, seed })
 }
 
 fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
@@ -249,13 +187,7 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
 }
 
 fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, ConfigError> {
-    let usual = match scene {
-        SceneKind::Rooms { .. } => Params::default(),
-        // Whatever rests needs its borders to converge.
-        SceneKind::Pile { .. } => {
-            Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() }
-        }
-    };
+    let usual = scene.usual_params();
     let whole = 0..=u64::from(u32::MAX);
     let params = Params {
         dt: 1.0 / settings.float("physics.hertz", 60.0)?,
@@ -322,7 +254,9 @@ fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, Conf
 fn refused_param(settings: &Settings, error: SetupError) -> ConfigError {
     let (name, value, must) = match error {
         SetupError::FrozenSubsteps if settings.place("physics.ghosts").is_some() => {
-            return settings.refusal("physics.ghosts", "\"dynamic\" where exchange = \"substep\"");
+            let default = if settings.place("physics.exchange").is_none() { ", the default of this scene" } else { "" };
+            let must = format!("\"dynamic\" with exchange = \"substep\"{default}; or use exchange = \"step\"");
+            return settings.refusal("physics.ghosts", must);
         }
         SetupError::BadParam { name: "dt", value, must } => ("hertz", 1.0 / value, must),
         SetupError::BadParam { name, value, must } => (name, value, must),

@@ -219,8 +219,11 @@ impl Settings {
 
 /// The words that may be said.
 pub(super) fn one_of<T>(words: &[(&str, T)]) -> String {
-    let words: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
-    words.join(" or ")
+    let quoted: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => quoted.concat(),
+    }
 }
 
 fn value_as_u64(value: &Value) -> Option<u64> {

@@ -1,7 +1,10 @@
 //! What is accepted, and what is said about everything else.
 
 use super::*;
+use glam::Vec2;
 
+/// What a scene may be called.
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack" or "slope""#;
 const ROOMS: &str = "[scene]\nkind = \"rooms\"\n";
 
 fn read(text: &str, overrides: &[(&str, &str)]) -> Result<Config, String> {
@@ -30,6 +33,54 @@ fn the_kind_of_scene_chooses_the_defaults() {
     assert_eq!((pile.params.gravity, pile.params.exchange), (Vec2::new(0.0, -10.0), Exchange::Substep));
     let pile = read("[scene]\nkind = \"pile\"", &[("exchange", "step"), ("gravity", "[1, 2.5]")]).unwrap();
     assert_eq!((pile.params.gravity, pile.params.exchange), (Vec2::new(1.0, 2.5), Exchange::Step));
+
+    for (name, bodies, rests) in [
+        ("pyramids", 22_000, true),
+        ("sparse", 100_000, false),
+        ("single-island", 100_000, true),
+        ("stack", 10, true),
+        ("slope", 1, true),
+    ] {
+        let config = read(&format!("[scene]\nkind = \"{name}\""), &[]).unwrap();
+        assert_eq!((config.scene.kind.name(), config.scene.bodies), (name, bodies));
+        assert_eq!(
+            (config.params.gravity.y < 0.0, config.params.exchange == Exchange::Substep),
+            (rests, rests),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn scenes_have_keys_of_their_own() {
+    let kind =
+        |name: &str, key: (&str, &str)| read(&format!("[scene]\nkind = \"{name}\""), &[key]).map(|c| c.scene.kind);
+    assert_eq!(kind("pyramids", ("base", "3")), Ok(SceneKind::Pyramids { base: 3 }));
+    assert_eq!(kind("slope", ("angle", "31")), Ok(SceneKind::Slope { angle: 31.0, friction: 0.6 }));
+    assert_eq!(kind("slope", ("friction", "0")), Ok(SceneKind::Slope { angle: 25.0, friction: 0.0 }));
+    for (name, key, value, expected) in [
+        ("pyramids", "base", "1", "must be a whole number within 2 to 100"),
+        ("pyramids", "base", "101", "must be a whole number within 2 to 100"),
+        ("slope", "angle", "-1", "must be a number within 0 to 60"),
+        ("slope", "angle", "nan", "must be a number within 0 to 60"),
+        ("slope", "friction", "3", "must be a number within 0 to 2"),
+        ("sparse", "bodies", "99", "must be a whole number within 100 to 10000000000"),
+        ("sparse", "base", "10", "scenes of this kind have no scene.base; leave it out"),
+        ("stack", "friction", "1", "scenes of this kind have no scene.friction; leave it out"),
+    ] {
+        assert_eq!(kind(name, (key, value)).unwrap_err(), format!("--set scene.{key}={value}: {expected}"));
+    }
+}
+
+#[test]
+fn frozen_ghosts_are_heard_of_once_a_step() {
+    let must = "--set physics.ghosts=frozen: must be \"dynamic\" with exchange = \"substep\"";
+    let error = read(ROOMS, &[("ghosts", "frozen"), ("exchange", "substep")]).unwrap_err();
+    assert_eq!(error, format!("{must}; or use exchange = \"step\""));
+    let error = read("[scene]\nkind = \"pile\"", &[("ghosts", "frozen")]).unwrap_err();
+    assert_eq!(error, format!("{must}, the default of this scene; or use exchange = \"step\""));
+    let config = read("[scene]\nkind = \"pile\"", &[("ghosts", "frozen"), ("exchange", "step")]).unwrap();
+    assert_eq!(config.params.ghosts, Ghosts::Frozen);
 }
 
 #[test]
@@ -60,12 +111,18 @@ fn every_key_can_be_given() {
         margin_floor = 0.1
         margin_cap = 0.4
         sort_interval = 16
-        broad_phase = "grid"
-        solver = "soft-step"
+        broad_phase = "quadtree"
+        solver = "pgs"
+        iterations = 20
+        baumgarte = 0.3
+        linear_slop = 0.01
+        islands = "dfs"
         parallel = "serial"
-        exchange = "substep"
-        ghosts = "dynamic"
-        sleep = false
+        exchange = "step"
+        ghosts = "frozen"
+        sleep = true
+        sleep_speed = 0.1
+        sleep_time = 1
     "#;
     let config = read(text, &[]).unwrap();
     assert_eq!(config.scene, SceneConfig { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
@@ -75,10 +132,14 @@ fn every_key_can_be_given() {
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
     assert_eq!((config.params.max_linear_speed, config.params.margin_cap), (f32::INFINITY, 0.4));
     assert_eq!((config.params.sort_interval, config.params.parallel), (16, Parallel::Serial));
+    assert_eq!((config.params.broad_phase, config.params.solver), (BroadPhase::Quadtree, Solver::Pgs));
+    assert_eq!((config.params.iterations, config.params.baumgarte, config.params.linear_slop), (20, 0.3, 0.01));
+    assert_eq!((config.params.island_search, config.params.ghosts), (IslandSearch::Dfs, Ghosts::Frozen));
+    assert_eq!((config.params.sleep, config.params.sleep_speed, config.params.sleep_time), (true, 0.1, 1.0));
 
     let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
-    // The scene's four stand on one line, and the jitter belongs to the other kind.
-    assert_eq!(keys + 4 + 1, keys::KEYS.len(), "a key is missing from this test");
+    // The scene's four stand on one line; jitter, base, angle and friction belong to other kinds.
+    assert_eq!(keys + 4 + 4, keys::KEYS.len(), "a key is missing from this test");
 }
 
 #[test]
@@ -141,14 +202,14 @@ fn unknown_names_come_with_a_suggestion() {
     for (text, expected) in [
         (
             "[scene]\nkind = \"room\"",
-            "test.toml: scene.kind = \"room\": must be \"rooms\" or \"pile\"; did you mean rooms?",
+            &*format!("test.toml: scene.kind = \"room\": must be {KINDS}; did you mean rooms?"),
         ),
-        ("[scene]\nkind = \"sea\"", "test.toml: scene.kind = \"sea\": must be \"rooms\" or \"pile\""),
+        ("[scene]\nkind = \"sea\"", &format!("test.toml: scene.kind = \"sea\": must be {KINDS}")),
         ("[scene]\nknid = \"rooms\"", "test.toml: scene.knid = \"rooms\": unknown key; did you mean scene.kind?"),
         ("[sceen]\nkind = \"rooms\"", "test.toml: unknown section [sceen]; did you mean [scene]?"),
         ("[run]\nsubsteps = 4", "test.toml: run.substeps = 4: unknown key; did you mean physics.substeps?"),
         ("steps = 4", "test.toml: steps = 4: unknown key; did you mean run.steps?"),
-        ("", "test.toml: scene.kind is missing: must be \"rooms\" or \"pile\""),
+        ("", &format!("test.toml: scene.kind is missing: must be {KINDS}")),
         ("[physics.more]\nx = 1\n[scene]\nkind = \"pile\"", "test.toml: physics.more = { x = 1 }: unknown key"),
     ] {
         let error = read(text, &[]).unwrap_err();

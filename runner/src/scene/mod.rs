@@ -5,28 +5,39 @@
 //! nothing depends on tiles, ranks or threads. To add a scene, implement `Layout` in a file of its own and name it in
 //! [`SceneKind`] and [`Scene::new`].
 
+mod lattice;
 mod pile;
+mod pyramids;
 mod random;
 pub(crate) mod rooms;
+mod single_island;
+mod slope;
+pub(crate) mod sparse;
+mod stack;
+mod statics;
 
 pub use random::SplitMix64;
 
 use crate::config::{SceneConfig, SceneKind};
-use atoll_core::{Body, GlobalId, Kind, KindId, Material, Rot, Shape, StaticBody};
-use glam::{DVec2, Vec2};
+use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
+use glam::DVec2;
 
 /// What makes one scene different from another.
 trait Layout: Send + Sync + std::fmt::Debug {
     /// How many dynamic bodies.
     fn bodies(&self) -> u64;
+    /// The table of shapes and materials that bodies refer to.
+    fn kinds(&self) -> Vec<Kind>;
     /// Low and high corner of the domain, in meters.
     fn domain(&self) -> (DVec2, DVec2);
     /// What never moves, with ids from 0.
     fn statics(&self) -> Vec<StaticBody>;
     /// The body of the given index, from 0, which is to be called `id`.
     fn body(&self, index: u64, id: GlobalId, seed: u64) -> Body;
-    /// Low and high corner of the rectangle this body must not leave.
-    fn home(&self, index: u64) -> (DVec2, DVec2);
+    /// Low and high corner of the rectangle this body must not leave: the domain, unless the scene says otherwise.
+    fn home(&self, _index: u64) -> (DVec2, DVec2) {
+        self.domain()
+    }
 }
 
 /// The start of a run.
@@ -43,6 +54,11 @@ impl Scene {
         let layout: Box<dyn Layout> = match config.kind {
             SceneKind::Rooms { power } => Box::new(rooms::Rooms::new(config.bodies, power)),
             SceneKind::Pile { jitter } => Box::new(pile::Pile::new(config.bodies, jitter)),
+            SceneKind::Pyramids { base } => Box::new(pyramids::Pyramids::new(config.bodies, base)),
+            SceneKind::Sparse => Box::new(sparse::Sparse::new(config.bodies)),
+            SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(config.bodies)),
+            SceneKind::Stack => Box::new(stack::Stack::new(config.bodies)),
+            SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(config.bodies, angle, friction)),
         };
         Self { statics: layout.statics(), layout, seed: config.seed }
     }
@@ -52,11 +68,9 @@ impl Scene {
         self.layout.bodies()
     }
 
-    /// The table of shapes and materials that bodies refer to: a box and a circle.
+    /// The table of shapes and materials that bodies refer to.
     pub fn kinds(&self) -> Vec<Kind> {
-        [Shape::rectangle(0.2, 0.2), Shape::circle(0.2)]
-            .map(|shape| Kind { shape, material: Material::default() })
-            .to_vec()
+        self.layout.kinds()
     }
 
     /// What never moves. These have the lowest ids.
@@ -101,53 +115,20 @@ impl Scene {
     }
 }
 
-/// A box or a circle, each with probability 1/2. One draw.
+/// The table of the reported mixture: a box and a circle.
+fn mixture() -> Vec<Kind> {
+    table([Shape::rectangle(0.2, 0.2), Shape::circle(0.2)])
+}
+
+/// A table of shapes of the usual material.
+fn table<const N: usize>(shapes: [Shape; N]) -> Vec<Kind> {
+    shapes.map(|shape| Kind { shape, material: Material::default() }).to_vec()
+}
+
+/// The first or the second row of a table, each with probability 1/2. One draw.
 fn random_kind(random: &mut SplitMix64) -> KindId {
     KindId(u32::from(random.coin()))
 }
 
-/// A static rectangle between two corners.
-fn wall(id: GlobalId, low: DVec2, high: DVec2) -> StaticBody {
-    let half: Vec2 = ((high - low) * 0.5).as_vec2();
-    let kind = Kind { shape: Shape::Box { half }, material: Material::default() };
-    StaticBody { id, position: (low + high) * 0.5, rotation: Rot::IDENTITY, kind }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scene(kind: SceneKind) -> Scene {
-        Scene::new(&SceneConfig { kind, bodies: 500, seed: 3 })
-    }
-
-    #[test]
-    fn ids_follow_the_statics_and_any_body_can_be_made_alone() {
-        for (kind, statics) in [(SceneKind::Rooms { power: 1.2 }, 16), (SceneKind::Pile { jitter: 0.01 }, 3)] {
-            let scene = scene(kind);
-            assert_eq!(scene.first_id(), GlobalId(statics));
-            for (index, body) in (0..).zip(scene.iter()) {
-                assert_eq!(body.id, GlobalId(statics + index));
-                assert_eq!(body, scene.body(index));
-                assert!(!scene.has_escaped(&body));
-            }
-        }
-    }
-
-    #[test]
-    fn the_seed_matters_and_the_same_seed_repeats() {
-        let make = |seed| Scene::new(&SceneConfig { kind: SceneKind::Rooms { power: 1.0 }, bodies: 100, seed });
-        assert!(make(1).iter().eq(make(1).iter()));
-        assert!(!make(1).iter().eq(make(2).iter()));
-    }
-
-    #[test]
-    fn a_body_in_another_room_has_escaped() {
-        let scene = scene(SceneKind::Rooms { power: 1.0 });
-        let mut body = scene.body(0);
-        body.position = scene.body(499).position;
-        assert!(scene.has_escaped(&body));
-        body.position = DVec2::NAN;
-        assert!(scene.has_escaped(&body));
-    }
-}
+mod tests;

@@ -3,18 +3,14 @@
 //! Bodies take two draws each, in this order: kind, shift along x.
 
 use super::random::SplitMix64;
-use super::{Layout, random_kind, wall};
-use atoll_core::{Body, GlobalId, Rot, StaticBody};
+use super::{Layout, mixture, random_kind, statics};
+use atoll_core::{Body, GlobalId, Kind, Rot, StaticBody};
 use glam::{DVec2, Vec2};
 
 /// Between centers at the start, in meters.
 const SPACING: f64 = 0.5;
 /// Center of the first body, in meters.
 const FIRST: DVec2 = DVec2::new(0.5, 0.3);
-/// Thickness of floor and walls, in meters. They stand outside the domain, their faces on its edges.
-const WALL: f64 = 4.0;
-/// The walls rise above the domain by this, in meters.
-const RISE: f64 = 20.0;
 /// Draws of one body.
 const DRAWS: u64 = 2;
 
@@ -39,18 +35,17 @@ impl Layout for Pile {
         self.bodies
     }
 
+    fn kinds(&self) -> Vec<Kind> {
+        mixture()
+    }
+
     fn domain(&self) -> (DVec2, DVec2) {
         (DVec2::ZERO, DVec2::new(SPACING * self.columns as f64 + 0.5, SPACING * self.rows as f64 + 1.0))
     }
 
     fn statics(&self) -> Vec<StaticBody> {
         let (low, high) = self.domain();
-        let top = high.y + RISE;
-        vec![
-            wall(GlobalId(0), low - DVec2::splat(WALL), DVec2::new(high.x + WALL, low.y)),
-            wall(GlobalId(1), DVec2::new(low.x - WALL, low.y), DVec2::new(low.x, top)),
-            wall(GlobalId(2), DVec2::new(high.x, low.y), DVec2::new(high.x + WALL, top)),
-        ]
+        statics::open_box(low, high)
     }
 
     fn body(&self, index: u64, id: GlobalId, seed: u64) -> Body {
@@ -60,10 +55,6 @@ impl Layout for Pile {
         let (column, row) = (index % self.columns, index / self.columns);
         let position = FIRST + DVec2::new(SPACING * column as f64 + shift, SPACING * row as f64);
         Body { id, position, rotation: Rot::IDENTITY, velocity: Vec2::ZERO, angular_velocity: 0.0, kind }
-    }
-
-    fn home(&self, _index: u64) -> (DVec2, DVec2) {
-        self.domain()
     }
 }
 

@@ -3,9 +3,10 @@
 //!
 //! Bodies take four draws each, in this order: kind, velocity along x, velocity along y, angular velocity.
 
+use super::lattice::Lattice;
 use super::random::SplitMix64;
-use super::{Layout, random_kind, wall};
-use atoll_core::{Body, GlobalId, Rot, StaticBody};
+use super::{Layout, mixture, random_kind, statics};
+use atoll_core::{Body, GlobalId, Kind, Rot, StaticBody};
 use glam::{DVec2, Vec2};
 
 /// Side of the square in meters, with this many bodies in it; any other number keeps the density.
@@ -32,8 +33,7 @@ pub(crate) const LEAST_BODIES: u64 = 100;
 #[derive(Debug)]
 pub(super) struct Rooms {
     bodies: u64,
-    /// Bodies along a side of the lattice.
-    lattice: u64,
+    lattice: Lattice,
     /// Side of the square, in meters.
     side: f64,
     power: f64,
@@ -42,9 +42,7 @@ pub(super) struct Rooms {
 impl Rooms {
     pub(super) fn new(bodies: u64, power: f64) -> Self {
         let side = REPORTED.0 * (bodies as f64 / REPORTED.1 as f64).sqrt();
-        let root = bodies.isqrt();
-        let lattice = if root * root < bodies { root + 1 } else { root };
-        Self { bodies, lattice, side, power }
+        Self { bodies, lattice: Lattice::of(bodies), side, power }
     }
 
     fn room_side(&self) -> f64 {
@@ -63,12 +61,6 @@ impl Rooms {
         (DVec2::new(left, bottom), DVec2::new(right, top))
     }
 
-    /// The i-th coordinate of the lattice, in (0, 1).
-    fn relative(&self, i: u64) -> f64 {
-        let r = (i as f64 + 0.5) / self.lattice as f64;
-        if self.power == 1.0 { r } else { libm::pow(r, self.power) }
-    }
-
     /// The room of a relative coordinate, and how far along that room it lies, in [0, 1).
     fn split(r: f64) -> (usize, f64) {
         let scaled = r * ROOMS as f64;
@@ -76,9 +68,10 @@ impl Rooms {
         (k, scaled - k as f64)
     }
 
-    /// Relative coordinates of a body. Along x in the slow index, along y in the fast one.
+    /// Relative coordinates of a body, in (0, 1).
     fn coordinates(&self, body: u64) -> [f64; 2] {
-        [self.relative(body / self.lattice), self.relative(body % self.lattice)]
+        let relative = self.lattice.relative(body);
+        if self.power == 1.0 { relative } else { relative.map(|r| libm::pow(r, self.power)) }
     }
 }
 
@@ -87,23 +80,21 @@ impl Layout for Rooms {
         self.bodies
     }
 
+    fn kinds(&self) -> Vec<Kind> {
+        mixture()
+    }
+
     fn domain(&self) -> (DVec2, DVec2) {
         (LOW, LOW + DVec2::splat(self.side))
     }
 
     fn statics(&self) -> Vec<StaticBody> {
-        let mut walls = Vec::new();
-        for room in 0..ROOMS * ROOMS {
+        let rooms = (0..ROOMS * ROOMS).zip((0..).step_by(4));
+        let walls = rooms.flat_map(|(room, first)| {
             let (low, high) = self.room([room % ROOMS, room / ROOMS]);
-            let left = (low, DVec2::new(low.x + WALL, high.y));
-            let right = (DVec2::new(high.x - WALL, low.y), high);
-            let bottom = (low, DVec2::new(high.x, low.y + WALL));
-            let top = (DVec2::new(low.x, high.y - WALL), high);
-            for (low, high) in [left, right, bottom, top] {
-                walls.push(wall(GlobalId(walls.len() as u64), low, high));
-            }
-        }
-        walls
+            statics::room(first, low, high, WALL)
+        });
+        walls.collect()
     }
 
     fn body(&self, index: u64, id: GlobalId, seed: u64) -> Body {
@@ -127,19 +118,14 @@ impl Layout for Rooms {
 
 #[cfg(test)]
 mod tests {
+    use super::super::statics::rectangle;
     use super::*;
-    use atoll_core::Shape;
-
-    fn rectangle(fixed: &StaticBody) -> (DVec2, DVec2) {
-        let Shape::Box { half } = fixed.kind.shape else { panic!("walls are boxes") };
-        (fixed.position - half.as_dvec2(), fixed.position + half.as_dvec2())
-    }
 
     #[test]
     fn the_reported_size_has_the_reported_domain_and_sixteen_walls() {
         let rooms = Rooms::new(700_000, 1.0);
         assert_eq!(rooms.domain(), (DVec2::splat(-10.0), DVec2::splat(1200.0)));
-        assert_eq!(rooms.lattice, 837);
+        assert_eq!(rooms.lattice.side, 837);
         let walls = rooms.statics();
         assert_eq!(walls.len(), 16);
         assert_eq!(rectangle(&walls[0]), (DVec2::new(-10.0, -10.0), DVec2::new(-8.0, 595.0)));

@@ -44,6 +44,9 @@ fn check(config: &Config) {
     match scene.kind {
         SceneKind::Rooms { power } => assert!(power.is_finite() && power > 0.0),
         SceneKind::Pile { jitter } => assert!(jitter.is_finite() && jitter >= 0.0),
+        SceneKind::Pyramids { base } => assert!(base >= 2),
+        SceneKind::Slope { angle, friction } => assert!((0.0..90.0).contains(&angle) && friction >= 0.0),
+        SceneKind::Sparse | SceneKind::SingleIsland | SceneKind::Stack => {}
     }
     let tiles = run.tiles.unwrap_or([1, 1]);
     assert!(tiles.iter().all(|&count| count >= 1));
