@@ -169,6 +169,12 @@ impl KindRow {
         })
     }
 
+    /// One for a box, zero for a circle.
+    #[inline(always)]
+    pub(crate) fn boxy(&self) -> f32 {
+        if self.radius > 0.0 { 0.0 } else { 1.0 }
+    }
+
     /// Half width and half height of the AABB at a rotation, in meters.
     #[inline(always)]
     pub(crate) fn half_extents(&self, rotation: crate::math::Rot) -> Vec2 {

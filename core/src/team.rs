@@ -21,10 +21,6 @@ impl Team {
         Self { threads: rayon::current_num_threads() }
     }
 
-    pub(crate) fn threads(self) -> usize {
-        self.threads
-    }
-
     pub(crate) fn is_alone(self) -> bool {
         self.threads == 1
     }
@@ -51,13 +47,15 @@ impl Team {
         }
     }
 
-    /// Runs `work` once on every thread, all at the same time.
-    pub(crate) fn all_at_once(self, work: impl Fn() + Sync) {
-        if self.is_alone() {
+    /// Runs `work` once for every thread: on this thread, and on those that come to help. Some may run one after the
+    /// other, if nobody comes.
+    pub(crate) fn together(self, work: impl Fn() + Sync) {
+        rayon::in_place_scope(|scope| {
+            for _ in 1..self.threads {
+                scope.spawn(|_| work());
+            }
             work();
-        } else {
-            rayon::broadcast(|_| work());
-        }
+        });
     }
 }
 

@@ -144,7 +144,7 @@ fn load(tile: &Tile, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9
         (half_x[i], half_y[i]) = (half.x, half.y);
         (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
         // Turning brings no point of a circle nearer.
-        let is_box = if kind.radius > 0.0 { 0.0 } else { 1.0 };
+        let is_box = kind.boxy();
         let sweep = is_box * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
         reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
         boxy[i] = is_box;

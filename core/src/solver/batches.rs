@@ -7,6 +7,7 @@ use super::bodies::{NOT_SOLVED, STATIC};
 use super::lanes::LANES;
 use crate::broad_phase::Pair;
 use crate::params::Parallel;
+use crate::team::Team;
 use std::ops::Range;
 
 /// Contacts in a batch of small islands, at least: enough to fill most lanes, few enough to stay in a core's cache.
@@ -56,6 +57,8 @@ pub(super) struct Batches {
     pub(super) contacts: Vec<u32>,
     /// For each island, named by its lowest node, how many contacts it has, and then its batch.
     of_island: Vec<u32>,
+    /// Whether there is more than one thread to solve a batch.
+    crews: bool,
 }
 
 fn is_node(place: u32) -> bool {
@@ -76,29 +79,35 @@ impl Batches {
         contacts: &[Pair],
         place: &mut [u32],
         roots: &[u32],
+        largest: u64,
         sleeps: Option<&[bool]>,
         parallel: Parallel,
+        team: Team,
     ) {
+        self.crews = !team.is_alone();
         self.all.clear();
         self.contacts.clear();
         if contacts.is_empty() {
             return;
         }
+        // An island that is nearly everything is worth no sorting: the others may as well be solved with it.
+        let (is_large, is_most) = (contacts.len() >= LARGE as usize, 4 * largest >= 3 * roots.len() as u64);
         let together = match parallel {
             Parallel::Serial | Parallel::Coloring => true,
             Parallel::Islands => false,
-            Parallel::Auto => contacts.len() < LARGE as usize,
+            Parallel::Auto => !is_large || is_most,
         };
+        let crew = parallel == Parallel::Coloring || parallel == Parallel::Auto && is_large;
         if together && sleeps.is_none() {
-            self.put_together(contacts.len(), place, roots.len(), parallel);
+            self.put_together(contacts.len(), place, roots.len(), crew);
         } else {
-            self.put_apart(contacts, place, roots, sleeps, parallel, together);
+            self.put_apart(contacts, place, roots, sleeps, parallel, together.then_some(crew));
         }
     }
 
     /// Everything in one batch.
-    fn put_together(&mut self, contacts: usize, place: &mut [u32], nodes: usize, parallel: Parallel) {
-        let mut batch = Batch::new(parallel == Parallel::Coloring);
+    fn put_together(&mut self, contacts: usize, place: &mut [u32], nodes: usize, crew: bool) {
+        let mut batch = Batch::new(self.crews && crew);
         let more = batch.statics - 1;
         if more > 0 {
             place.iter_mut().filter(|place| is_node(**place)).for_each(|place| *place += more);
@@ -116,7 +125,7 @@ impl Batches {
         roots: &[u32],
         sleeps: Option<&[bool]>,
         parallel: Parallel,
-        together: bool,
+        together: Option<bool>,
     ) {
         let island_of = |place: &[u32], [a, b]: Pair| {
             let node = if place[a as usize] == STATIC { place[b as usize] } else { place[a as usize] } - 1;
@@ -180,9 +189,9 @@ impl Batches {
 
     /// Decides which island goes into which batch, from the contacts of each alone: ascending, so that neighbours in
     /// memory stay neighbours.
-    fn choose(&mut self, roots: &[u32], sleeps: Option<&[bool]>, parallel: Parallel, together: bool) {
-        if together {
-            self.all.push(Batch::new(parallel == Parallel::Coloring));
+    fn choose(&mut self, roots: &[u32], sleeps: Option<&[bool]>, parallel: Parallel, together: Option<bool>) {
+        if let Some(crew) = together {
+            self.all.push(Batch::new(self.crews && crew));
         }
         let (mut open, mut filled) = (NO_BATCH, 0);
         for (node, &root) in (0..).zip(roots) {
@@ -192,10 +201,10 @@ impl Batches {
             let weight = self.of_island[node as usize];
             self.of_island[node as usize] = if weight == 0 || sleeps.is_some_and(|sleeps| sleeps[root as usize]) {
                 NO_BATCH
-            } else if together {
+            } else if together.is_some() {
                 0
             } else if parallel == Parallel::Auto && weight >= LARGE {
-                self.all.push(Batch::new(true));
+                self.all.push(Batch::new(self.crews));
                 self.all.len() as u32 - 1
             } else {
                 if open == NO_BATCH || filled >= SMALL {

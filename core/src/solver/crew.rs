@@ -1,59 +1,69 @@
 //! Several threads that solve one batch together, stage by stage.
 //!
-//! A stage is cut into pieces; each member takes the next piece that is left, and none begins a stage before all have
-//! ended the one before. Who takes which piece does not matter: pieces of one stage share nothing.
+//! A stage is cut into pieces; each member takes the next piece that is left, and the stage ends when all its pieces are
+//! done. Nobody waits for a member that has taken none: one that comes late, or whose processor was taken away between
+//! two pieces, finds the stages it missed done. Who takes which piece does not matter: pieces of one stage share nothing.
+//!
+//! Source: stages of claimed blocks, as in the solver of Box2D v3 (E. Catto).
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread;
 
 /// How often a member looks before it lets others have the processor.
-const PATIENCE: u32 = 4000;
+const PATIENCE: u32 = 2000;
 
 /// What the members share.
-#[derive(Debug)]
+#[derive(Default, Debug)]
 pub(super) struct Crew {
-    size: u32,
-    /// The next piece of the stage under way.
-    next: AtomicU32,
-    arrived: AtomicU32,
-    /// Stages that all have ended.
-    stages: AtomicU32,
-    /// A member panicked: the others must not wait for it.
+    /// The stage under way, and in the low half its next piece.
+    state: AtomicU64,
+    /// Pieces of the stage under way that are done.
+    done: AtomicU32,
+    /// A member panicked: the others must not wait for its piece.
     abandoned: AtomicBool,
 }
 
 /// One of a crew, or somebody who works alone.
-#[derive(Clone, Copy)]
-pub(super) struct Member<'a>(Option<&'a Crew>);
+pub(super) struct Member<'a> {
+    crew: Option<&'a Crew>,
+    /// The stage this member comes to next.
+    stage: Cell<u32>,
+}
 
 impl Crew {
-    pub(super) fn new(size: usize) -> Self {
-        Self {
-            size: size as u32,
-            next: AtomicU32::new(0),
-            arrived: AtomicU32::new(0),
-            stages: AtomicU32::new(0),
-            abandoned: AtomicBool::new(false),
-        }
-    }
-
-    /// To be called once by each of as many threads as the crew has members, all at once.
+    /// A member, for one thread.
     pub(super) fn member(&self) -> Member<'_> {
-        Member(Some(self))
+        Member { crew: Some(self), stage: Cell::new(0) }
     }
 
-    /// Waits for the others. What each wrote before is seen by all after: arriving releases it and acquires what those
-    /// before released, and the last to arrive hands all of that on through `stages`.
-    fn wait(&self) {
-        let stage = self.stages.load(Ordering::Relaxed);
-        if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.size {
-            self.next.store(0, Ordering::Relaxed);
-            self.arrived.store(0, Ordering::Relaxed);
-            self.stages.store(stage.wrapping_add(1), Ordering::Release);
-            return;
+    /// The next piece of a stage, for the caller alone. What was done in earlier stages is seen: `state` hands it on.
+    fn claim(&self, stage: u32, pieces: u32) -> Option<u32> {
+        let mut state = self.state.load(Ordering::Acquire);
+        loop {
+            let piece = state as u32;
+            if (state >> 32) as u32 != stage || piece >= pieces {
+                return None;
+            }
+            match self.state.compare_exchange_weak(state, state + 1, Ordering::Acquire, Ordering::Acquire) {
+                Ok(_) => return Some(piece),
+                Err(now) => state = now,
+            }
         }
+    }
+
+    /// Notes that a piece is done. The last one to do so has seen all that the others did, and begins the next stage.
+    fn finish(&self, stage: u32, pieces: u32) {
+        if self.done.fetch_add(1, Ordering::AcqRel) + 1 == pieces {
+            self.done.store(0, Ordering::Relaxed);
+            self.state.store(u64::from(stage.wrapping_add(1)) << 32, Ordering::Release);
+        }
+    }
+
+    /// Waits for pieces that others have taken.
+    fn wait(&self, stage: u32) {
         let mut looks = 0;
-        while self.stages.load(Ordering::Acquire) == stage {
+        while (self.state.load(Ordering::Acquire) >> 32) as u32 == stage {
             assert!(!self.abandoned.load(Ordering::Relaxed), "another thread of this rank panicked");
             looks += 1;
             if looks < PATIENCE { std::hint::spin_loop() } else { thread::yield_now() }
@@ -63,50 +73,60 @@ impl Crew {
 
 impl<'a> Member<'a> {
     /// Somebody without a crew: all pieces in order.
-    pub(super) const ALONE: Self = Self(None);
+    pub(super) fn alone() -> Self {
+        Self { crew: None, stage: Cell::new(0) }
+    }
 
-    /// One stage of so many pieces: those that fall to this member. After the last it waits for the others. Every member
-    /// calls it with the same number, in the same order of stages, and takes all there are.
+    /// One stage of so many pieces, at least one: those that fall to this member. After the last it waits until all are
+    /// done. Every member calls it with the same number, in the same order of stages, and takes all there are.
     ///
     /// An iterator, not a function that is given the work: what is done to a piece must be compiled within the caller,
     /// for the caller's processor (see [`super::lanes`]).
     #[inline(always)]
-    pub(super) fn pieces(self, pieces: u32) -> Pieces<'a> {
-        Pieces { crew: self.0, next: 0, pieces }
+    pub(super) fn pieces(&self, pieces: u32) -> Pieces<'a> {
+        let stage = self.stage.get();
+        self.stage.set(stage.wrapping_add(1));
+        Pieces { crew: self.crew, stage, pieces, next: 0, claimed: false }
     }
 }
 
 /// The pieces of a stage that fall to one member.
 pub(super) struct Pieces<'a> {
     crew: Option<&'a Crew>,
-    next: u32,
+    stage: u32,
     pieces: u32,
+    /// Without a crew, the next piece.
+    next: u32,
+    /// Whether a piece was taken that is not yet reported as done.
+    claimed: bool,
 }
 
 impl Iterator for Pieces<'_> {
     type Item = u32;
     #[inline(always)]
     fn next(&mut self) -> Option<u32> {
-        let piece = match self.crew {
-            None => self.next,
-            Some(crew) => crew.next.fetch_add(1, Ordering::Relaxed),
+        let Some(crew) = self.crew else {
+            let piece = self.next;
+            self.next += 1;
+            return (piece < self.pieces).then_some(piece);
         };
-        if piece < self.pieces {
-            self.next = piece + 1;
-            return Some(piece);
+        if self.claimed {
+            crew.finish(self.stage, self.pieces);
         }
-        if let Some(crew) = self.crew {
-            crew.wait();
+        let piece = crew.claim(self.stage, self.pieces);
+        self.claimed = piece.is_some();
+        if piece.is_none() {
+            crew.wait(self.stage);
         }
-        None
+        piece
     }
 }
 
 impl Drop for Pieces<'_> {
     #[inline(always)]
     fn drop(&mut self) {
-        // Nobody is to wait for a member that panicked.
-        if let Some(crew) = self.crew.filter(|_| thread::panicking()) {
+        // Only a panic leaves a piece undone.
+        if let Some(crew) = self.crew.filter(|_| self.claimed) {
             crew.abandoned.store(true, Ordering::Relaxed);
         }
     }
@@ -115,11 +135,10 @@ impl Drop for Pieces<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicU64;
 
     #[test]
     fn every_piece_is_done_once_and_stages_do_not_overlap() {
-        let crew = Crew::new(3);
+        let crew = Crew::default();
         let done: Vec<AtomicU64> = (0..50).map(|_| AtomicU64::new(0)).collect();
         thread::scope(|scope| {
             for _ in 0..3 {
@@ -130,6 +149,8 @@ mod tests {
                             let before = done[piece as usize].fetch_add(1, Ordering::Relaxed);
                             assert_eq!(before, stage);
                         }
+                        // After a stage, all of it is seen.
+                        assert!(done.iter().all(|count| count.load(Ordering::Relaxed) > stage));
                     }
                 });
             }
@@ -138,19 +159,25 @@ mod tests {
     }
 
     #[test]
+    fn a_member_that_comes_late_finds_all_done() {
+        let crew = Crew::default();
+        let work = || {
+            let member = crew.member();
+            (0..10).map(|_| member.pieces(3).count()).sum::<usize>()
+        };
+        assert_eq!((work(), work()), (30, 0));
+    }
+
+    #[test]
     fn nobody_waits_for_a_member_that_panicked() {
-        let crew = Crew::new(2);
-        let ends = thread::scope(|scope| {
-            let run = || {
-                let member = crew.member();
-                assert!(member.pieces(2).count() <= 2);
-                for _ in member.pieces(1) {
-                    std::panic::resume_unwind(Box::new("on purpose"));
-                }
-            };
-            let threads = [scope.spawn(run), scope.spawn(run)];
-            threads.map(|thread| thread.join().is_err())
-        });
+        let crew = Crew::default();
+        let run = || {
+            let member = crew.member();
+            for _ in member.pieces(1) {
+                std::panic::resume_unwind(Box::new("on purpose"));
+            }
+        };
+        let ends = thread::scope(|scope| [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().is_err()));
         assert_eq!(ends, [true, true]);
     }
 }

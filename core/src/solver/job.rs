@@ -70,7 +70,7 @@ impl<'a> Job<'a> {
     /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
     /// member: meeting costs more than they do.
     #[inline(always)]
-    pub(super) fn each_color<V: Lanes>(&self, member: Member<'a>, pass: impl Pass) {
+    pub(super) fn each_color<V: Lanes>(&self, member: &Member<'a>, pass: impl Pass) {
         let mut colors = self.colors;
         while let Some(first) = colors.first() {
             let small = colors.iter().take_while(|color| color.slices == 1).count();
@@ -104,7 +104,7 @@ impl<'a> Job<'a> {
 
     /// The bodies that fall to a member of the crew in one stage, range by range.
     #[inline(always)]
-    fn bodies(&self, member: Member<'a>) -> impl Iterator<Item = Range<usize>> {
+    fn bodies(&self, member: &Member<'a>) -> impl Iterator<Item = Range<usize>> {
         let bodies = self.velocity.len();
         member.pieces(bodies.div_ceil(BODIES_PER_PIECE) as u32).map(move |piece| {
             let first = piece as usize * BODIES_PER_PIECE;
@@ -115,7 +115,7 @@ impl<'a> Job<'a> {
     /// What moves bodies but contacts; then last substep's impulses once more, unless this is the first, and what ghosts
     /// are given.
     #[inline(always)]
-    pub(super) fn integrate_velocities<V: Lanes>(&self, member: Member<'a>, motion: &Motion, first: bool) {
+    pub(super) fn integrate_velocities<V: Lanes>(&self, member: &Member<'a>, motion: &Motion, first: bool) {
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocities, starts) = unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
@@ -160,7 +160,7 @@ impl<'a> Job<'a> {
 
     /// Moves bodies by their velocities.
     #[inline(always)]
-    pub(super) fn integrate_positions<V: Lanes>(&self, member: Member<'a>, h: f32) {
+    pub(super) fn integrate_positions<V: Lanes>(&self, member: &Member<'a>, h: f32) {
         let (h, one) = (V::splat(h), V::splat(1.0));
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
@@ -193,8 +193,8 @@ impl Kernel for Run<'_> {
         let Self { job, member, substeps, setup } = self;
         for substep in substeps {
             match setup.params.solver {
-                Solver::SoftStep => soft_step::substep::<V>(job, member, substep, setup),
-                Solver::Pgs => pgs::step::<V>(job, member, setup),
+                Solver::SoftStep => soft_step::substep::<V>(job, &member, substep, setup),
+                Solver::Pgs => pgs::step::<V>(job, &member, setup),
             }
         }
     }

@@ -67,9 +67,9 @@ impl Solver {
     }
 
     /// Puts the islands into batches, leaves those out that sleep (see [`crate::sleep`]), and takes their bodies in.
-    pub(crate) fn gather(&mut self, tile: &mut Tile, contacts: &[Pair], roots: &[u32], setup: &Setup) {
+    pub(crate) fn gather(&mut self, tile: &mut Tile, contacts: &[Pair], roots: &[u32], setup: &Setup, team: Team) {
         let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
-        self.batches.divide(contacts, self.bodies.places_mut(), roots, sleeps, setup.params.parallel);
+        self.batches.divide(contacts, self.bodies.places_mut(), roots, sleeps, setup.params.parallel, team);
         self.bodies.load(tile, &self.batches, setup);
     }
 
@@ -91,15 +91,15 @@ impl Solver {
     /// Makes some substeps of all batches.
     pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
         let alone =
-            |job: Job<'_>| dispatch(Run { job: &job, member: Member::ALONE, substeps: substeps.clone(), setup });
+            |job: Job<'_>| dispatch(Run { job: &job, member: Member::alone(), substeps: substeps.clone(), setup });
         // Nothing to share: no list of jobs.
         if team.is_alone() || setup.params.parallel == Parallel::Serial {
             return self.jobs().for_each(alone);
         }
         let (large, small): (Vec<_>, Vec<_>) = self.jobs().partition(|job| job.large);
         for job in &large {
-            let crew = Crew::new(team.threads());
-            team.all_at_once(|| dispatch(Run { job, member: crew.member(), substeps: substeps.clone(), setup }));
+            let crew = Crew::default();
+            team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps.clone(), setup }));
         }
         team.for_each(small, alone);
     }

@@ -21,7 +21,7 @@ use crate::setup::Setup;
 
 /// The whole step of a batch.
 #[inline(always)]
-pub(super) fn step<'a, V: Lanes>(job: &Job<'a>, member: Member<'a>, setup: &Setup) {
+pub(super) fn step<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, setup: &Setup) {
     job.integrate_velocities::<V>(member, &Motion::new(setup), true);
     job.each_color::<V>(member, WarmStart);
     for _ in 0..setup.params.iterations {

@@ -3,12 +3,12 @@
 use super::batches::{Batch, Batches};
 use super::bodies::{STATIC, SolverBodies};
 use super::groups::{Bounce, Group, Groups, NO_CONTACT};
-use super::lanes::LANES;
+use super::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
+use crate::broad_phase::Pair;
 use crate::contact::Contact;
-use crate::math::{cross, dot, max, right_perp, turn};
+use crate::math::{dot, max, turn};
 use crate::narrow_phase::Contacts;
 use crate::setup::Setup;
-use crate::shape::{KindRow, Shape};
 use crate::team::Team;
 use crate::tile::Tile;
 use glam::Vec2;
@@ -33,26 +33,184 @@ struct Unit<'a> {
     slice: u32,
 }
 
-impl Unit<'_> {
-    fn write(self, source: Source<'_>) {
-        write_groups(self.singles, self.in_singles, source, self.base, self.slice);
-        write_groups(self.doubles, self.in_doubles, source, self.base, self.slice);
+/// Writes the rows of a unit.
+struct Write<'a> {
+    unit: Unit<'a>,
+    source: Source<'a>,
+}
+
+impl Kernel for Write<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { unit, source } = self;
+        let local = Local { base: unit.base, slice: unit.slice };
+        for (group, members) in unit.singles.iter_mut().zip(unit.in_singles) {
+            write::<V, 1>(group, &Inputs::collect(members, source, local));
+        }
+        for (group, members) in unit.doubles.iter_mut().zip(unit.in_doubles) {
+            write::<V, 2>(group, &Inputs::collect(members, source, local));
+        }
     }
 }
 
-fn write_groups<const N: usize>(
-    groups: &mut [Group<N>],
-    members: &[[u32; LANES]],
-    source: Source<'_>,
+/// How a place among the solver's bodies becomes one in a batch.
+#[derive(Clone, Copy)]
+struct Local {
     base: u32,
     slice: u32,
-) {
-    for (group, members) in groups.iter_mut().zip(members) {
-        *group = Group::EMPTY;
-        for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
-            let local = |place: u32| if place == STATIC { slice } else { place - base };
-            Constraint::new(source, contact as usize).write(group, lane, local);
+}
+
+impl Local {
+    #[inline(always)]
+    fn place(self, place: u32) -> u32 {
+        if place == STATIC { self.slice } else { place - self.base }
+    }
+}
+
+/// What the rows of eight contacts follow from; all zero in a lane without one.
+struct Inputs {
+    a: [u32; LANES],
+    b: [u32; LANES],
+    /// The contacts, four numbers at a time (see [`Contact`]): normal, offset; rotations; two points.
+    contact: [[Quad; LANES]; QUADS],
+    separation: [Row; 2],
+    /// Roots of the masses of both bodies, as the solver has them.
+    weight_a: [Quad; LANES],
+    weight_b: [Quad; LANES],
+    friction_a: Row,
+    friction_b: Row,
+    /// One for a box, zero for a circle.
+    boxy_a: Row,
+    boxy_b: Row,
+}
+
+/// A contact in fours.
+const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
+
+impl Inputs {
+    #[inline(always)]
+    fn collect(members: &[u32; LANES], source: Source<'_>, local: Local) -> Self {
+        const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
+        const ZERO: Row = [0.0; LANES];
+        let mut inputs = Self {
+            a: [0; LANES],
+            b: [0; LANES],
+            contact: [NONE; QUADS],
+            separation: [ZERO; 2],
+            weight_a: NONE,
+            weight_b: NONE,
+            friction_a: ZERO,
+            friction_b: ZERO,
+            boxy_a: ZERO,
+            boxy_b: ZERO,
+        };
+        let Source { tile, contacts, bodies, setup } = source;
+        for lane in 0..LANES {
+            if members[lane] == NO_CONTACT {
+                continue;
+            }
+            let contact = members[lane] as usize;
+            let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
+            for k in 0..QUADS {
+                inputs.contact[k][lane] = quads[k];
+            }
+            let separation = contacts.separation[contact];
+            (inputs.separation[0][lane], inputs.separation[1][lane]) = (separation[0], separation[1]);
+            let [a, b] = contacts.bodies[contact];
+            let (place_a, place_b) = (bodies.place_of(a), bodies.place_of(b));
+            (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
+            inputs.weight_a[lane] = bodies.weight[place_a as usize];
+            inputs.weight_b[lane] = bodies.weight[place_b as usize];
+            let kind_a = setup.kind(tile.bodies.kind[a as usize]);
+            let kind_b = setup.kind(tile.bodies.kind[b as usize]);
+            inputs.friction_a[lane] = kind_a.material.friction;
+            inputs.friction_b[lane] = kind_b.material.friction;
+            inputs.boxy_a[lane] = kind_a.boxy();
+            inputs.boxy_b[lane] = kind_b.boxy();
         }
+        inputs
+    }
+}
+
+/// A vector in every lane.
+#[derive(Clone, Copy)]
+struct Vectors<V> {
+    x: V,
+    y: V,
+}
+
+impl<V: Lanes> Vectors<V> {
+    #[inline(always)]
+    fn scaled(self, by: V) -> Self {
+        Self { x: self.x.mul(by), y: self.y.mul(by) }
+    }
+
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        Self { x: self.x.sub(other.x), y: self.y.sub(other.y) }
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> V {
+        self.x.mul(other.x).add(self.y.mul(other.y))
+    }
+
+    #[inline(always)]
+    fn cross(self, other: Self) -> V {
+        self.x.mul(other.y).sub(self.y.mul(other.x))
+    }
+}
+
+#[inline(always)]
+fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let [normal_x, normal_y, offset_x, offset_y] = V::load_quads(&inputs.contact[0]);
+    let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
+    let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
+    let (boxy_a, boxy_b) = (V::load(&inputs.boxy_a), V::load(&inputs.boxy_b));
+    let normal = Vectors { x: normal_x, y: normal_y };
+    let tangent = Vectors { x: normal_y, y: normal_x.mul(V::splat(-1.0)) };
+    let offset = Vectors { x: offset_x, y: offset_y };
+    let (on_a, on_b) = (normal.scaled(root_mass_a), normal.scaled(root_mass_b));
+    group.a = inputs.a;
+    group.b = inputs.b;
+    on_a.x.store(&mut group.normal_ax);
+    on_a.y.store(&mut group.normal_ay);
+    on_b.x.store(&mut group.normal_bx);
+    on_b.y.store(&mut group.normal_by);
+    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut group.friction);
+    // The roots of a static's inverse masses are zero.
+    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut group.fixed);
+    let linear = on_a.dot(on_a).add(on_b.dot(on_b));
+    // Where there is no contact nothing may come of it, not even the inverse of zero.
+    let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
+    let [x0, y0, _, normal0] = V::load_quads(&inputs.contact[2]);
+    let [tangent0, _, x1, y1] = V::load_quads(&inputs.contact[3]);
+    let [_, normal1, tangent1, _] = V::load_quads(&inputs.contact[4]);
+    let points = [(x0, y0, normal0, tangent0), (x1, y1, normal1, tangent1)];
+    for (k, rows) in group.points.iter_mut().enumerate() {
+        let (x, y, normal_impulse, tangent_impulse) = points[k];
+        let arm_a = Vectors { x, y };
+        let arm_b = arm_a.minus(offset);
+        // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
+        let normal_a = boxy_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
+        let normal_b = boxy_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
+        let (tangent_a, tangent_b) = (root_a.mul(arm_a.cross(tangent)), root_b.mul(arm_b.cross(tangent)));
+        normal_a.store(&mut rows.normal_a);
+        normal_b.store(&mut rows.normal_b);
+        tangent_a.store(&mut rows.tangent_a);
+        tangent_b.store(&mut rows.tangent_b);
+        boxy_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
+        boxy_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
+        inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b))).store(&mut rows.normal_mass);
+        inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b))).store(&mut rows.tangent_mass);
+        rows.first_separation = inputs.separation[k];
+        rows.separation = inputs.separation[k];
+        normal_impulse.store(&mut rows.normal_impulse);
+        tangent_impulse.store(&mut rows.tangent_impulse);
+        zero.store(&mut rows.total_normal);
+        zero.store(&mut rows.total_tangent);
     }
 }
 
@@ -81,10 +239,10 @@ impl Groups {
                 .flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
         });
         if team.is_alone() {
-            each.for_each(|(batch, color, slice)| next(batch, color, slice).write(source));
+            each.for_each(|(batch, color, slice)| dispatch(Write { unit: next(batch, color, slice), source }));
         } else {
             let units = each.map(|(batch, color, slice)| next(batch, color, slice)).collect();
-            team.for_each(units, |unit: Unit<'_>| unit.write(source));
+            team.for_each(units, |unit| dispatch(Write { unit, source }));
         }
     }
 
@@ -92,12 +250,13 @@ impl Groups {
     pub(super) fn find_bounces(&mut self, source: Source<'_>) {
         self.bounces.clear();
         for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
-            let constraint = Constraint::new(source, i);
-            let [a, b] = constraint.kinds;
-            let restitution = max(a.material.restitution, b.material.restitution);
+            let sides = source.contacts.bodies[i];
+            let [a, b] =
+                sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);
+            let restitution = max(a, b);
             if restitution > 0.0 && self.is_solved(i as u32) {
                 for point in 0..contact.point_count() {
-                    let closing = constraint.closing_speed(source.tile, point);
+                    let closing = closing_speed(source.tile, sides, contact, point);
                     if closing > source.setup.params.restitution_threshold {
                         let (contact, point) = (i as u32, point as u32);
                         self.bounces.push(Bounce { contact, point, speed: restitution * closing });
@@ -108,78 +267,12 @@ impl Groups {
     }
 }
 
-/// Everything about one contact that its lane needs.
-struct Constraint<'a> {
-    contact: &'a Contact,
-    separation: [f32; 2],
-    bodies: [usize; 2],
-    /// Places among the solver's bodies.
-    places: [u32; 2],
-    kinds: [&'a KindRow; 2],
-    /// What the roots of their inverse masses are multiplied by: one, but for frozen ghosts.
-    scale: [f32; 2],
-}
-
-impl<'a> Constraint<'a> {
-    #[inline(always)]
-    fn new(source: Source<'a>, contact: usize) -> Self {
-        let Source { tile, contacts, bodies, setup } = source;
-        let [a, b] = contacts.bodies[contact];
-        Self {
-            contact: &contacts.cache.contacts[contact],
-            separation: contacts.separation[contact],
-            bodies: [a as usize, b as usize],
-            places: [bodies.place_of(a), bodies.place_of(b)],
-            kinds: [a, b].map(|body| setup.kind(tile.bodies.kind[body as usize])),
-            scale: [a, b].map(|body| 1.0 / bodies.weight_scale(tile, body)),
-        }
-    }
-
-    #[inline(always)]
-    fn write<const N: usize>(&self, group: &mut Group<N>, lane: usize, local: impl Fn(u32) -> u32) {
-        let [a, b] = self.kinds;
-        let normal = self.contact.normal;
-        let tangent = right_perp(normal);
-        group.a[lane] = local(self.places[0]);
-        group.b[lane] = local(self.places[1]);
-        let (on_a, on_b) = (normal * (a.root_inv_mass * self.scale[0]), normal * (b.root_inv_mass * self.scale[1]));
-        (group.normal_ax[lane], group.normal_ay[lane]) = (on_a.x, on_a.y);
-        (group.normal_bx[lane], group.normal_by[lane]) = (on_b.x, on_b.y);
-        group.friction[lane] = (a.material.friction * b.material.friction).sqrt();
-        group.fixed[lane] = if a.inv_mass == 0.0 || b.inv_mass == 0.0 { 1.0 } else { 0.0 };
-        let linear = dot(on_a, on_a) + dot(on_b, on_b);
-        for (k, rows) in group.points.iter_mut().enumerate() {
-            let point = &self.contact.points[k];
-            let (arm_a, arm_b) = (point.anchor, point.anchor - self.contact.offset);
-            let root_a = a.root_inv_inertia * self.scale[0];
-            let root_b = b.root_inv_inertia * self.scale[1];
-            // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
-            let is_circle = |kind: &KindRow| matches!(kind.shape, Shape::Circle { .. });
-            let flat = |kind: &KindRow, value: f32| if is_circle(kind) { 0.0 } else { value };
-            let (normal_a, normal_b) = (flat(a, root_a * cross(arm_a, normal)), flat(b, root_b * cross(arm_b, normal)));
-            let (tangent_a, tangent_b) = (root_a * cross(arm_a, tangent), root_b * cross(arm_b, tangent));
-            rows.normal_a[lane] = normal_a;
-            rows.normal_b[lane] = normal_b;
-            rows.tangent_a[lane] = tangent_a;
-            rows.tangent_b[lane] = tangent_b;
-            rows.depth_a[lane] = flat(a, dot(arm_a, normal));
-            rows.depth_b[lane] = flat(b, dot(arm_b, normal));
-            rows.normal_mass[lane] = 1.0 / (linear + normal_a * normal_a + normal_b * normal_b);
-            rows.tangent_mass[lane] = 1.0 / (linear + tangent_a * tangent_a + tangent_b * tangent_b);
-            rows.first_separation[lane] = self.separation[k];
-            rows.separation[lane] = self.separation[k];
-            rows.normal_impulse[lane] = point.normal_impulse;
-            rows.tangent_impulse[lane] = point.tangent_impulse;
-        }
-    }
-
-    /// Speed at which a point's surfaces come nearer, in m/s.
-    fn closing_speed(&self, tile: &Tile, point: usize) -> f32 {
-        let anchor = self.contact.points[point].anchor;
-        let velocity = |side: usize, arm: Vec2| {
-            let i = self.bodies[side];
-            tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
-        };
-        -dot(velocity(1, anchor - self.contact.offset) - velocity(0, anchor), self.contact.normal)
-    }
+/// Speed at which a point's surfaces come nearer, in m/s.
+fn closing_speed(tile: &Tile, [a, b]: Pair, contact: &Contact, point: usize) -> f32 {
+    let anchor = contact.points[point].anchor;
+    let velocity = |body: u32, arm: Vec2| {
+        let i = body as usize;
+        tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
+    };
+    -dot(velocity(b, anchor - contact.offset) - velocity(a, anchor), contact.normal)
 }

@@ -15,7 +15,7 @@ use crate::setup::Setup;
 
 /// One substep of a batch.
 #[inline(always)]
-pub(super) fn substep<'a, V: Lanes>(job: &Job<'a>, member: Member<'a>, substep: u32, setup: &Setup) {
+pub(super) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep: u32, setup: &Setup) {
     job.integrate_velocities::<V>(member, &Motion::new(setup), substep == 0);
     if substep == 0 {
         job.each_color::<V>(member, WarmStart);
