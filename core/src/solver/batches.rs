@@ -49,6 +49,18 @@ impl Batch {
     }
 }
 
+/// The contacts of a tile and their islands.
+#[derive(Clone, Copy)]
+pub(super) struct Graph<'a> {
+    pub(super) contacts: &'a [Pair],
+    /// For each node, a body with contacts, the lowest of its island.
+    pub(super) roots: &'a [u32],
+    /// Nodes in the largest island.
+    pub(super) largest: u64,
+    /// For each root whether its island sleeps. None where nobody may.
+    pub(super) sleeps: Option<&'a [bool]>,
+}
+
 /// How a tile's contacts are put into batches.
 #[derive(Default, Debug)]
 pub(super) struct Batches {
@@ -69,21 +81,10 @@ fn is_node(place: u32) -> bool {
 const NO_BATCH: u32 = u32::MAX;
 
 impl Batches {
-    /// Puts islands into batches. `place` gives for each body of the tile its node plus one, [`STATIC`] or
-    /// [`NOT_SOLVED`]; `roots` for each node the lowest of its island. Islands whose root `sleeps` are left out; nobody
-    /// sleeps where there is no such list.
-    ///
-    /// Writes the places of the bodies among the solver's to `place`.
-    pub(super) fn divide(
-        &mut self,
-        contacts: &[Pair],
-        place: &mut [u32],
-        roots: &[u32],
-        largest: u64,
-        sleeps: Option<&[bool]>,
-        parallel: Parallel,
-        team: Team,
-    ) {
+    /// Puts islands into batches, but those that sleep. `place` gives for each body of the tile its node plus one,
+    /// [`STATIC`] or [`NOT_SOLVED`]; afterwards, its place among the solver's bodies.
+    pub(super) fn divide(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, team: Team) {
+        let Graph { contacts, roots, largest, sleeps } = graph;
         self.crews = !team.is_alone();
         self.all.clear();
         self.contacts.clear();
@@ -101,7 +102,7 @@ impl Batches {
         if together && sleeps.is_none() {
             self.put_together(contacts.len(), place, roots.len(), crew);
         } else {
-            self.put_apart(contacts, place, roots, sleeps, parallel, together.then_some(crew));
+            self.put_apart(graph, place, parallel, together.then_some(crew));
         }
     }
 
@@ -118,15 +119,9 @@ impl Batches {
         self.all.push(batch);
     }
 
-    fn put_apart(
-        &mut self,
-        contacts: &[Pair],
-        place: &mut [u32],
-        roots: &[u32],
-        sleeps: Option<&[bool]>,
-        parallel: Parallel,
-        together: Option<bool>,
-    ) {
+    /// Islands into the batches that [`choose`](Self::choose) has them in.
+    fn put_apart(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, together: Option<bool>) {
+        let Graph { contacts, roots, sleeps, .. } = graph;
         let island_of = |place: &[u32], [a, b]: Pair| {
             let node = if place[a as usize] == STATIC { place[b as usize] } else { place[a as usize] } - 1;
             roots[node as usize]

@@ -41,7 +41,7 @@ use crate::params::Parallel;
 use crate::setup::Setup;
 use crate::team::Team;
 use crate::tile::Tile;
-use batches::Batches;
+use batches::{Batches, Graph};
 use coloring::Coloring;
 use crew::{Crew, Member};
 use groups::Groups;
@@ -67,9 +67,18 @@ impl Solver {
     }
 
     /// Puts the islands into batches, leaves those out that sleep (see [`crate::sleep`]), and takes their bodies in.
-    pub(crate) fn gather(&mut self, tile: &mut Tile, contacts: &[Pair], roots: &[u32], setup: &Setup, team: Team) {
+    /// `roots` gives for each node the lowest of its island, `largest` how many nodes the largest island has.
+    pub(crate) fn gather(
+        &mut self,
+        tile: &mut Tile,
+        contacts: &[Pair],
+        (roots, largest): (&[u32], u64),
+        setup: &Setup,
+        team: Team,
+    ) {
         let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
-        self.batches.divide(contacts, self.bodies.places_mut(), roots, sleeps, setup.params.parallel, team);
+        let graph = Graph { contacts, roots, largest, sleeps };
+        self.batches.divide(graph, self.bodies.places_mut(), setup.params.parallel, team);
         self.bodies.load(tile, &self.batches, setup);
     }
 
