@@ -82,6 +82,7 @@ impl Proxies {
         });
         team.for_each(parts.collect(), |(range, part)| load(tile, setup, range, part));
         self.owned = tile.owned;
+        self.dynamic = tile.owned + tile.ghosts();
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.dt = setup.params.dt;
     }
