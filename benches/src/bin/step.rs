@@ -21,7 +21,7 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), String> {
     let [repeats, bodies, steps] = arguments(["REPEATS", "BODIES", "STEPS"], [3, 700_000, 200])?;
-    let runs = (0..repeats).map(|_| normal(bodies, steps)).collect::<Result<Vec<_>, _>>()?;
+    let runs = (0..repeats).map(|_| normal(bodies, "auto", steps)).collect::<Result<Vec<_>, _>>()?;
     let first = &runs[0];
     if runs.iter().any(|run| run.state_hash != first.state_hash) {
         return Err("two repeats of one run differ".to_owned());

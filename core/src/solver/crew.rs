@@ -173,9 +173,7 @@ mod tests {
         let crew = Crew::default();
         let run = || {
             let member = crew.member();
-            for _ in member.pieces(1) {
-                std::panic::resume_unwind(Box::new("on purpose"));
-            }
+            member.pieces(1).for_each(|_| std::panic::resume_unwind(Box::new("on purpose")));
         };
         let ends = thread::scope(|scope| [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().is_err()));
         assert_eq!(ends, [true, true]);

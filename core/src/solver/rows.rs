@@ -106,14 +106,11 @@ impl Inputs {
             boxy_b: ZERO,
         };
         let Source { tile, contacts, bodies, setup } = source;
-        for lane in 0..LANES {
-            if members[lane] == NO_CONTACT {
-                continue;
-            }
-            let contact = members[lane] as usize;
+        for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
+            let contact = contact as usize;
             let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
-            for k in 0..QUADS {
-                inputs.contact[k][lane] = quads[k];
+            for (lanes, &quad) in inputs.contact.iter_mut().zip(quads) {
+                lanes[lane] = quad;
             }
             let separation = contacts.separation[contact];
             (inputs.separation[0][lane], inputs.separation[1][lane]) = (separation[0], separation[1]);
