@@ -85,6 +85,7 @@ mod team;
 #[cfg(test)]
 mod testing;
 mod tile;
+mod violation;
 mod world;
 
 pub use body::{Bodies, Body, StaticBody};

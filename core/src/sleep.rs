@@ -7,7 +7,7 @@
 //! are found anew each step, so nothing has to be kept in order.
 
 use crate::setup::Setup;
-use crate::solver::NOT_SOLVED;
+use crate::solver::place::NOT_SOLVED;
 use glam::Vec2;
 
 /// Who rests since when. Empty where nobody may sleep.

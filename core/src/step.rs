@@ -128,7 +128,8 @@ fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H
 /// Broad phase, narrow phase.
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
-        b.work.proxies.load(b.tile, b.setup, b.team);
+        let (tile, counts) = (&b.tile, [b.tile.owned, b.tile.ghosts()]);
+        b.work.proxies.load(&tile.bodies, counts, tile.corner, b.setup, b.team);
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
         }

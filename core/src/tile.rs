@@ -10,7 +10,7 @@ use crate::params::BroadPhase;
 use crate::partition::Region;
 use crate::setup::Setup;
 use crate::sleep::Sleep;
-use crate::solver::Violation;
+use crate::violation::Violation;
 use glam::DVec2;
 
 /// The unit of physics: one step of a tile is a function of its state and of the messages it received.

@@ -11,11 +11,11 @@ mod search;
 #[cfg(test)]
 mod tests;
 
+use crate::body::Bodies;
 use crate::math::{self, dot};
 use crate::setup::Setup;
 use crate::team::Team;
-use crate::tile::Tile;
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use std::ops::Range;
 
 /// Bodies in a piece of work, at least.
@@ -56,9 +56,17 @@ impl Proxies {
         self.x.len()
     }
 
-    /// Fills in the proxies of a tile's bodies.
-    pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup, team: Team) {
-        let total = tile.bodies.len();
+    /// Fills in the proxies of a tile's bodies, of which so many are owned and so many more ghosts. Local coordinates
+    /// count from its `corner`.
+    pub(crate) fn load(
+        &mut self,
+        bodies: &Bodies,
+        [owned, ghosts]: [usize; 2],
+        corner: DVec2,
+        setup: &Setup,
+        team: Team,
+    ) {
+        let (total, dynamic) = (bodies.len(), owned + ghosts);
         let columns = [
             &mut self.x,
             &mut self.y,
@@ -80,9 +88,8 @@ impl Proxies {
             let part = rest.each_mut().map(|column| column.split_off_mut(..range.len()).expect("as many are left"));
             (range, part)
         });
-        team.for_each(parts.collect(), |(range, part)| load(tile, setup, range, part));
-        self.owned = tile.owned;
-        self.dynamic = tile.owned + tile.ghosts();
+        team.for_each(parts.collect(), |(range, part)| load(bodies, dynamic, corner, setup, range, part));
+        (self.owned, self.dynamic) = (owned, dynamic);
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.dt = setup.params.dt;
     }
@@ -125,9 +132,8 @@ impl Proxies {
 }
 
 /// Fills in the proxies of some bodies: the columns of [`Proxies`], in their order.
-fn load(tile: &Tile, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9]) {
-    let (bodies, count) = (&tile.bodies, range.len());
-    let dynamic = (tile.owned + tile.ghosts()).saturating_sub(range.start);
+fn load(bodies: &Bodies, dynamic: usize, corner: DVec2, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9]) {
+    let (count, dynamic) = (range.len(), dynamic.saturating_sub(range.start));
     // One length for all columns: each index is checked once, not once per column.
     let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy, slack] = columns.map(|column| &mut column[..count]);
     let (position, velocity, rotation) =
@@ -135,7 +141,7 @@ fn load(tile: &Tile, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9
     let (angular_velocity, kinds) = (&bodies.angular_velocity[range.clone()], &bodies.kind[range]);
     for i in 0..count {
         let kind = setup.kind(kinds[i]);
-        let local = (position[i] - tile.corner).as_vec2();
+        let local = (position[i] - corner).as_vec2();
         (x[i], y[i]) = (local.x, local.y);
         slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
         let mut half = kind.half_extents(rotation[i]);

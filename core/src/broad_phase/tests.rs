@@ -70,7 +70,7 @@ impl Stuffed {
             tile.bodies.push(*body);
         }
         let mut proxies = Proxies::default();
-        proxies.load(&tile, &setup, Team::ALONE);
+        proxies.load(&tile.bodies, [tile.owned, tile.ghosts()], tile.corner, &setup, Team::ALONE);
         Self { setup, tile, proxies }
     }
 

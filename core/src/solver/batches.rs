@@ -3,8 +3,8 @@
 //! A batch is one or several whole islands. Within an island the order of constraints follows from its contacts alone
 //! (see [`super::coloring`]), so how islands are put into batches changes no bit.
 
-use super::bodies::{NOT_SOLVED, STATIC};
 use super::lanes::LANES;
+use super::place::{NOT_SOLVED, STATIC};
 use crate::broad_phase::Pair;
 use crate::params::Parallel;
 use crate::team::Team;

@@ -2,17 +2,12 @@
 
 use super::batches::Batches;
 use super::lanes::Quad;
+use super::place::{NOT_SOLVED, STATIC};
 use crate::broad_phase::Pair;
 use crate::halo::{GhostRefresh, Unseen};
 use crate::params::Ghosts;
 use crate::setup::Setup;
 use crate::tile::Tile;
-
-/// The place of a body that is not solved: it has no contact, or sleeps.
-pub(crate) const NOT_SOLVED: u32 = u32::MAX;
-
-/// The place of every static. No body that moves comes first in a batch.
-pub(crate) const STATIC: u32 = 0;
 
 /// The root of how much heavier a frozen ghost is made than it is. With mass-weighted velocities infinity cannot be
 /// written down; this leaves 1e-12 of what an impulse would do, and that is taken back in every substep.

@@ -1,7 +1,7 @@
 //! Greedy coloring of the constraint graph: contacts of one color share no body that moves.
 
 use super::batches::Batches;
-use super::bodies::STATIC;
+use super::place::STATIC;
 use crate::broad_phase::Pair;
 use crate::team::Team;
 

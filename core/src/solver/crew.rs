@@ -173,7 +173,8 @@ mod tests {
         let crew = Crew::default();
         let run = || {
             let member = crew.member();
-            member.pieces(1).for_each(|_| std::panic::resume_unwind(Box::new("on purpose")));
+            let mut pieces = member.pieces(1);
+            assert_eq!(pieces.next(), None, "a piece to panic with");
         };
         let ends = thread::scope(|scope| [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().is_err()));
         assert_eq!(ends, [true, true]);

@@ -4,12 +4,9 @@ use super::bodies::Ghost;
 use super::crew::Member;
 use super::groups::{Color, Group};
 use super::kernels::{Pass, Table};
-use super::lanes::{Kernel, LANES, Lanes, Quad};
+use super::lanes::{LANES, Lanes, Quad};
 use super::motion::{Motion, turn_on};
 use super::shared::Shared;
-use super::{pgs, soft_step};
-use crate::params::Solver;
-use crate::setup::Setup;
 use std::ops::Range;
 
 /// Bodies in a piece of a stage.
@@ -173,28 +170,6 @@ impl<'a> Job<'a> {
                 let [x, y, c, s] = V::load_quads(pose);
                 let (c, s) = turn_on(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
-            }
-        }
-    }
-}
-
-/// Some substeps of a job, as one member of its crew, or alone.
-pub(super) struct Run<'a> {
-    pub(super) job: &'a Job<'a>,
-    pub(super) member: Member<'a>,
-    pub(super) substeps: Range<u32>,
-    pub(super) setup: &'a Setup,
-}
-
-impl Kernel for Run<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<V: Lanes>(self) {
-        let Self { job, member, substeps, setup } = self;
-        for substep in substeps {
-            match setup.params.solver {
-                Solver::SoftStep => soft_step::substep::<V>(job, &member, substep, setup),
-                Solver::Pgs => pgs::step::<V>(job, &member, setup),
             }
         }
     }

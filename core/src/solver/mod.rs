@@ -25,14 +25,16 @@ mod kernels;
 pub(crate) mod lanes;
 mod motion;
 mod pgs;
+pub(crate) mod place;
 mod rows;
+mod run;
 #[allow(unsafe_code)]
 mod shared;
 mod soft_step;
 pub(crate) mod softness;
 mod write_back;
 
-pub(crate) use bodies::{NOT_SOLVED, SolverBodies};
+pub(crate) use bodies::SolverBodies;
 pub(crate) use write_back::write_back;
 
 use crate::broad_phase::Pair;
@@ -41,13 +43,15 @@ use crate::params::Parallel;
 use crate::setup::Setup;
 use crate::team::Team;
 use crate::tile::Tile;
+use crate::violation::Violation;
 use batches::{Batches, Graph};
 use coloring::Coloring;
 use crew::{Crew, Member};
 use groups::Groups;
-use job::{Job, Parts, Run};
+use job::{Job, Parts};
 use lanes::{LANES, dispatch};
 use rows::Source;
+use run::Run;
 use std::ops::Range;
 
 /// Buffers of the solver, shared by all tiles of a thread.
@@ -184,24 +188,5 @@ impl Solver {
             }
         }
         violation
-    }
-}
-
-/// How well contacts are solved.
-#[derive(Clone, Copy, Default, Debug)]
-pub(crate) struct Violation {
-    pub(crate) points: u64,
-    /// Sum and maximum of the speeds, in m/s.
-    pub(crate) sum: f64,
-    pub(crate) max: f64,
-}
-
-impl Violation {
-    fn add(&mut self, speed: f64) {
-        self.points += 1;
-        if speed > 0.0 {
-            self.sum += speed;
-            self.max = if speed > self.max { speed } else { self.max };
-        }
     }
 }

@@ -1,9 +1,10 @@
 //! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
 
 use super::batches::{Batch, Batches};
-use super::bodies::{STATIC, SolverBodies};
+use super::bodies::SolverBodies;
 use super::groups::{Bounce, Group, Groups, NO_CONTACT};
 use super::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
+use super::place::STATIC;
 use crate::broad_phase::Pair;
 use crate::contact::Contact;
 use crate::math::{dot, max, turn};

@@ -1,8 +1,9 @@
 //! Every owned body's new state, solved or flown, written back to the tile.
 
-use super::bodies::{NOT_SOLVED, SolverBodies};
+use super::bodies::SolverBodies;
 use super::lanes::{Kernel, LANES, Lanes, Row, dispatch};
 use super::motion::{Motion, turn_on};
+use super::place::NOT_SOLVED;
 use crate::id::GlobalId;
 use crate::math::Rot;
 use crate::setup::Setup;
