@@ -212,3 +212,79 @@ impl Batches {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::island::Islands;
+    use crate::params::IslandSearch;
+    use proptest::prelude::*;
+
+    /// Any contacts among bodies, the first two of which are statics.
+    fn any_contacts() -> impl Strategy<Value = (usize, Vec<Pair>)> {
+        (3..400_u32).prop_flat_map(|bodies| {
+            let contact = (0..bodies, 2..bodies).prop_filter("two bodies", |(a, b)| a != b).prop_map(|(a, b)| [a, b]);
+            (Just(bodies as usize), prop::collection::vec(contact, 0..3000))
+        })
+    }
+
+    /// Numbers the bodies with contacts as the solver does: places, and links between nodes.
+    fn number(bodies: usize, contacts: &[Pair]) -> (Vec<u32>, Vec<Pair>) {
+        let mut place = vec![NOT_SOLVED; bodies];
+        contacts.iter().flatten().for_each(|&body| place[body as usize] = STATIC);
+        let mut nodes = 0;
+        for place in place[2..].iter_mut().filter(|place| **place == STATIC) {
+            nodes += 1;
+            *place = nodes;
+        }
+        let links = contacts.iter().map(|&[a, b]| [place[a as usize], place[b as usize]]);
+        let links = links.filter(|link| !link.contains(&STATIC)).map(|link| link.map(|place| place - 1)).collect();
+        (place, links)
+    }
+
+    proptest! {
+        #![proptest_config(crate::testing::cases(64))]
+        #[test]
+        fn batches_share_nothing_and_leave_nothing_out((bodies, contacts) in any_contacts(), sleep: bool) {
+            let (nodes, links) = number(bodies, &contacts);
+            let count = nodes.iter().filter(|&&place| is_node(place)).count();
+            let mut islands = Islands::default();
+            let largest = islands.find(IslandSearch::UnionFind, count, &links, Team::ALONE).largest;
+            let roots = islands.roots();
+            let asleep: Vec<bool> = (0..count).map(|root| root % 3 == 0).collect();
+            let sleeps = sleep.then_some(&asleep[..]);
+            for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
+                for team in [Team::ALONE, Team::of_pool()] {
+                    let mut place = nodes.clone();
+                    let mut batches = Batches::default();
+                    batches.divide(Graph { contacts: &contacts, roots, largest, sleeps }, &mut place, parallel, team);
+                    let mut solved = vec![false; contacts.len()];
+                    let mut next = (0, 0);
+                    for batch in &batches.all {
+                        prop_assert_eq!((batch.contacts.start, batch.bodies.start), next);
+                        next = (batch.contacts.end, batch.bodies.end);
+                        prop_assert_eq!(batch.bodies.len() % LANES, 0);
+                        let own = &batches.contacts[batch.contacts.clone()];
+                        prop_assert!(own.is_sorted(), "not in canonical order");
+                        for &contact in own {
+                            solved[contact as usize] = true;
+                            for body in contacts[contact as usize] {
+                                let place = place[body as usize] as usize;
+                                let moving = batch.bodies.start + batch.statics as usize..batch.bodies.end;
+                                prop_assert!(body < 2 || moving.contains(&place), "a body in another batch");
+                            }
+                        }
+                    }
+                    for (contact, solved) in contacts.iter().zip(solved) {
+                        let node = contact.map(|body| nodes[body as usize]).into_iter().find(|&place| is_node(place));
+                        let root = roots[node.expect("one moves") as usize - 1];
+                        prop_assert_eq!(solved, !(sleep && asleep[root as usize]));
+                    }
+                    let mut places: Vec<u32> = place.into_iter().filter(|&place| is_node(place)).collect();
+                    places.sort_unstable();
+                    prop_assert!(places.windows(2).all(|pair| pair[0] < pair[1]), "two bodies at one place");
+                }
+            }
+        }
+    }
+}
