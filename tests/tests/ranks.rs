@@ -40,6 +40,8 @@ fn outcome(scene: &Scene, spread: Spread<'_>, steps: u32) -> Outcome {
         whole.migrations += report.migrations;
         whole.islands += report.islands;
         whole.largest_island = whole.largest_island.max(report.largest_island);
+        whole.asleep += report.asleep;
+        whole.colors = whole.colors.max(report.colors);
     }
     Outcome {
         halfway: parts.iter().map(|part| part.0).reduce(Hashes::merge).unwrap(),
