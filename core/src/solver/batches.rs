@@ -57,6 +57,9 @@ pub(super) struct Graph<'a> {
     pub(super) roots: &'a [u32],
     /// Nodes in the largest island.
     pub(super) largest: u64,
+    /// Nodes from here on are ghosts that are heard of within the step. Islands with such, and islands without, are not
+    /// mixed: these need not wait for word.
+    pub(super) first_ghost: usize,
     /// For each root whether its island sleeps. None where nobody may.
     pub(super) sleeps: Option<&'a [bool]>,
 }
@@ -69,6 +72,8 @@ pub(super) struct Batches {
     pub(super) contacts: Vec<u32>,
     /// For each island, named by its lowest node, how many contacts it has, and then its batch.
     of_island: Vec<u32>,
+    /// For each island whether it has a ghost that is heard of within the step.
+    at_border: Vec<bool>,
     /// Whether there is more than one thread to solve a batch.
     crews: bool,
 }
@@ -84,7 +89,7 @@ impl Batches {
     /// Puts islands into batches, but those that sleep. `place` gives for each body of the tile its node plus one,
     /// [`STATIC`] or [`NOT_SOLVED`]; afterwards, its place among the solver's bodies.
     pub(super) fn divide(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, team: Team) {
-        let Graph { contacts, roots, largest, sleeps } = graph;
+        let Graph { contacts, roots, largest, sleeps, .. } = graph;
         self.crews = !team.is_alone();
         self.all.clear();
         self.contacts.clear();
@@ -121,7 +126,7 @@ impl Batches {
 
     /// Islands into the batches that [`choose`](Self::choose) has them in.
     fn put_apart(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, together: Option<bool>) {
-        let Graph { contacts, roots, sleeps, .. } = graph;
+        let Graph { contacts, roots, .. } = graph;
         let island_of = |place: &[u32], [a, b]: Pair| {
             let node = if place[a as usize] == STATIC { place[b as usize] } else { place[a as usize] } - 1;
             roots[node as usize]
@@ -131,7 +136,7 @@ impl Batches {
         for &pair in contacts {
             self.of_island[island_of(place, pair) as usize] += 1;
         }
-        self.choose(roots, sleeps, parallel, together);
+        self.choose(graph, parallel, together);
 
         // Bodies: in the order of the tile within each batch.
         for &root in roots {
@@ -184,11 +189,16 @@ impl Batches {
 
     /// Decides which island goes into which batch, from the contacts of each alone: ascending, so that neighbours in
     /// memory stay neighbours.
-    fn choose(&mut self, roots: &[u32], sleeps: Option<&[bool]>, parallel: Parallel, together: Option<bool>) {
+    fn choose(&mut self, graph: Graph<'_>, parallel: Parallel, together: Option<bool>) {
+        let Graph { roots, sleeps, first_ghost, .. } = graph;
+        self.at_border.clear();
+        self.at_border.resize(roots.len(), false);
+        roots[first_ghost.min(roots.len())..].iter().for_each(|&root| self.at_border[root as usize] = true);
         if let Some(crew) = together {
             self.all.push(Batch::new(self.crews && crew));
         }
-        let (mut open, mut filled) = (NO_BATCH, 0);
+        // The batch that is being filled, and its contacts: of islands within the tile, and of those at its border.
+        let mut open = [(NO_BATCH, 0); 2];
         for (node, &root) in (0..).zip(roots) {
             if node != root {
                 continue;
@@ -202,12 +212,13 @@ impl Batches {
                 self.all.push(Batch::new(self.crews));
                 self.all.len() as u32 - 1
             } else {
-                if open == NO_BATCH || filled >= SMALL {
+                let (batch, filled) = &mut open[usize::from(self.at_border[node as usize])];
+                if *batch == NO_BATCH || *filled >= SMALL {
                     self.all.push(Batch::new(false));
-                    (open, filled) = (self.all.len() as u32 - 1, 0);
+                    (*batch, *filled) = (self.all.len() as u32 - 1, 0);
                 }
-                filled += weight;
-                open
+                *filled += weight;
+                *batch
             };
         }
     }
@@ -253,11 +264,13 @@ mod tests {
             let roots = islands.roots();
             let asleep: Vec<bool> = (0..count).map(|root| root % 3 == 0).collect();
             let sleeps = sleep.then_some(&asleep[..]);
+            let first_ghost = count - count / 8;
+            let graph = Graph { contacts: &contacts, roots, largest, first_ghost, sleeps };
             for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
                 for team in [Team::ALONE, Team::of_pool()] {
                     let mut place = nodes.clone();
                     let mut batches = Batches::default();
-                    batches.divide(Graph { contacts: &contacts, roots, largest, sleeps }, &mut place, parallel, team);
+                    batches.divide(graph, &mut place, parallel, team);
                     let mut solved = vec![false; contacts.len()];
                     let mut next = (0, 0);
                     for batch in &batches.all {

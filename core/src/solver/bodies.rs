@@ -33,6 +33,8 @@ pub(crate) struct SolverBodies {
     /// Contacts between bodies that move, as nodes: bodies with contacts, in the order of the tile.
     links: Vec<Pair>,
     nodes: usize,
+    /// The first node that is a ghost.
+    pub(super) first_ghost: usize,
     pub(super) frozen: bool,
 }
 
@@ -56,11 +58,16 @@ impl SolverBodies {
             self.place[a as usize] = STATIC;
             self.place[b as usize] = STATIC;
         }
-        self.nodes = 0;
-        for place in self.place[..dynamic].iter_mut().filter(|place| **place == STATIC) {
-            self.nodes += 1;
-            *place = self.nodes as u32;
+        let mut nodes = 0;
+        let (owned, ghosts) = self.place[..dynamic].split_at_mut(tile.owned);
+        for places in [owned, ghosts] {
+            self.first_ghost = nodes as usize;
+            for place in places.iter_mut().filter(|place| **place == STATIC) {
+                nodes += 1;
+                *place = nodes;
+            }
         }
+        self.nodes = nodes as usize;
         self.links.clear();
         for &[a, b] in contacts {
             let (a, b) = (self.place[a as usize], self.place[b as usize]);

@@ -64,6 +64,11 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Whether other tiles' bodies take part.
+    pub(super) fn has_ghosts(&self) -> bool {
+        !self.ghosts.is_empty()
+    }
+
     /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
     /// member: meeting costs more than they do.
     #[inline(always)]

@@ -39,7 +39,7 @@ pub(crate) use write_back::write_back;
 
 use crate::broad_phase::Pair;
 use crate::narrow_phase::Contacts;
-use crate::params::Parallel;
+use crate::params::{Exchange, Parallel};
 use crate::setup::Setup;
 use crate::team::Team;
 use crate::tile::Tile;
@@ -81,7 +81,9 @@ impl Solver {
         team: Team,
     ) {
         let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
-        let graph = Graph { contacts, roots, largest, sleeps };
+        let heard_of = setup.params.exchange == Exchange::Substep;
+        let first_ghost = if heard_of { self.bodies.first_ghost } else { roots.len() };
+        let graph = Graph { contacts, roots, largest, first_ghost, sleeps };
         self.batches.divide(graph, self.bodies.places_mut(), setup.params.parallel, team);
         self.bodies.load(tile, &self.batches, setup);
     }
@@ -101,10 +103,18 @@ impl Solver {
         }
     }
 
-    /// Makes some substeps of all batches.
+    /// Makes some substeps of all batches. Those without ghosts have no word to wait for, and make all of them with the
+    /// first, while they are in the cache.
     pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
-        let alone =
-            |job: Job<'_>| dispatch(Run { job: &job, member: Member::alone(), substeps: substeps.clone(), setup });
+        let substeps = |job: &Job<'_>| match substeps.start {
+            _ if job.has_ghosts() => substeps.clone(),
+            0 => 0..setup.params.integrations(),
+            _ => 0..0,
+        };
+        let alone = |job: Job<'_>| {
+            let substeps = substeps(&job);
+            dispatch(Run { job: &job, member: Member::alone(), substeps, setup });
+        };
         // Nothing to share: no list of jobs.
         if team.is_alone() || setup.params.parallel == Parallel::Serial {
             return self.jobs().for_each(alone);
@@ -112,7 +122,7 @@ impl Solver {
         let (large, small): (Vec<_>, Vec<_>) = self.jobs().partition(|job| job.large);
         for job in &large {
             let crew = Crew::default();
-            team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps.clone(), setup }));
+            team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps(job), setup }));
         }
         team.for_each(small, alone);
     }
