@@ -88,7 +88,7 @@ fn main() -> ExitCode {
 
 fn compare() -> Result<(), String> {
     let (chosen, [repeats, threads]) =
-        part_and_arguments(&SCENES.map(|scene| scene.name), ["REPEATS", "THREADS"], [5, 2])?;
+        part_and_arguments(&SCENES.map(|scene| scene.name), ["REPEATS", "THREADS"], [9, 2])?;
     eprintln!("speedups to serial on 1 thread, here on {threads} threads; reported: on up to 36\n");
     let mut measured = Vec::new();
     for scene in SCENES.into_iter().filter(|scene| chosen(scene.name)) {
