@@ -203,7 +203,7 @@ impl Params {
         require("baumgarte", self.baumgarte, (0.0..=1.0).contains(&self.baumgarte), "within 0 to 1")?;
         not_negative("linear_slop", self.linear_slop)?;
         not_negative("sleep_speed", self.sleep_speed)?;
-        not_negative("sleep_time", self.sleep_time)?;
+        positive("sleep_time", self.sleep_time)?;
         if self.ghosts == Ghosts::Frozen && self.exchange == Exchange::Substep {
             return Err(SetupError::FrozenSubsteps);
         }

@@ -1,11 +1,14 @@
 //! Sleeping: islands that rest are left out until something touches them. Within one tile only.
 //!
-//! A body rests while its fastest point is slower than `sleep_speed`. An island sleeps while each of its bodies has
-//! rested for `sleep_time`, which is a function of the state: whatever comes to touch it makes one larger island, which
-//! is awake as long as the newcomer is. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with
+//! A body rests while its fastest point is slower than `sleep_speed`. An island has rested as long as the one of its
+//! bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
+//! rest anew. An island sleeps once it has rested for `sleep_time`; decided before each solve, on the step's contacts.
+//! Whatever comes to touch it makes one larger island, which is awake as the newcomer is. A body without contacts is an
+//! island of its own. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with
 //! their impulses, so that they wake as they fell asleep. Source: islands that sleep as in Box2D (E. Catto); here they
 //! are found anew each step, so nothing has to be kept in order.
 
+use crate::math;
 use crate::setup::Setup;
 use crate::solver::place::NOT_SOLVED;
 use glam::Vec2;
@@ -17,7 +20,9 @@ pub(crate) struct Sleep {
     still: Vec<f32>,
     /// For each owned body whether its island sleeps.
     asleep: Vec<bool>,
-    /// For each node of the contact graph that is the lowest of its island, whether that sleeps.
+    /// For each node of the contact graph that is the lowest of its island, how long that has rested, in seconds, and
+    /// whether it sleeps.
+    rested: Vec<f32>,
     islands: Vec<bool>,
 }
 
@@ -41,6 +46,8 @@ impl Sleep {
     /// Follows the bodies to a new order: the one at `order[i]` comes to `i`.
     pub(crate) fn permute(&mut self, order: &[u32]) {
         if !self.still.is_empty() {
+            // Bodies may have been added since.
+            self.resize(order.len());
             self.still = order.iter().map(|&from| self.still[from as usize]).collect();
             self.asleep = order.iter().map(|&from| self.asleep[from as usize]).collect();
         }
@@ -57,19 +64,21 @@ impl Sleep {
         angular_velocity: &mut [f32],
         setup: &Setup,
     ) -> (&[bool], u64) {
-        let rested = |still: f32| still >= setup.params.sleep_time;
-        self.islands.clear();
-        self.islands.resize(roots.len(), true);
+        let root_of = |node: u32| roots[node as usize - 1] as usize;
+        self.rested.clear();
+        self.rested.resize(roots.len(), f32::INFINITY);
         for (&node, &still) in nodes.iter().zip(&self.still).filter(|&(&node, _)| node != NOT_SOLVED) {
-            let island = &mut self.islands[roots[node as usize - 1] as usize];
-            *island &= rested(still);
+            let rested = &mut self.rested[root_of(node)];
+            *rested = math::min(still, *rested);
         }
+        self.islands.clear();
+        self.islands.extend(self.rested.iter().map(|&rested| rested >= setup.params.sleep_time));
         let mut count = 0;
         for (i, asleep) in self.asleep.iter_mut().enumerate() {
-            *asleep = match nodes[i] {
-                NOT_SOLVED => rested(self.still[i]),
-                node => self.islands[roots[node as usize - 1] as usize],
-            };
+            if nodes[i] != NOT_SOLVED {
+                self.still[i] = self.rested[root_of(nodes[i])];
+            }
+            *asleep = self.still[i] >= setup.params.sleep_time;
             if *asleep {
                 (velocity[i], angular_velocity[i]) = (Vec2::ZERO, 0.0);
                 count += 1;

@@ -195,6 +195,13 @@ impl World {
         for tile in &mut self.tiles {
             tile.counts = Default::default();
         }
+        // Where threads help within tiles, each of them is asked once a step; else in every stage.
+        if threads > 1
+            && !apart(self.tiles.len())
+            && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok)
+        {
+            self.tiles.iter_mut().for_each(|tile| tile.counts.fault = Some(Fault::FloatMode));
+        }
     }
 
     /// Ends a step: the clock, and what went wrong.

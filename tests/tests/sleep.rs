@@ -82,6 +82,42 @@ fn a_stack_that_slept_and_woke_still_stands() {
     assert!((sim.bodies()[9].position - top).length() < 0.01);
 }
 
+/// Bodies are sorted anew on fixed steps, whoever has just come.
+#[test]
+fn a_body_may_come_on_a_step_that_sorts() {
+    let (scene, _) = stacks_and_a_ball();
+    let mut sim = scene.start(WHOLE);
+    sim.run(3 * scene.params.sort_interval);
+    assert_eq!(sim.report.asleep, 6);
+    let body = atoll_core::Body { id: GlobalId(99), position: DVec2::new(-10.0, 0.25), ..scene.bodies[0] };
+    sim.world.add(body).unwrap();
+    sim.run(1);
+    assert_eq!(sim.report.asleep, 6);
+    sim.run(60);
+    assert!(sim.body(GlobalId(99)).velocity.length() < 0.01);
+}
+
+/// Who has long rested upon something must not hang in the air when that is struck away.
+#[test]
+fn what_loses_its_support_falls() {
+    let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+    scene.params.sleep = true;
+    let smooth = Material { friction: 0.0, ..Material::default() };
+    scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, smooth);
+    let boxed = scene.kind(Shape::rectangle(0.5, 0.5), smooth);
+    let heavy = scene.kind(Shape::circle(0.2), Material { density: 500.0, ..smooth });
+    scene.body(boxed, DVec2::new(0.0, 0.25), Vec2::ZERO);
+    let upper = scene.body(boxed, DVec2::new(0.0, 0.75), Vec2::ZERO);
+    // Arrives when both have slept for a while.
+    scene.body(heavy, DVec2::new(-18.0, 0.2), Vec2::new(12.0, 0.0));
+    let mut sim = scene.start(WHOLE);
+    sim.run(75);
+    assert_eq!(sim.report.asleep, 2, "{:?}", sim.report);
+    sim.run(60);
+    let height = sim.body(upper).position.y;
+    assert!(height < 0.5, "the upper box hangs at {height}");
+}
+
 #[test]
 fn without_gravity_a_lone_body_at_rest_sleeps_too() {
     let mut scene = Scene::new(DVec2::ZERO, 0.0);

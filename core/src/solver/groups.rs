@@ -16,7 +16,7 @@ pub(super) const NO_CONTACT: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct Group<const N: usize> {
-    /// Bodies, as places in their batch; 0, a static, in a lane without a contact.
+    /// Bodies, as places in their batch; that of its slice's static in a lane without a contact.
     pub(super) a: [u32; LANES],
     pub(super) b: [u32; LANES],
     /// The normal, times the root of the inverse mass of A and of B.
@@ -179,7 +179,8 @@ impl Groups {
             let range = batch.contacts.clone();
             self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch);
             batch.colors = first..self.colors.len();
-            most_colors = most_colors.max(batch.colors.len());
+            // All that overflows counts as one color.
+            most_colors = most_colors.max(batch.colors.len().min(COLORS + 1));
         }
         self.singles.resize(self.in_singles.len(), Group::EMPTY);
         self.doubles.resize(self.in_doubles.len(), Group::EMPTY);

@@ -119,7 +119,8 @@ impl Solver {
         if team.is_alone() || setup.params.parallel == Parallel::Serial {
             return self.jobs().for_each(alone);
         }
-        let (large, small): (Vec<_>, Vec<_>) = self.jobs().partition(|job| job.large);
+        let to_do = self.jobs().filter(|job| !substeps(job).is_empty());
+        let (large, small): (Vec<_>, Vec<_>) = to_do.partition(|job| job.large);
         for job in &large {
             let crew = Crew::default();
             team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps(job), setup }));

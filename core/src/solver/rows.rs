@@ -69,7 +69,7 @@ impl Local {
     }
 }
 
-/// What the rows of eight contacts follow from; all zero in a lane without one.
+/// What the rows of eight contacts follow from; in a lane without one all zero, between its slice's static and itself.
 struct Inputs {
     a: [u32; LANES],
     b: [u32; LANES],
@@ -95,8 +95,8 @@ impl Inputs {
         const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
         const ZERO: Row = [0.0; LANES];
         let mut inputs = Self {
-            a: [0; LANES],
-            b: [0; LANES],
+            a: [local.slice; LANES],
+            b: [local.slice; LANES],
             contact: [NONE; QUADS],
             separation: [ZERO; 2],
             weight_a: NONE,
