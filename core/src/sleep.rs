@@ -94,3 +94,31 @@ impl Sleep {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::Params;
+    use crate::partition::TileGrid;
+    use crate::setup::Blueprint;
+    use glam::DVec2;
+
+    #[test]
+    fn an_island_rests_as_long_as_its_least_rested_body() {
+        let grid = TileGrid::new(DVec2::ZERO, DVec2::ONE, 1, 1).unwrap();
+        let params = Params { sleep: true, ..Params::default() };
+        let setup = Setup::new(&Blueprint { params, grid, kinds: Vec::new(), statics: Vec::new() }).unwrap();
+        let mut sleep = Sleep { still: vec![9.0, 0.1, 9.0, 9.0], asleep: vec![true; 4], ..Sleep::default() };
+        let mut decide = |nodes: &[u32], roots: &[u32]| {
+            let (islands, count) = sleep.decide(nodes, roots, &mut [Vec2::ONE; 4], &mut [1.0; 4], &setup);
+            (islands.to_vec(), count, sleep.asleep.clone(), sleep.still.clone())
+        };
+        // The first two touch each other, the third something that never moves, the last nothing.
+        let (islands, count, asleep, still) = decide(&[1, 2, 3, NOT_SOLVED], &[0, 0, 2]);
+        assert_eq!((islands[0], islands[2], count), (false, true, 2));
+        assert_eq!((asleep, still), (vec![false, false, true, true], vec![0.1, 0.1, 9.0, 9.0]));
+        // Once apart, the first must rest anew by itself.
+        let (_, _, asleep, _) = decide(&[NOT_SOLVED, NOT_SOLVED, 1, NOT_SOLVED], &[0]);
+        assert_eq!(asleep, [false, false, true, true]);
+    }
+}
