@@ -9,6 +9,7 @@ use crate::shape::{KindRow, Shape};
 use crate::team::Team;
 use crate::tile::Tile;
 use glam::Vec2;
+use std::ops::Range;
 
 /// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
 const RECYCLE_COSINE: f32 = 0.98;
@@ -77,14 +78,15 @@ impl NarrowPhase {
         self.cull(tile, proxies, candidates, team);
         self.sort(tile.owned);
         contacts.clear();
-        let (sorted, pieces) = (&self.sorted[..], team.pieces(self.sorted.len(), GRAIN));
+        let sorted = &self.sorted[..];
+        let pieces = team.pieces(sorted.len(), GRAIN);
         if pieces == 1 {
             return find_among(sorted, tile, setup, contacts);
         }
         self.parts.resize_with(pieces, Contacts::default);
-        let parts = self.parts.iter_mut().enumerate().collect();
-        team.for_each(parts, |(i, part): (usize, &mut Contacts)| {
-            find_among(&sorted[i * sorted.len() / pieces..(i + 1) * sorted.len() / pieces], tile, setup, part);
+        let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
+        team.for_each(parts, |(range, part): (Range<usize>, &mut Contacts)| {
+            find_among(&sorted[range], tile, setup, part);
         });
         self.parts.iter_mut().for_each(|part| contacts.append(part));
     }
@@ -92,19 +94,9 @@ impl NarrowPhase {
     /// Keeps the candidates that are pairs, and counts them by their lower index.
     fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], team: Team) {
         self.near.clear();
-        if team.pieces(candidates.len(), GRAIN) == 1 {
-            self.near.resize(candidates.len(), [0, 0]);
-            let kept = cull(tile, proxies, candidates, &mut self.near);
-            self.near.truncate(kept);
-        } else {
-            let parts = team.map(candidates.len(), GRAIN, |range| {
-                let mut near = vec![[0, 0]; range.len()];
-                let kept = cull(tile, proxies, &candidates[range], &mut near);
-                near.truncate(kept);
-                near
-            });
-            parts.iter().for_each(|part| self.near.extend_from_slice(part));
-        }
+        team.append(&mut self.near, candidates.len(), GRAIN, |range, near| {
+            cull(tile, proxies, &candidates[range], near)
+        });
         self.start.clear();
         self.start.resize(tile.owned + 2, 0);
         for pair in &self.near {
@@ -135,17 +127,18 @@ impl NarrowPhase {
     }
 }
 
-/// Copies the candidates that are pairs, and says how many. Every one is written down and counted or not: a branch here
-/// would be a coin toss.
-fn cull(tile: &Tile, proxies: &Proxies, candidates: &[Pair], near: &mut [Pair]) -> usize {
+/// Appends the candidates that are pairs. Every one is written down and counted or not: a branch here would be a coin
+/// toss.
+fn cull(tile: &Tile, proxies: &Proxies, candidates: &[Pair], near: &mut Vec<Pair>) {
     let position = &tile.bodies.position;
-    let mut kept = 0;
+    let mut kept = near.len();
+    near.resize(kept + candidates.len(), [0, 0]);
     for &pair in candidates {
         let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
         near[kept] = pair;
         kept += usize::from(proxies.is_pair(offset, pair));
     }
-    kept
+    near.truncate(kept);
 }
 
 /// Appends the contacts among some sorted pairs.

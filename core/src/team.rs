@@ -31,19 +31,43 @@ impl Team {
         if self.is_alone() { 1 } else { (len / grain).clamp(1, 4 * self.threads) }
     }
 
+    /// Ranges that make up `0..len`, as many as [`pieces`](Self::pieces).
+    pub(crate) fn ranges(self, len: usize, grain: usize) -> impl Iterator<Item = Range<usize>> {
+        let pieces = self.pieces(len, grain);
+        (0..pieces).map(move |i| i * len / pieces..(i + 1) * len / pieces)
+    }
+
     /// Runs `work` on ranges that make up `0..len`, none shorter than `grain`; their results in order.
     pub(crate) fn map<R: Send>(self, len: usize, grain: usize, work: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
-        let pieces = self.pieces(len, grain);
-        let piece = |i: usize| work(i * len / pieces..(i + 1) * len / pieces);
-        if pieces == 1 { vec![piece(0)] } else { (0..pieces).into_par_iter().with_max_len(1).map(piece).collect() }
+        self.for_each(self.ranges(len, grain).collect(), work)
+    }
+
+    /// Runs `work` on ranges that make up `0..len`, none shorter than `grain`. What each appends is appended to `all`, in
+    /// the order of the ranges.
+    pub(crate) fn append<T: Copy + Send>(
+        self,
+        all: &mut Vec<T>,
+        len: usize,
+        grain: usize,
+        work: impl Fn(Range<usize>, &mut Vec<T>) + Sync,
+    ) {
+        if self.pieces(len, grain) == 1 {
+            return work(0..len, all);
+        }
+        let parts = self.map(len, grain, |range| {
+            let mut part = Vec::new();
+            work(range, &mut part);
+            part
+        });
+        parts.iter().for_each(|part| all.extend_from_slice(part));
     }
 
     /// Runs `work` on each of some things; the results in order.
-    pub(crate) fn for_each<T: Send, R: Send>(self, things: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
+    pub(crate) fn for_each<T: Send, R: Send>(self, things: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
         if self.is_alone() || things.len() == 1 {
             things.into_iter().map(work).collect()
         } else {
-            things.into_par_iter().with_max_len(1).map(work).collect()
+            things.into_par_iter().with_max_len(1).map(&work).collect()
         }
     }
 
@@ -68,7 +92,10 @@ mod tests {
         for threads in [1, 2, 7] {
             for len in [0, 1, 9, 1000] {
                 let team = Team { threads };
-                let ranges = team.map(len, 10, |range| range);
+                let ranges: Vec<_> = team.ranges(len, 10).collect();
+                let mut all = vec![usize::MAX];
+                team.append(&mut all, len, 10, |range, part| part.extend(range));
+                assert!(all[0] == usize::MAX && all[1..].iter().copied().eq(0..len), "{threads} {len}");
                 assert!(ranges.len() <= 4 * threads && (ranges.len() == 1 || ranges.iter().all(|r| r.len() >= 10)));
                 assert!(ranges.into_iter().flatten().eq(0..len), "{threads} {len}");
             }

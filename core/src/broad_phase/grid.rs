@@ -133,18 +133,9 @@ impl Grid {
 
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
         let (sorted, dt, owned) = (&self.sorted, proxies.dt, proxies.owned);
-        let search = |places, pairs: &mut Vec<Pair>| {
+        team.append(pairs, sorted.len, GRAIN, |places, pairs| {
             Search { sorted, dt, owned, places, pairs }.neighbours(&self.start, layout.columns);
-        };
-        if team.pieces(sorted.len, GRAIN) == 1 {
-            return search(0..sorted.len, pairs);
-        }
-        let parts = team.map(sorted.len, GRAIN, |places| {
-            let mut pairs = Vec::new();
-            search(places, &mut pairs);
-            pairs
         });
-        parts.iter().for_each(|part| pairs.extend_from_slice(part));
     }
 
     fn pair_large(&self, layout: &Layout, proxies: &Proxies, limit: f32, pairs: &mut Vec<Pair>) {

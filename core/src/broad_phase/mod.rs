@@ -82,9 +82,7 @@ impl Proxies {
             column.resize(total, 0.0);
             &mut column[..total]
         });
-        let pieces = team.pieces(total, GRAIN);
-        let parts = (0..pieces).map(|i| {
-            let range = i * total / pieces..(i + 1) * total / pieces;
+        let parts = team.ranges(total, GRAIN).map(|range| {
             let part = rest.each_mut().map(|column| column.split_off_mut(..range.len()).expect("as many are left"));
             (range, part)
         });

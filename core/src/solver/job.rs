@@ -17,53 +17,22 @@ const BODIES_PER_PIECE: usize = 64 * LANES;
 /// It is run either by one thread alone, or by the members of one crew, which get different pieces of every stage and
 /// meet between stages.
 pub(super) struct Job<'a> {
-    velocity: Shared<'a, Quad>,
-    pose: Shared<'a, Quad>,
-    start: Shared<'a, Quad>,
-    weight: &'a [Quad],
-    singles: Shared<'a, Group<1>>,
-    doubles: Shared<'a, Group<2>>,
-    colors: &'a [Color],
+    pub(super) velocity: Shared<'a, Quad>,
+    pub(super) pose: Shared<'a, Quad>,
+    pub(super) start: Shared<'a, Quad>,
+    pub(super) weight: &'a [Quad],
+    pub(super) singles: Shared<'a, Group<1>>,
+    pub(super) doubles: Shared<'a, Group<2>>,
+    pub(super) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
-    ghosts: &'a [Ghost],
-    base: u32,
-    frozen: bool,
+    pub(super) ghosts: &'a [Ghost],
+    pub(super) base: u32,
+    pub(super) frozen: bool,
     /// Whether it is worth a crew.
     pub(super) large: bool,
 }
 
-/// The part of the solver's buffers that one batch has.
-pub(super) struct Parts<'a> {
-    pub(super) velocity: &'a mut [Quad],
-    pub(super) pose: &'a mut [Quad],
-    pub(super) start: &'a mut [Quad],
-    pub(super) weight: &'a [Quad],
-    pub(super) singles: &'a mut [Group<1>],
-    pub(super) doubles: &'a mut [Group<2>],
-    pub(super) colors: &'a [Color],
-    pub(super) ghosts: &'a [Ghost],
-    pub(super) base: u32,
-    pub(super) frozen: bool,
-    pub(super) large: bool,
-}
-
 impl<'a> Job<'a> {
-    pub(super) fn new(parts: Parts<'a>) -> Self {
-        Self {
-            velocity: Shared::new(parts.velocity),
-            pose: Shared::new(parts.pose),
-            start: Shared::new(parts.start),
-            weight: parts.weight,
-            singles: Shared::new(parts.singles),
-            doubles: Shared::new(parts.doubles),
-            colors: parts.colors,
-            ghosts: parts.ghosts,
-            base: parts.base,
-            frozen: parts.frozen,
-            large: parts.large && parts.colors.iter().any(|color| color.slices > 1),
-        }
-    }
-
     /// Whether other tiles' bodies take part.
     pub(super) fn has_ghosts(&self) -> bool {
         !self.ghosts.is_empty()

@@ -48,10 +48,11 @@ use batches::{Batches, Graph};
 use coloring::Coloring;
 use crew::{Crew, Member};
 use groups::Groups;
-use job::{Job, Parts};
+use job::Job;
 use lanes::{LANES, dispatch};
 use rows::Source;
 use run::Run;
+use shared::Shared;
 use std::ops::Range;
 
 /// Buffers of the solver, shared by all tiles of a thread.
@@ -139,19 +140,20 @@ impl Solver {
         self.batches.all.iter().map(move |batch| {
             let bodies = batch.bodies.len();
             let own_ghosts = ghosts.partition_point(|ghost| (ghost.place as usize) < batch.bodies.end);
-            Job::new(Parts {
-                velocity: velocity.split_off_mut(..bodies).expect(IN_ORDER),
-                pose: pose.split_off_mut(..bodies).expect(IN_ORDER),
-                start: start.split_off_mut(..bodies).expect(IN_ORDER),
+            let colors = &colors[batch.colors.clone()];
+            Job {
+                velocity: Shared::new(velocity.split_off_mut(..bodies).expect(IN_ORDER)),
+                pose: Shared::new(pose.split_off_mut(..bodies).expect(IN_ORDER)),
+                start: Shared::new(start.split_off_mut(..bodies).expect(IN_ORDER)),
                 weight: &weight[batch.bodies.clone()],
-                singles: singles.split_off_mut(..batch.singles.len()).expect(IN_ORDER),
-                doubles: doubles.split_off_mut(..batch.doubles.len()).expect(IN_ORDER),
-                colors: &colors[batch.colors.clone()],
+                singles: Shared::new(singles.split_off_mut(..batch.singles.len()).expect(IN_ORDER)),
+                doubles: Shared::new(doubles.split_off_mut(..batch.doubles.len()).expect(IN_ORDER)),
+                colors,
                 ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
                 base: batch.bodies.start as u32,
                 frozen,
-                large: batch.large,
-            })
+                large: batch.large && colors.iter().any(|color| color.slices > 1),
+            }
         })
     }
 

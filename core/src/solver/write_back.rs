@@ -32,8 +32,7 @@ pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, 
         asleep: tile.sleep.asleep(),
         not_finite: None,
     };
-    let pieces = team.pieces(owned, GRAIN);
-    let parts = (0..pieces).map(|i| rest.split_off((i + 1) * owned / pieces - i * owned / pieces)).collect();
+    let parts = team.ranges(owned, GRAIN).map(|range| rest.split_off(range.len())).collect();
     let substeps = setup.params.integrations();
     let not_finite = team.for_each(parts, |part| dispatch(WriteBack { owned: part, solved, motion, substeps }));
     tile.counts.not_finite = not_finite.into_iter().flatten().min();

@@ -65,15 +65,7 @@ impl Quadtree {
 
     /// Appends every pair, and some that are none (see the contract in [`super`]). The tree must be up to date.
     pub(crate) fn find_pairs(&self, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
-        if team.is_alone() {
-            return self.query(proxies, 0..proxies.owned, pairs);
-        }
-        let found = team.map(proxies.owned, GRAIN, |range| {
-            let mut found = Vec::new();
-            self.query(proxies, range, &mut found);
-            found
-        });
-        found.iter().for_each(|found| pairs.extend_from_slice(found));
+        team.append(pairs, proxies.owned, GRAIN, |bodies, pairs| self.query(proxies, bodies, pairs));
     }
 
     /// Pairs of some owned bodies with those that come after them.
