@@ -39,6 +39,8 @@
 //!    message of every rank has arrived. A message to oneself is allowed and costs at most one copy. An empty message
 //!    is a message. Nothing is lost, duplicated, truncated or reordered, and a message of one round is never seen in
 //!    another, however much faster one rank is than the next.
+//!    Beside its messages every rank may [set a flag word](Outgoing::set_flag_word); every rank gets the [least of
+//!    all](Incoming::flag_word) of the same round, also from ranks that send it nothing.
 //! 3. **Lockstep.** Every rank makes the same sequence of exchanges. A rank can therefore be at most one round ahead of
 //!    a peer, so *at most two messages are ever unread between two ranks*, and a backend needs no more room than that
 //!    to send without waiting.

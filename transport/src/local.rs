@@ -2,6 +2,7 @@
 
 use crate::error::Aborted;
 use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
+use std::time::Duration;
 
 /// The only rank of a run of size 1.
 ///
@@ -23,7 +24,7 @@ pub struct Local {
 impl Local {
     /// The endpoint of a run of one rank.
     pub fn new() -> Local {
-        Local { outgoing: Outgoing::new(1) }
+        Local { outgoing: Outgoing::owned(1) }
     }
 }
 
@@ -43,15 +44,21 @@ impl Transport for Local {
     }
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
-        self.outgoing.prepare(self.rank(), lengths)?;
+        self.outgoing.begin_prepare(Rank(0), lengths)?;
+        self.outgoing.as_owned().resize(lengths);
+        self.outgoing.end_prepare();
         Ok(&mut self.outgoing)
     }
 
     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
         self.outgoing.begin_exchange(self.rank())?;
-        incoming.resize(1);
-        let old = incoming.take(Rank(0));
-        incoming.put(Rank(0), self.outgoing.replace(Rank(0), old));
+        incoming.begin(1);
+        incoming.hear(self.outgoing.flag_word());
+        let received = incoming.as_owned();
+        received.resize(1);
+        let old = received.take(Rank(0));
+        received.put(Rank(0), self.outgoing.as_owned().replace(Rank(0), old));
+        incoming.end(Duration::ZERO);
         Ok(())
     }
 

@@ -31,6 +31,9 @@ enum State {
     Failed(TransportError),
 }
 
+/// A message with its sender's flag word.
+type Frame = (Vec<u8>, u128);
+
 /// One rank's ends of the channels to all others.
 ///
 /// Whatever closes the channels records its cause in `origin` *first*: a peer that finds a channel closed then finds
@@ -40,9 +43,9 @@ pub(super) struct Links {
     rank: Rank,
     peer_timeout: Duration,
     /// By destination; none to oneself.
-    senders: Vec<Option<Sender<Vec<u8>>>>,
+    senders: Vec<Option<Sender<Frame>>>,
     /// By source; none from oneself.
-    receivers: Vec<Option<Receiver<Vec<u8>>>>,
+    receivers: Vec<Option<Receiver<Frame>>>,
     /// By source: whether the message of the present round still has to come.
     awaited: Vec<bool>,
     state: State,
@@ -98,9 +101,15 @@ impl Links {
     /// Sends a frame to every rank and receives one from each. An error ends the run for this rank.
     pub(super) fn exchange(&mut self, outgoing: &mut Outgoing, incoming: &mut Incoming) -> Result<(), TransportError> {
         let started = Instant::now();
-        incoming.resize(self.size());
+        incoming.begin(self.size());
+        incoming.as_owned().resize(self.size());
         self.send(outgoing, incoming, started)
-            .and_then(|()| self.receive(incoming, started))
+            .and_then(|()| {
+                let sent = Instant::now();
+                self.receive(incoming, started)?;
+                incoming.end(sent.elapsed());
+                Ok(())
+            })
             .map_err(|error| self.fail(error))
     }
 
@@ -116,15 +125,17 @@ impl Links {
         incoming: &mut Incoming,
         started: Instant,
     ) -> Result<(), TransportError> {
+        let word = outgoing.flag_word();
         for (to, sender) in Rank::all(self.size()).zip(&self.senders) {
-            let old = incoming.take(to);
-            let frame = outgoing.replace(to, old);
+            let old = incoming.as_owned().take(to);
+            let message = outgoing.as_owned().replace(to, old);
             let Some(sender) = sender else {
-                incoming.put(to, frame);
+                incoming.as_owned().put(to, message);
+                incoming.hear(word);
                 continue;
             };
             let left = self.peer_timeout.saturating_sub(started.elapsed());
-            sender.send_timeout(frame, left).map_err(|error| match error {
+            sender.send_timeout((message, word), left).map_err(|error| match error {
                 SendTimeoutError::Disconnected(_) => left_early(to),
                 SendTimeoutError::Timeout(_) => TransportError::Timeout { rank: to, waited: started.elapsed() },
             })?;
@@ -172,12 +183,13 @@ impl Links {
         Ok(())
     }
 
-    fn receiver(&self, from: Rank) -> &Receiver<Vec<u8>> {
+    fn receiver(&self, from: Rank) -> &Receiver<Frame> {
         self.receivers[from.index()].as_ref().expect("every other rank has a channel to this one")
     }
 
-    fn accept(&mut self, from: Rank, frame: Vec<u8>, incoming: &mut Incoming) {
-        incoming.put(from, frame);
+    fn accept(&mut self, from: Rank, (message, word): Frame, incoming: &mut Incoming) {
+        incoming.as_owned().put(from, message);
+        incoming.hear(word);
         self.awaited[from.index()] = false;
     }
 

@@ -82,7 +82,7 @@ impl Builder {
     /// Makes the endpoint. Call this on the rank's own thread.
     pub fn build(mut self) -> Channel {
         self.links.join_run();
-        let outgoing = Outgoing::new(self.links.size());
+        let outgoing = Outgoing::owned(self.links.size());
         Channel { links: self.links, outgoing }
     }
 }
@@ -105,7 +105,9 @@ impl Transport for Channel {
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
         self.links.check()?;
-        self.outgoing.prepare(self.links.rank(), lengths)?;
+        self.outgoing.begin_prepare(self.links.rank(), lengths)?;
+        self.outgoing.as_owned().resize(lengths);
+        self.outgoing.end_prepare();
         Ok(&mut self.outgoing)
     }
 

@@ -86,7 +86,8 @@ fn what_was_sent_before_leaving_arrives() {
     a.prepare(&[1, 1]).unwrap().iter_mut().for_each(|(_, frame)| frame.copy_from_slice(b"a"));
     a.outgoing.begin_exchange(Rank(0)).unwrap();
     let mut incoming = Incoming::default();
-    incoming.resize(2);
+    incoming.begin(2);
+    incoming.as_owned().resize(2);
     a.links.send(&mut a.outgoing, &mut incoming, Instant::now()).unwrap();
     has_left.recv().unwrap();
     a.links.receive(&mut incoming, Instant::now()).unwrap();

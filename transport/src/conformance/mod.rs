@@ -24,14 +24,15 @@
 //! ```
 //!
 //! Where ranks are processes, the harness passes [`Case::name`] to the program it launches, and that program looks the
-//! case up with [`case`], runs its [`body`](Case::body) on its endpoint, and exits with a code by which the harness
-//! tells the outcomes apart. A body checks what it sees and panics where the contract is broken; it asserts no time
+//! case up with [`case`] and runs it with [`process::record`], which leaves a file from which the harness learns how it
+//! ended. Cases that lose no rank may run one after another on one endpoint. A body checks what it sees and panics where the contract is broken; it asserts no time
 //! that a slow machine could miss. The one clock it compares between ranks is the system clock, in `barrier_separates`,
 //! so the ranks have to share one.
 //!
 //! A run that hangs is for the harness's caller to end: put [`check_all`] under a watchdog.
 
 mod loss;
+pub mod process;
 mod rounds;
 mod shared;
 
@@ -189,6 +190,7 @@ pub static CASES: &[Case] = &[
     healthy("identity", "ranks are 0 .. size and do not change", ALL_SIZES, rounds::identity),
     healthy("all_to_all", "messages of distinct lengths and contents reach their ranks", ALL_SIZES, rounds::all_to_all),
     healthy("empty_messages", "empty messages are messages", ALL_SIZES, rounds::empty_messages),
+    healthy("flag_words", "every rank gets the least flag word of a round", ALL_SIZES, rounds::flag_words),
     healthy("large_messages", "16 MB arrive whole, and small messages after them", FEW, rounds::large_messages),
     healthy("thousand_rounds", "rounds do not mix over a thousand of them", ALL_SIZES, rounds::thousand_rounds),
     healthy("to_oneself", "a rank can send to itself alone", ALL_SIZES, rounds::to_oneself),

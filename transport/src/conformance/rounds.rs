@@ -98,6 +98,36 @@ pub(super) fn empty_messages(transport: &mut dyn Transport) {
     }
 }
 
+pub(super) fn flag_words(transport: &mut dyn Transport) {
+    let (own, size) = (transport.rank().index() as u64, transport.size() as u64);
+    let mut incoming = Incoming::default();
+    // Differ from rank to rank and round to round, in the upper half of the word or only in the lower one.
+    let word = |rank: u64, number: u64| match (rank + number) % size {
+        place if number.is_multiple_of(2) => u128::from(place + number) << 64 | u128::from(u64::MAX - place),
+        place => u128::from(place + number),
+    };
+    for number in 0..4 * size {
+        let lengths = if number % 3 == 0 { vec![8; size as usize] } else { vec![0; size as usize] };
+        let outgoing = transport.prepare(&lengths).unwrap();
+        outgoing.set_flag_word(word(own, number));
+        transport.exchange(&mut incoming).unwrap();
+        let least = (0..size).map(|rank| word(rank, number)).min();
+        assert_eq!(Some(incoming.flag_word()), least, "round {number}");
+
+        // One rank alone says something; then nobody does.
+        let speaks = own == number % size;
+        let outgoing = transport.prepare(&lengths).unwrap();
+        if speaks {
+            outgoing.set_flag_word(u128::MAX - 1);
+        }
+        transport.exchange(&mut incoming).unwrap();
+        assert_eq!(incoming.flag_word(), u128::MAX - 1, "said by rank {}", number % size);
+        transport.prepare(&lengths).unwrap();
+        transport.exchange(&mut incoming).unwrap();
+        assert_eq!(incoming.flag_word(), u128::MAX, "a word is for one round");
+    }
+}
+
 pub(super) fn large_messages(transport: &mut dyn Transport) {
     const LARGE: usize = 16 << 20;
     let mut incoming = Incoming::default();

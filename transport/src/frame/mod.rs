@@ -1,0 +1,257 @@
+//! The memory of one round: what a rank sends and what it receives.
+//!
+//! Both types hide where their bytes live, so that a backend can hand out memory of its own: each kind of memory is a
+//! variant of two private enums and a file here. Inside one process it is one `Vec<u8>` per rank ([`owned`]): a message
+//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it.
+
+mod owned;
+
+use crate::{Rank, TransportError};
+pub(crate) use owned::{OwnedIncoming, OwnedOutgoing};
+use std::time::Duration;
+
+/// The flag word of a rank that has nothing to say: the greatest, so that any other wins over it.
+const NO_WORD: u128 = u128::MAX;
+
+/// One writable buffer per destination, of exactly the length that was asked for in
+/// [`prepare`](crate::Transport::prepare), and the flag word of this rank.
+///
+/// The buffers hold arbitrary bytes of earlier rounds until they are written. Parallel code shares the slices of
+/// [`iter_mut`](Outgoing::iter_mut) between threads, not this type, whose memory may be bound to one thread.
+#[derive(Debug)]
+pub struct Outgoing {
+    memory: OutgoingMemory,
+    size: usize,
+    flag_word: u128,
+    /// Whether the buffers were prepared and not yet sent.
+    ready: bool,
+}
+
+/// Where the bytes to send are.
+#[derive(Debug)]
+pub(crate) enum OutgoingMemory {
+    Owned(OwnedOutgoing),
+}
+
+impl Outgoing {
+    pub(crate) fn new(size: usize, memory: OutgoingMemory) -> Outgoing {
+        Outgoing { memory, size, flag_word: NO_WORD, ready: false }
+    }
+
+    /// For backends that move a buffer per rank.
+    pub(crate) fn owned(size: usize) -> Outgoing {
+        Outgoing::new(size, OutgoingMemory::Owned(OwnedOutgoing::new(size)))
+    }
+
+    /// The number of destinations, which is the number of ranks.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The buffer that goes to `rank`.
+    ///
+    /// # Panics
+    /// If there is no such rank.
+    pub fn to(&mut self, rank: Rank) -> &mut [u8] {
+        match &mut self.memory {
+            OutgoingMemory::Owned(frames) => frames.to(rank),
+        }
+    }
+
+    /// Every destination with its buffer, in rank order.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (Rank, &mut [u8])> {
+        let frames = match &mut self.memory {
+            OutgoingMemory::Owned(frames) => FramesMut::Owned(frames.iter_mut()),
+        };
+        Rank::all(self.size).zip(frames)
+    }
+
+    /// Sets the word that goes to every rank beside the messages; [`Incoming::flag_word`] is the least of all. Without
+    /// this it is `u128::MAX`, which is never less than another's.
+    pub fn set_flag_word(&mut self, word: u128) {
+        self.flag_word = word;
+    }
+
+    /// The word of this rank.
+    pub(crate) fn flag_word(&self) -> u128 {
+        self.flag_word
+    }
+
+    /// The buffers of a backend that moves one per rank.
+    pub(crate) fn as_owned(&mut self) -> &mut OwnedOutgoing {
+        match &mut self.memory {
+            OutgoingMemory::Owned(frames) => frames,
+        }
+    }
+
+    /// Begins a prepare: what an earlier one prepared is discarded, whether or not the lengths are right.
+    pub(crate) fn begin_prepare(&mut self, rank: Rank, lengths: &[usize]) -> Result<(), TransportError> {
+        (self.flag_word, self.ready) = (NO_WORD, false);
+        if lengths.len() == self.size {
+            return Ok(());
+        }
+        Err(TransportError::usage(format!(
+            "rank {rank}: prepare was given {} lengths for {} ranks; give one per rank, 0 for nothing to send",
+            lengths.len(),
+            self.size
+        )))
+    }
+
+    /// Ends a prepare: the buffers have the lengths asked for.
+    pub(crate) fn end_prepare(&mut self) {
+        self.ready = true;
+    }
+
+    /// Begins the sending: the round is spent from here on.
+    pub(crate) fn begin_exchange(&mut self, rank: Rank) -> Result<(), TransportError> {
+        if std::mem::take(&mut self.ready) {
+            Ok(())
+        } else {
+            Err(TransportError::usage(format!(
+                "rank {rank}: exchange without prepare; prepare every round, with lengths 0 for nothing to send"
+            )))
+        }
+    }
+}
+
+/// The buffers of [`Outgoing`], in rank order.
+enum FramesMut<'a> {
+    Owned(std::slice::IterMut<'a, Vec<u8>>),
+}
+
+impl<'a> Iterator for FramesMut<'a> {
+    type Item = &'a mut [u8];
+
+    fn next(&mut self) -> Option<&'a mut [u8]> {
+        match self {
+            FramesMut::Owned(frames) => frames.next().map(Vec::as_mut_slice),
+        }
+    }
+}
+
+/// What one round brought: one message from every rank, this one included, and the least of all flag words.
+///
+/// Keep one value and pass it to every exchange: its old messages become the memory of later ones, and then a warm
+/// exchange allocates nothing. The messages stay valid until the next exchange that is given this value, or until it is
+/// dropped. As with [`Outgoing`], share the slices between threads, not the value.
+#[derive(Debug, Default)]
+pub struct Incoming {
+    memory: IncomingMemory,
+    size: usize,
+    flag_word: u128,
+    waited: Duration,
+}
+
+/// Where the received bytes are.
+#[derive(Debug)]
+pub(crate) enum IncomingMemory {
+    Owned(OwnedIncoming),
+}
+
+impl Default for IncomingMemory {
+    fn default() -> IncomingMemory {
+        IncomingMemory::Owned(OwnedIncoming::default())
+    }
+}
+
+impl Incoming {
+    /// The number of sources: the number of ranks, or 0 before the first exchange.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// What `rank` sent, possibly nothing.
+    ///
+    /// # Panics
+    /// If there is no such rank, or before the first exchange.
+    pub fn from(&self, rank: Rank) -> &[u8] {
+        match &self.memory {
+            IncomingMemory::Owned(frames) => frames.from(rank),
+        }
+    }
+
+    /// Every source with what it sent, in rank order.
+    pub fn iter(&self) -> impl Iterator<Item = (Rank, &[u8])> {
+        Rank::all(self.size).map(|rank| (rank, self.from(rank)))
+    }
+
+    /// The least of the words that the ranks set in this round.
+    pub fn flag_word(&self) -> u128 {
+        self.flag_word
+    }
+
+    /// The part of the exchange in which this rank, having sent everything, waited for others, or for bytes on their way.
+    pub fn waited(&self) -> Duration {
+        self.waited
+    }
+
+    /// Begins a round among so many ranks, whose flag words are all to be [`hear`](Incoming::hear)d.
+    pub(crate) fn begin(&mut self, size: usize) {
+        (self.size, self.flag_word) = (size, NO_WORD);
+    }
+
+    /// Takes the flag word of one rank into account.
+    pub(crate) fn hear(&mut self, word: u128) {
+        self.flag_word = self.flag_word.min(word);
+    }
+
+    /// Ends a round.
+    pub(crate) fn end(&mut self, waited: Duration) {
+        self.waited = waited;
+    }
+
+    /// Buffers for a backend that moves one per rank.
+    pub(crate) fn as_owned(&mut self) -> &mut OwnedIncoming {
+        match &mut self.memory {
+            IncomingMemory::Owned(frames) => frames,
+        }
+    }
+
+    /// Forgets every message, so that a failed round cannot be mistaken for a received one.
+    pub(crate) fn clear(&mut self) {
+        *self = Incoming::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn prepare(outgoing: &mut Outgoing, rank: Rank, lengths: &[usize]) -> Result<(), TransportError> {
+        outgoing.begin_prepare(rank, lengths)?;
+        outgoing.as_owned().resize(lengths);
+        outgoing.end_prepare();
+        Ok(())
+    }
+
+    #[test]
+    fn buffers_have_the_prepared_lengths() {
+        let mut outgoing = Outgoing::owned(3);
+        for lengths in [[4, 0, 9], [1, 7, 0]] {
+            prepare(&mut outgoing, Rank(0), &lengths).unwrap();
+            let seen: Vec<_> = outgoing.iter_mut().map(|(rank, frame)| (rank, frame.len())).collect();
+            assert_eq!(seen, [(Rank(0), lengths[0]), (Rank(1), lengths[1]), (Rank(2), lengths[2])]);
+            assert_eq!(outgoing.to(Rank(1)).len(), lengths[1]);
+        }
+    }
+
+    #[test]
+    fn a_failed_prepare_leaves_nothing_prepared() {
+        let mut outgoing = Outgoing::owned(2);
+        prepare(&mut outgoing, Rank(1), &[1, 1]).unwrap();
+        let error = prepare(&mut outgoing, Rank(1), &[1]).unwrap_err();
+        assert!(error.to_string().starts_with("rank 1: prepare was given 1 lengths for 2 ranks"), "{error}");
+        let error = outgoing.begin_exchange(Rank(1)).unwrap_err();
+        assert!(error.to_string().starts_with("rank 1: exchange without prepare"), "{error}");
+    }
+
+    #[test]
+    fn a_flag_word_is_for_one_round() {
+        let mut outgoing = Outgoing::owned(1);
+        prepare(&mut outgoing, Rank(0), &[0]).unwrap();
+        outgoing.set_flag_word(7);
+        assert_eq!(outgoing.flag_word(), 7);
+        prepare(&mut outgoing, Rank(0), &[0]).unwrap();
+        assert_eq!(outgoing.flag_word(), NO_WORD);
+    }
+}
