@@ -3,17 +3,20 @@
 //! A frame is everything one rank tells another at one sync point:
 //!
 //! ```text
-//! header   bincode, fixed-width little-endian: format, step, sync point, verdict, number of messages
+//! header   bincode, fixed-width little-endian: format, step, sync point, number of messages
 //! counts   per message seven u32: source, destination, and how many of each of the five records
 //! records  per message the five arrays, as they lie in memory
 //! ```
+//!
+//! Ranks that have no message for each other exchange no frame. The verdict, which every rank must hear, travels beside
+//! the frames, as a word.
 //!
 //! `bincode` 2.0.1 is its last release and is pinned; only the header goes through it. Records are plain old data
 //! (`bytemuck`), copied in and out with one `memcpy` each, which needs no alignment of the frame.
 
 use crate::error::CodecError;
-use crate::halo::{Inbox, Message, Outbox, Verdict};
-use crate::id::{GlobalId, TileId};
+use crate::halo::{Inbox, Message, Outbox};
+use crate::id::TileId;
 use bincode::config::{Configuration, Fixint, Limit, LittleEndian};
 use bincode::{Decode, Encode};
 use bytemuck::Pod;
@@ -22,37 +25,22 @@ use bytemuck::Pod;
 mod tests;
 
 /// The version of the frame; grows with every change of any record.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 #[derive(Encode, Decode)]
 struct Header {
     format: u32,
     step: u64,
     sync: u32,
-    stop: bool,
-    failure: Option<(u64, u64)>,
     messages: u32,
 }
 
-const HEADER_LIMIT: usize = 64;
+/// Bytes of a header: its integers have fixed widths.
+const HEADER: usize = 4 + 8 + 4 + 4;
 const COUNTS: usize = 7 * 4;
 
-fn config() -> Configuration<LittleEndian, Fixint, Limit<HEADER_LIMIT>> {
+fn config() -> Configuration<LittleEndian, Fixint, Limit<HEADER>> {
     bincode::config::standard().with_fixed_int_encoding().with_limit()
-}
-
-impl Header {
-    fn of(outbox: &Outbox, messages: usize) -> Self {
-        let (step, sync) = outbox.moment();
-        let Verdict { stop, failure } = outbox.verdict();
-        let failure = failure.map(|(step, id)| (step, id.0));
-        Self { format: FORMAT, step, sync, stop, failure, messages: messages as u32 }
-    }
-
-    fn length(&self) -> usize {
-        // Fixed-width integers; an Option is a byte and its content.
-        4 + 8 + 4 + 1 + (1 + if self.failure.is_some() { 16 } else { 0 }) + 4
-    }
 }
 
 /// The five arrays of a message, each as one expression: their order on the wire.
@@ -117,39 +105,76 @@ fn message_length(message: &Message) -> usize {
     length
 }
 
-impl Outbox {
-    /// Writes into `lengths`, for each of `size` ranks, how many bytes its frame takes. The own rank gets none: its
-    /// messages are for [`Outbox::deliver`].
-    pub fn frame_lengths(&self, size: usize, rank_of: &dyn Fn(TileId) -> usize, own: usize, lengths: &mut Vec<usize>) {
+/// The messages of an outbox dealt out to ranks, a frame for each. Keep one value: it keeps its memory.
+#[derive(Default, Debug)]
+pub struct Frames {
+    /// Bytes of each rank's frame.
+    lengths: Vec<usize>,
+    /// Where each rank's messages end in `order`; they begin where those of the rank before end.
+    ends: Vec<usize>,
+    /// Every message for another rank, by rank, as its bag and its place in there.
+    order: Vec<(u32, u32)>,
+}
+
+impl Frames {
+    /// Deals out the messages for `size` ranks. The rank `own` gets none: its messages are for [`Outbox::deliver`].
+    /// Takes time for each message and each rank.
+    pub fn deal(&mut self, outbox: &Outbox, size: usize, own: usize, rank_of: &dyn Fn(TileId) -> usize) {
+        let Self { lengths, ends, order } = self;
         lengths.clear();
-        lengths.resize(size, Header::of(self, 0).length());
-        for message in self.messages() {
-            lengths[rank_of(message.to)] += message_length(message);
+        lengths.resize(size, 0);
+        // Counted at first, one place further on, so that adding up gives where each begins.
+        ends.clear();
+        ends.resize(size + 1, 0);
+        let others = || outbox.numbered_messages().map(|(place, m)| (place, m, rank_of(m.to))).filter(|m| m.2 != own);
+        for (_, message, rank) in others() {
+            lengths[rank] += message_length(message) + if lengths[rank] == 0 { HEADER } else { 0 };
+            ends[rank + 1] += 1;
         }
-        lengths[own] = 0;
+        for rank in 0..size {
+            ends[rank + 1] += ends[rank];
+        }
+        order.clear();
+        order.resize(ends[size], (0, 0));
+        for (place, _, rank) in others() {
+            order[ends[rank]] = place;
+            ends[rank] += 1;
+        }
+        ends.truncate(size);
     }
 
-    /// Writes the frame for `rank` into `bytes`, whose length [`Outbox::frame_lengths`] gave.
+    /// How many bytes the frame of each rank takes; zero where there is nothing to say.
+    pub fn lengths(&self) -> &[usize] {
+        &self.lengths
+    }
+
+    /// Writes the frame for `rank` into `bytes`. The outbox must be the one that was dealt out, as it was.
     ///
     /// # Panics
-    /// If the length is another one.
-    pub fn encode(&self, rank: usize, rank_of: &dyn Fn(TileId) -> usize, bytes: &mut [u8]) {
-        let mine = || self.messages().filter(|message| rank_of(message.to) == rank);
-        let header = Header::of(self, mine().count());
+    /// If `bytes` has another length than [`lengths`](Self::lengths) says.
+    pub fn encode(&self, outbox: &Outbox, rank: usize, bytes: &mut [u8]) {
+        assert_eq!(bytes.len(), self.lengths[rank], "the frame has the length announced");
+        let start = if rank == 0 { 0 } else { self.ends[rank - 1] };
+        let order = &self.order[start..self.ends[rank]];
+        if order.is_empty() {
+            return;
+        }
+        let messages = || order.iter().map(|&place| outbox.numbered_message(place));
+        let (step, sync) = outbox.moment();
+        let header = Header { format: FORMAT, step, sync, messages: order.len() as u32 };
         let mut at = bincode::encode_into_slice(&header, bytes, config()).expect("the header fits its frame");
         let mut put = |source: &[u8]| {
             bytes[at..at + source.len()].copy_from_slice(source);
             at += source.len();
         };
-        for message in mine() {
+        for message in messages() {
             put(&message.from.0.to_le_bytes());
             put(&message.to.0.to_le_bytes());
             each_array!(arrays!(&message), array => put(&(array.len() as u32).to_le_bytes()));
         }
-        for message in mine() {
+        for message in messages() {
             each_array!(arrays!(&message), array => put(bytemuck::cast_slice(array)));
         }
-        assert_eq!(at, bytes.len(), "the frame has the length announced");
     }
 }
 
@@ -184,7 +209,7 @@ impl<'a> Reader<'a> {
 }
 
 impl Inbox {
-    /// Reads another rank's frame, straight from the bytes it came in.
+    /// Reads another rank's frame, which is not empty, straight from the bytes it came in.
     ///
     /// # Errors
     /// On bytes that are not a frame of this version, step and sync point, whole and with nothing after it, for tiles
@@ -221,8 +246,6 @@ impl Inbox {
         if !reader.rest.is_empty() {
             return Err(CodecError::Length { length, announced: (length - reader.rest.len()) as u64 });
         }
-        let failure = header.failure.map(|(step, id)| (step, GlobalId(id)));
-        self.hear(Verdict { stop: header.stop, failure });
         Ok(())
     }
 }

@@ -163,6 +163,29 @@ impl Verdict {
         };
         Self { stop: self.stop | other.stop, failure }
     }
+
+    /// As a word for the outside to carry: the least word of all ranks stands for all their verdicts joined. A failure
+    /// hides a stop, which makes no difference: it ends the run.
+    pub fn to_word(self) -> u128 {
+        match self {
+            // A run never counts as many steps as would make this one of the words below.
+            Self { failure: Some((step, id)), .. } => u128::from(step) << 64 | u128::from(id.0),
+            Self { stop: true, .. } => Self::STOP,
+            Self { stop: false, .. } => Self::NOTHING,
+        }
+    }
+
+    /// Reads [`to_word`](Self::to_word).
+    pub fn from_word(word: u128) -> Self {
+        match word {
+            Self::NOTHING => Self::default(),
+            Self::STOP => Self { stop: true, failure: None },
+            _ => Self { stop: false, failure: Some(((word >> 64) as u64, GlobalId(word as u64))) },
+        }
+    }
+
+    const NOTHING: u128 = u128::MAX;
+    const STOP: u128 = u128::MAX - 1;
 }
 
 /// The messages one tile sends, or receives, at one sync point. Keeps its buffers: those beyond `used` are empty.
@@ -258,6 +281,16 @@ impl Outbox {
     /// All messages.
     pub fn messages(&self) -> impl Iterator<Item = &Message> {
         self.bags.iter().flat_map(Mailbag::messages)
+    }
+
+    /// All messages, each with its bag and its place in there.
+    pub(crate) fn numbered_messages(&self) -> impl Iterator<Item = ((u32, u32), &Message)> {
+        let bags = (0..).zip(&self.bags);
+        bags.flat_map(|(bag, mail)| (0..).zip(mail.messages()).map(move |(place, message)| ((bag, place), message)))
+    }
+
+    pub(crate) fn numbered_message(&self, (bag, place): (u32, u32)) -> &Message {
+        &self.bags[bag as usize].messages()[place as usize]
     }
 }
 

@@ -48,7 +48,7 @@
 //! # Several ranks
 //!
 //! Give each rank's [`World`] its own tiles, and write a halo that hands what [`Outbox::deliver`] leaves to the other
-//! ranks as bytes ([`Outbox::frame_lengths`], [`Outbox::encode`], [`Inbox::decode`]). At the end of a run [`finish`]
+//! ranks as bytes ([`Frames`], [`Inbox::decode`]) and the [`Verdict`] of each to all. At the end of a run [`finish`]
 //! makes the closing exchange.
 //!
 //! # What determinism promises
@@ -89,7 +89,7 @@ mod violation;
 mod world;
 
 pub use body::{Bodies, Body, StaticBody};
-pub use codec::FORMAT;
+pub use codec::{FORMAT, Frames};
 pub use contact::{Contact, ContactPoint};
 pub use error::{CodecError, SetupError, StepError};
 pub use facts::{Facts, TileFacts};

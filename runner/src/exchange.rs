@@ -1,8 +1,9 @@
 //! The halo of the physics over a transport: one frame per pair of ranks and sync point.
 
 use crate::assignment::Assignment;
-use atoll_core::{CodecError, Halo, Inbox, Outbox, TileId};
+use atoll_core::{CodecError, Frames, Halo, Inbox, Outbox, TileId, Verdict};
 use atoll_transport::{Incoming, Rank, Transport, TransportError};
+use std::time::Duration;
 use thiserror::Error;
 
 /// Why a sync point failed.
@@ -26,16 +27,22 @@ pub enum ExchangeError {
 pub struct RankHalo<'a, T> {
     transport: T,
     assignment: &'a Assignment,
-    /// Bytes for each rank; kept for its memory.
-    lengths: Vec<usize>,
+    /// What goes to each rank; kept for its memory.
+    frames: Frames,
     /// What came last; kept for its memory.
     incoming: Incoming,
+    waited: Duration,
 }
 
 impl<'a, T: Transport> RankHalo<'a, T> {
     /// A halo that finds tiles by `assignment`, which every rank must hold alike.
     pub fn new(transport: T, assignment: &'a Assignment) -> Self {
-        Self { transport, assignment, lengths: Vec::new(), incoming: Incoming::default() }
+        Self { transport, assignment, frames: Frames::default(), incoming: Incoming::default(), waited: Duration::ZERO }
+    }
+
+    /// How long this rank has waited for others in all sync points.
+    pub fn waited(&self) -> Duration {
+        self.waited
     }
 
     /// The transport, for what ranks do together outside of steps.
@@ -48,20 +55,20 @@ impl<T: Transport> Halo for RankHalo<'_, T> {
     type Error = ExchangeError;
 
     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), ExchangeError> {
-        let (own, size) = (self.transport.rank(), self.transport.size());
-        let rank_of = |tile: TileId| self.assignment.rank_of(tile);
-        let others = || Rank::all(size).filter(|&rank| rank != own);
-
-        outbox.frame_lengths(size, &rank_of, own.index(), &mut self.lengths);
-        let outgoing = self.transport.prepare(&self.lengths)?;
-        for to in others() {
-            outbox.encode(to.index(), &rank_of, outgoing.to(to));
+        let (own, size) = (self.transport.rank().index(), self.transport.size());
+        self.frames.deal(outbox, size, own, &|tile: TileId| self.assignment.rank_of(tile));
+        let outgoing = self.transport.prepare(self.frames.lengths())?;
+        outgoing.set_flag_word(outbox.verdict().to_word());
+        for (to, bytes) in outgoing.iter_mut().filter(|(_, bytes)| !bytes.is_empty()) {
+            self.frames.encode(outbox, to.index(), bytes);
         }
         self.transport.exchange(&mut self.incoming)?;
+        self.waited += self.incoming.waited();
         // What stays on this rank never becomes bytes.
         outbox.deliver(inbox);
-        for from in others() {
-            inbox.decode(self.incoming.from(from)).map_err(|error| ExchangeError::Frame { from, error })?;
+        inbox.hear(Verdict::from_word(self.incoming.flag_word()));
+        for (from, bytes) in self.incoming.iter().filter(|(_, bytes)| !bytes.is_empty()) {
+            inbox.decode(bytes).map_err(|error| ExchangeError::Frame { from, error })?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Ranks as threads that hand each other frames through channels: the smallest halo there can be for more than one.
 
 use crate::world::Scene;
-use atoll_core::{Exchange, Halo, Inbox, Outbox, TileId, World};
+use atoll_core::{Exchange, Frames, Halo, Inbox, Outbox, TileId, Verdict, World};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
@@ -27,9 +27,9 @@ pub struct Spread<'a> {
 pub struct RankHalo<'a> {
     own: usize,
     rank_of: RankOf<'a>,
-    to: Vec<Sender<Vec<u8>>>,
-    from: Vec<Receiver<Vec<u8>>>,
-    lengths: Vec<usize>,
+    to: Vec<Sender<(Vec<u8>, u128)>>,
+    from: Vec<Receiver<(Vec<u8>, u128)>>,
+    frames: Frames,
     /// Bytes sent so far.
     pub bytes: usize,
 }
@@ -39,18 +39,22 @@ impl Halo for RankHalo<'_> {
 
     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), String> {
         let rank_of = |tile| (self.rank_of)(tile);
-        outbox.frame_lengths(self.to.len(), &rank_of, self.own, &mut self.lengths);
-        for (rank, &length) in self.lengths.iter().enumerate().filter(|&(rank, _)| rank != self.own) {
+        self.frames.deal(outbox, self.to.len(), self.own, &rank_of);
+        let word = outbox.verdict().to_word();
+        for (rank, &length) in self.frames.lengths().iter().enumerate().filter(|&(rank, _)| rank != self.own) {
             let mut frame = vec![0; length];
-            outbox.encode(rank, &rank_of, &mut frame);
-            self.to[rank].send(frame).map_err(|_| format!("rank {rank} has left"))?;
+            self.frames.encode(outbox, rank, &mut frame);
+            self.to[rank].send((frame, word)).map_err(|_| format!("rank {rank} has left"))?;
             self.bytes += length;
         }
         outbox.deliver(inbox);
         // Against the order of ranks: what arrives first must not matter.
         for rank in (0..self.from.len()).rev().filter(|&rank| rank != self.own) {
-            let frame = self.from[rank].recv().map_err(|_| format!("rank {rank} has left"))?;
-            inbox.decode(&frame).map_err(|error| format!("from rank {rank}: {error}"))?;
+            let (frame, word) = self.from[rank].recv().map_err(|_| format!("rank {rank} has left"))?;
+            inbox.hear(Verdict::from_word(word));
+            if !frame.is_empty() {
+                inbox.decode(&frame).map_err(|error| format!("from rank {rank}: {error}"))?;
+            }
         }
         Ok(())
     }
@@ -61,7 +65,7 @@ pub fn run<R: Send>(scene: &Scene, spread: Spread<'_>, work: impl Fn(World, &mut
     let Spread { tiles, exchange, ranks, rank_of, threads } = spread;
     let blueprint = scene.blueprint(tiles, exchange);
     let mut halos: Vec<_> = (0..ranks)
-        .map(|own| RankHalo { own, rank_of, to: Vec::new(), from: Vec::new(), lengths: Vec::new(), bytes: 0 })
+        .map(|own| RankHalo { own, rank_of, to: Vec::new(), from: Vec::new(), frames: Frames::default(), bytes: 0 })
         .collect();
     for from in 0..ranks {
         for to in 0..ranks {

@@ -3,7 +3,7 @@
 use super::assert_one_line;
 use atoll_core::{
     Blueprint, Exchange, FORMAT, Halo, Inbox, Kind, Material, Message, Outbox, Params, Shape, StepError, TileGrid,
-    TileId, Verdict, World, step,
+    TileId, World, step,
 };
 use bytemuck::cast_slice;
 use glam::DVec2;
@@ -42,20 +42,14 @@ pub fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
     ear.heard.expect("a step begins with an exchange")
 }
 
-/// A frame of step 0, sync point 0, written after the description of the format alone: what `Outbox::encode` would
+/// A frame of step 0, sync point 0, written after the description of the format alone: what `Frames::encode` would
 /// write.
-pub fn frame<'a>(verdict: Verdict, messages: impl Iterator<Item = &'a Message> + Clone) -> Vec<u8> {
+pub fn frame<'a>(messages: impl Iterator<Item = &'a Message> + Clone) -> Vec<u8> {
     let mut bytes = Vec::new();
     let count = |length: usize| (length as u32).to_le_bytes();
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend(0_u64.to_le_bytes());
     bytes.extend(0_u32.to_le_bytes());
-    bytes.push(u8::from(verdict.stop));
-    bytes.push(u8::from(verdict.failure.is_some()));
-    if let Some((step, id)) = verdict.failure {
-        bytes.extend(step.to_le_bytes());
-        bytes.extend(id.0.to_le_bytes());
-    }
     bytes.extend(count(messages.clone().count()));
     for Message { from, to, migrants, contacts, ghosts, refreshes, impulses } in messages.clone() {
         let records = [migrants.len(), contacts.len(), ghosts.len(), refreshes.len(), impulses.len()];
@@ -79,7 +73,7 @@ pub fn frame<'a>(verdict: Verdict, messages: impl Iterator<Item = &'a Message> +
 pub fn codec(bytes: &[u8]) -> bool {
     let decoded = receive(|inbox| {
         let result = inbox.decode(bytes);
-        result.map(|()| frame(inbox.verdict(), inbox.messages().collect::<Vec<_>>().into_iter()))
+        result.map(|()| frame(inbox.messages().collect::<Vec<_>>().into_iter()))
     });
     match &decoded {
         Ok(again) => assert!(again == bytes, "{bytes:02x?} were taken for {again:02x?}"),
