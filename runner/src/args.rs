@@ -34,7 +34,7 @@ pub struct RunArgs {
     /// Threads of each rank [default: the configuration's, else 1].
     #[arg(long, value_name = "T")]
     pub threads: Option<String>,
-    /// What carries bytes between ranks: local or channel [default: local for one rank, else channel].
+    /// What carries bytes between ranks: local, channel, iceoryx2 or mpi [default: local for one rank, else channel].
     #[arg(long, value_name = "NAME")]
     pub transport: Option<String>,
     /// Columns and rows of tiles, such as 17x17, or auto.

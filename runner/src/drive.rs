@@ -1,12 +1,14 @@
 //! One rank of a run, from an empty world to the last figure.
 
+use crate::error::Exit;
 use crate::exchange::{ExchangeError, RankHalo};
 use crate::interrupt::StopFlag;
 use crate::plan::Plan;
 use crate::progress::{Progress, Show};
-use crate::summary::{RankFacts, Summary};
+use crate::summary::{Gathered, RankFacts};
 use atoll_core::{SetupError, StepError, StepReport, TileFacts, World};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
+use bytemuck::Pod;
 use rayon::ThreadPoolBuilder;
 use std::time::Instant;
 use tracing::{debug, info, info_span};
@@ -38,6 +40,23 @@ pub enum RankError {
     Step(StepError<ExchangeError>),
     /// Outside of a step, the transport failed.
     Transport(TransportError),
+    /// It said so itself, in a process of its own.
+    Told {
+        /// Its words.
+        text: String,
+        /// The exit code they go with.
+        exit: Exit,
+    },
+}
+
+impl RankError {
+    /// What the transport said, if it was the transport.
+    pub fn transport(&self) -> Option<&TransportError> {
+        match self {
+            Self::Transport(error) | Self::Step(StepError::Halo(ExchangeError::Transport(error))) => Some(error),
+            _ => None,
+        }
+    }
 }
 
 /// How a rank ended.
@@ -45,8 +64,8 @@ pub enum RankError {
 pub struct RankEnd {
     /// Steps it completed.
     pub complete: u64,
-    /// The summary, of rank 0.
-    pub result: Result<Option<Box<Summary>>, RankError>,
+    /// What all ranks have to say, of rank 0.
+    pub result: Result<Option<Gathered>, RankError>,
 }
 
 /// Runs one rank, with a pool of threads of its own that this thread becomes part of. `leads_process` is true for one
@@ -79,7 +98,7 @@ fn run<T: Transport>(
     observer: &Observer,
     leads_process: bool,
     complete: &mut u64,
-) -> Result<Option<Box<Summary>>, RankError> {
+) -> Result<Option<Gathered>, RankError> {
     let start = Instant::now();
     let rank = transport.rank();
     let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
@@ -115,11 +134,12 @@ fn run<T: Transport>(
     (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
     facts.build_nanos = (built - start).as_nanos() as u64;
     facts.wall_nanos = (finished - built).as_nanos() as u64;
+    facts.wait_nanos = halo.waited().as_nanos() as u64;
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();
     }
-    gather(halo.transport(), plan, &facts, &tiles).map_err(RankError::Transport)
+    gather(halo.transport(), &facts, &tiles).map_err(RankError::Transport)
 }
 
 /// This rank's part of the scene.
@@ -136,21 +156,37 @@ fn build(plan: &Plan, rank: Rank) -> Result<World, RankError> {
     Ok(world)
 }
 
-/// Brings everything to rank 0, which makes the summary of it.
+/// Brings everything to rank 0.
 fn gather(
     transport: &mut impl Transport,
-    plan: &Plan,
     facts: &RankFacts,
     tiles: &[TileFacts],
-) -> Result<Option<Box<Summary>>, TransportError> {
+) -> Result<Option<Gathered>, TransportError> {
     let ranks = transport.gather(Rank(0), bytemuck::bytes_of(facts))?;
     let tiles = transport.gather(Rank(0), bytemuck::cast_slice(tiles))?;
-    Ok(ranks.zip(tiles).map(|(ranks, tiles)| {
-        let ranks: Vec<RankFacts> = ranks.iter().map(|bytes| bytemuck::pod_read_unaligned(bytes)).collect();
-        let tiles = tiles.iter().flat_map(|bytes| bytes.chunks_exact(size_of::<TileFacts>()));
-        let tiles = tiles.map(bytemuck::pod_read_unaligned::<TileFacts>);
-        Box::new(Summary::new(plan, &ranks, tiles))
-    }))
+    let Some((ranks, tiles)) = ranks.zip(tiles) else { return Ok(None) };
+    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)? };
+    if gathered.ranks.len() == ranks.len() { Ok(Some(gathered)) } else { Err(unreadable(Rank(0))) }
+}
+
+/// What came from all ranks, in their order, as one list.
+fn records<T: Pod>(parts: &[Vec<u8>]) -> Result<Vec<T>, TransportError> {
+    let mut records = Vec::new();
+    for (rank, bytes) in parts.iter().enumerate() {
+        let part = bytes.chunks_exact(size_of::<T>());
+        if !part.remainder().is_empty() {
+            return Err(unreadable(Rank::from_index(rank)));
+        }
+        records.extend(part.map(bytemuck::pod_read_unaligned::<T>));
+    }
+    Ok(records)
+}
+
+fn unreadable(rank: Rank) -> TransportError {
+    TransportError::PeerLost {
+        rank,
+        reason: "its closing figures cannot be read; run one version on all ranks".to_owned(),
+    }
 }
 
 /// The most memory this process ever held, in bytes; zero where the system does not tell.

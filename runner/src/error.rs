@@ -24,6 +24,14 @@ pub enum Exit {
     Interrupted = 130,
 }
 
+impl Exit {
+    /// The exit code of that number; a number that is none of them stands for a lost rank.
+    pub fn from_code(code: u8) -> Self {
+        let all = [Self::Done, Self::Usage, Self::PeerLost, Self::Physics, Self::Output, Self::Interrupted];
+        all.into_iter().find(|exit| *exit as u8 == code).unwrap_or(Self::PeerLost)
+    }
+}
+
 /// A run that has no summary, or could not write it.
 #[derive(Debug, Error)]
 pub enum RunError {
@@ -91,6 +99,41 @@ pub enum RunError {
         /// What happened to it.
         reason: String,
     },
+    /// A transport whose ranks are processes was asked for where there is only this one.
+    #[error("transport {transport} runs ranks as processes of their own, each the program itself; use `atoll run`")]
+    NeedsProcesses {
+        /// Its name.
+        transport: &'static str,
+    },
+    /// The processes of a run were not started alike.
+    #[error("rank {rank} was started with {what} {found}, and most ranks with {expected}; start all of them alike")]
+    Mismatch {
+        /// The odd one.
+        rank: Rank,
+        /// In what it differs.
+        what: String,
+        /// What it has.
+        found: String,
+        /// What the others have.
+        expected: String,
+    },
+    /// A launcher that does not fit.
+    #[error("{0}")]
+    Launcher(String),
+    /// What a rank in a process of its own said.
+    #[error("{text}")]
+    Relayed {
+        /// Its words.
+        text: String,
+        /// The exit code they go with.
+        exit: Exit,
+    },
+    /// What another rank tells the user.
+    #[error("see what another rank says")]
+    ToldElsewhere {
+        /// The exit code that goes with it.
+        exit: Exit,
+    },
     /// The transport was used wrongly.
     #[error("the transport refused after {complete} of {steps} steps: {reason}")]
     Transport {
@@ -156,7 +199,11 @@ impl RunError {
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
             | Self::TooLarge { .. }
-            | Self::Threads { .. } => Exit::Usage,
+            | Self::Threads { .. }
+            | Self::NeedsProcesses { .. }
+            | Self::Mismatch { .. }
+            | Self::Launcher(_) => Exit::Usage,
+            Self::Relayed { exit, .. } | Self::ToldElsewhere { exit } => *exit,
             Self::PeerLost { .. } | Self::Transport { .. } => Exit::PeerLost,
             Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {
                 Exit::Physics

@@ -1,8 +1,8 @@
 //! Stopping a run early, so that all ranks end after the same step.
 
-use crate::error::Exit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tracing::warn;
 
 /// A request to stop, shared by whoever may make it and every rank of this process.
 #[derive(Clone, Default, Debug)]
@@ -19,19 +19,21 @@ impl StopFlag {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// A flag that Ctrl-C, SIGTERM and SIGHUP raise. The second time, the process ends at once.
-    ///
-    /// # Errors
-    /// If the process already handles these signals.
-    pub fn on_signals() -> Result<Self, ctrlc::Error> {
+    /// A flag that Ctrl-C, SIGTERM and SIGHUP raise. The second time, `quit` is called. Where these signals are handled
+    /// already, the flag is one that nobody raises, and a warning says so. `announce` tells whether to say what happens.
+    pub fn on_signals(announce: bool, quit: impl Fn() + Send + 'static) -> Self {
         let flag = Self::default();
         let raised = flag.clone();
-        ctrlc::set_handler(move || {
+        let handled = ctrlc::set_handler(move || {
             if raised.0.swap(true, Ordering::Relaxed) {
-                std::process::exit(Exit::Interrupted as i32);
+                quit();
+            } else if announce {
+                eprintln!("atoll: stopping after this step; interrupt again to quit at once");
             }
-            eprintln!("atoll: stopping after this step; interrupt again to quit at once");
-        })?;
-        Ok(flag)
+        });
+        if let Err(error) = handled {
+            warn!("interrupts will end the run without a summary: {error}");
+        }
+        flag
     }
 }

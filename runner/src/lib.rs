@@ -22,10 +22,13 @@ pub mod config;
 pub mod drive;
 pub mod error;
 pub mod exchange;
+pub mod handshake;
 pub mod interrupt;
 pub mod output;
 pub mod plan;
 pub mod progress;
+#[cfg(feature = "iceoryx2")]
+pub mod report;
 pub mod scene;
 pub mod summary;
 pub mod telemetry;

@@ -11,7 +11,7 @@ use std::fmt;
 const PHASES: usize = Phase::ALL.len();
 
 /// What one rank brings to the summary. Plain data, so that it travels as bytes.
-#[derive(Clone, Copy, Default, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct RankFacts {
     /// Halves of the state hash, the low one first.
@@ -46,8 +46,19 @@ pub struct RankFacts {
     pub build_nanos: u64,
     /// Time of all steps.
     pub wall_nanos: u64,
+    /// Time in which the exchange waited for other ranks.
+    pub wait_nanos: u64,
     /// Time of each phase, in the order of [`Phase::ALL`].
     pub phase_nanos: [u64; PHASES],
+}
+
+/// What all ranks have to say at the end of a run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Gathered {
+    /// By rank.
+    pub ranks: Vec<RankFacts>,
+    /// Of all tiles, in no order in particular.
+    pub tiles: Vec<TileFacts>,
 }
 
 impl RankFacts {
@@ -73,8 +84,17 @@ impl RankFacts {
 
     fn timings(&self, rank: usize, threads: usize) -> RankTimings {
         let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum());
-        let names = Phase::ALL.iter().map(|phase| phase.name());
-        let phases = names.zip(self.phase_nanos).chain([("other", rest)]).collect();
+        let mut phases = Vec::with_capacity(PHASES + 2);
+        for (phase, nanos) in Phase::ALL.into_iter().zip(self.phase_nanos) {
+            if phase == Phase::Exchange {
+                // The part in which nothing was done but wait is told apart.
+                let waited = self.wait_nanos.min(nanos);
+                phases.extend([(phase.name(), nanos - waited), ("wait", waited)]);
+            } else {
+                phases.push((phase.name(), nanos));
+            }
+        }
+        phases.push(("other", rest));
         RankTimings { rank, threads, steps: self.steps, wall_nanos: self.wall_nanos, phases }
     }
 
@@ -172,7 +192,8 @@ pub struct Summary {
     pub constraint_violation: f64,
     /// The greatest, in m/s.
     pub max_constraint_violation: f64,
-    /// Time of each phase; `other` is what no phase accounts for, such as threads out of work.
+    /// Time of each phase; `wait` is the part of the exchange in which a rank waited for others, `other` what no phase
+    /// accounts for, such as threads out of work.
     #[serde(serialize_with = "as_map")]
     pub phases: Vec<(&'static str, PhaseTime)>,
     /// The most memory held, summed over processes.
@@ -183,8 +204,8 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Joins what the ranks and the tiles have to say. `ranks` is in rank order.
-    pub fn new(plan: &Plan, ranks: &[RankFacts], tiles: impl IntoIterator<Item = TileFacts>) -> Self {
+    /// Joins what the ranks and the tiles have to say.
+    pub fn new(plan: &Plan, Gathered { ranks, tiles }: Gathered) -> Self {
         let sum = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).sum::<u64>();
         let most = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).max().unwrap_or(0);
         let facts = Facts::total(tiles);

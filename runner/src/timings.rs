@@ -16,8 +16,8 @@ pub struct RankTimings {
     pub steps: u64,
     /// All steps, from the first to the last.
     pub wall_nanos: u64,
-    /// Each phase in the order of the step, and `other`, which no phase accounts for, such as threads out of work. They
-    /// add up to the whole, but for rounding.
+    /// Each phase in the order of the step, `wait`, the part of the exchange in which it waited for other ranks, and
+    /// `other`, which no phase accounts for, such as threads out of work. They add up to the whole, but for rounding.
     pub phases: Vec<(&'static str, u64)>,
 }
 

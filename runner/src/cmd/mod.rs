@@ -4,10 +4,11 @@ pub mod run;
 
 use crate::args::{self, Cli, Command};
 use crate::config::OneLine;
-use crate::error::Exit;
+use crate::error::{Exit, RunError};
 use crate::telemetry;
 use clap::Parser;
 use clap::error::ErrorKind;
+use std::fmt::Display;
 use std::process::ExitCode;
 
 /// Reads the command line and does what it says.
@@ -20,11 +21,17 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
-        // On one line, whatever names and values the user has given.
-        eprintln!("atoll: {}", OneLine(&error.to_string()));
+        if !matches!(error, RunError::ToldElsewhere { .. }) {
+            complain(&error);
+        }
         error.exit()
     });
     ExitCode::from(exit as u8)
+}
+
+/// On one line, whatever names and values the user has given.
+pub(crate) fn complain(error: &dyn Display) {
+    eprintln!("atoll: {}", OneLine(&error.to_string()));
 }
 
 /// Help and version as they are; complaints on one line.

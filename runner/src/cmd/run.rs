@@ -3,38 +3,99 @@
 use crate::args::RunArgs;
 use crate::backend;
 use crate::config::Config;
+#[cfg(any(feature = "iceoryx2", feature = "mpi"))]
+use crate::config::TransportKind;
 use crate::drive::Observer;
 use crate::error::{Exit, RunError};
 use crate::interrupt::StopFlag;
 use crate::output::WholeFile;
 use crate::plan::Plan;
 use crate::progress::Show;
+use crate::summary::Summary;
 use crate::timings;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use tracing::warn;
 
 /// Does it, with everything that can be refused refused before anything heavy starts.
 ///
 /// # Errors
 /// Whatever ended it without a summary, or with one that fails a check or cannot be written.
 pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
-    let config = Config::load(&args.config, &args.overrides()?)?;
-    let [json, timings] = output_files(args)?;
-    let stop = StopFlag::on_signals().unwrap_or_else(|error| {
-        warn!("interrupts will end the run without a summary: {error}");
-        StopFlag::default()
-    });
+    #[cfg(feature = "iceoryx2")]
+    if let Some(rank) = backend::iceoryx2::RankProcess::of_this() {
+        return rank.run(load(args), observer(args));
+    }
+    let config = load(args);
+    #[cfg(feature = "mpi")]
+    if is_for_mpi(args, &config) {
+        return over_mpi(args, config);
+    }
+    let config = config?;
+    let outputs = Outputs::check(args)?;
     let plan = Plan::new(&config)?;
+    tell(&plan);
+    #[cfg(feature = "iceoryx2")]
+    if plan.transport == TransportKind::Iceoryx2 {
+        return conclude(&backend::iceoryx2::run(&plan, &args.config)?, &outputs);
+    }
+    let stop = StopFlag::on_signals(true, || std::process::exit(Exit::Interrupted as i32));
+    let summary = backend::run(&plan, &Observer { stop, ..observer(args) })?;
+    conclude(&summary, &outputs)
+}
+
+fn load(args: &RunArgs) -> Result<Config, RunError> {
+    Ok(Config::load(&args.config, &args.overrides()?)?)
+}
+
+fn observer(args: &RunArgs) -> Observer {
+    Observer { show: if args.quiet { Show::Nothing } else { Show::OnStderr }, stop: StopFlag::default() }
+}
+
+/// What the user may want to know before the run starts.
+fn tell(plan: &Plan) {
     for note in plan.notes() {
         eprintln!("atoll: {note}");
     }
+}
 
-    let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
-    let summary = backend::run(&plan, &Observer { show, stop })?;
+/// Whether ranks are to be joined by MPI. A configuration that cannot be read leaves the command line to say so, and
+/// then the ranks meet to complain once.
+#[cfg(feature = "mpi")]
+fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
+    match config {
+        Ok(config) => config.transport() == TransportKind::Mpi,
+        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()),
+    }
+}
+
+/// Runs this process as a rank of an MPI job.
+#[cfg(feature = "mpi")]
+fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, RunError> {
+    let mut job = backend::mpi::Job::join()?;
+    let speaks = job.speaks();
+    let prepared = config.and_then(|config| {
+        let plan = Plan::new(&job.adapt(config)?)?;
+        // Only the rank that speaks writes.
+        let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
+        Ok((plan, outputs))
+    });
+    let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    if speaks {
+        tell(&plan);
+    }
+    let stop = StopFlag::on_signals(speaks, || std::process::exit(Exit::Interrupted as i32));
+    match job.run(&plan, &Observer { stop, ..observer(args) })? {
+        Some(summary) => conclude(&summary, &outputs),
+        None => Ok(Exit::Done),
+    }
+}
+
+/// Shows and writes what became of a run, and says with which exit code to end.
+fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // All are tried before any is complained about: the one may save what another lost.
-    let json = json.map_or(Ok(()), |file| file.write(&summary.to_json()));
-    let timings = timings.map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
+    let json = outputs.json.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
+    let timings =
+        outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
     let shown = match write!(io::stdout(), "{summary}") {
         // A reader that has seen enough, as in `atoll run ... | head`, is not a failure.
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -51,13 +112,22 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
-/// Where the summary and the timings are to go, checked.
-fn output_files(args: &RunArgs) -> Result<[Option<WholeFile>; 2], RunError> {
-    let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
-    let (json, timings) = (args.json.as_deref(), args.timings.as_deref());
-    if let Some(path) = timings.filter(|_| json == timings) {
-        let reason = "--json writes to the same file".to_owned();
-        return Err(RunError::BadOutput { option: "--timings", path: path.to_owned(), reason });
+/// The files to write when the run is over.
+#[derive(Default)]
+struct Outputs {
+    json: Option<WholeFile>,
+    timings: Option<WholeFile>,
+}
+
+impl Outputs {
+    /// Where the summary and the timings are to go, checked.
+    fn check(args: &RunArgs) -> Result<Self, RunError> {
+        let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
+        let (json, timings) = (args.json.as_deref(), args.timings.as_deref());
+        if let Some(path) = timings.filter(|_| json == timings) {
+            let reason = "--json writes to the same file".to_owned();
+            return Err(RunError::BadOutput { option: "--timings", path: path.to_owned(), reason });
+        }
+        Ok(Self { json: check("--json", json)?, timings: check("--timings", timings)? })
     }
-    Ok([check("--json", json)?, check("--timings", timings)?])
 }

@@ -138,6 +138,17 @@ pub enum ConfigError {
         /// What works today.
         instead: String,
     },
+    /// A transport that this program was built without.
+    #[error(
+        "{place}: this program was built without it; build it again with `cargo build --release --features {feature}`, \
+         or use \"local\" or \"channel\""
+    )]
+    NotBuiltIn {
+        /// The value.
+        place: Place,
+        /// The feature of the package that brings it.
+        feature: &'static str,
+    },
     /// A key that means nothing beside another value.
     #[error("{place}: {reason}")]
     Inapplicable {

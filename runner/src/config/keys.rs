@@ -18,6 +18,7 @@ pub(super) const KEYS: &[&str] = &[
     "run.transport",
     "run.tiles",
     "run.peer_timeout",
+    "run.mpi_exchange",
     "physics.hertz",
     "physics.substeps",
     "physics.gravity",

@@ -38,8 +38,10 @@ pub struct Config {
 pub struct RunConfig {
     /// How many steps.
     pub steps: u64,
-    /// How many ranks share the tiles.
+    /// How many ranks share the tiles. With transport mpi the launcher decides, and this is only what it should be.
     pub ranks: usize,
+    /// Whether that number was asked for on the command line, so that another one is an error.
+    pub ranks_asked_for: bool,
     /// Threads of each rank.
     pub threads: usize,
     /// What carries bytes between ranks; `None` chooses by their number.
@@ -48,6 +50,18 @@ pub struct RunConfig {
     pub tiles: Option<[u32; 2]>,
     /// A rank that stays silent for so long is given up.
     pub peer_timeout: Duration,
+    /// How ranks exchange messages with transport mpi.
+    pub mpi_exchange: MpiExchange,
+}
+
+/// How ranks exchange messages over MPI. Both ways give the same bits.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum MpiExchange {
+    /// `MPI_Ialltoallv`: right up to hundreds of ranks.
+    #[default]
+    Alltoallv,
+    /// Messages only between ranks that have some: right for thousands.
+    Sparse,
 }
 
 /// What carries bytes between ranks.
@@ -57,14 +71,37 @@ pub enum TransportKind {
     Local,
     /// Ranks are threads of this process.
     Channel,
+    /// Ranks are processes of this machine that share memory.
+    Iceoryx2,
+    /// Ranks are processes that an MPI launcher started.
+    Mpi,
 }
 
 impl TransportKind {
     /// As in a configuration.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Local => "local",
             Self::Channel => "channel",
+            Self::Iceoryx2 => "iceoryx2",
+            Self::Mpi => "mpi",
+        }
+    }
+
+    /// All of them by name.
+    const WORDS: [(&'static str, Self); 4] = [
+        (Self::Local.name(), Self::Local),
+        (Self::Channel.name(), Self::Channel),
+        (Self::Iceoryx2.name(), Self::Iceoryx2),
+        (Self::Mpi.name(), Self::Mpi),
+    ];
+
+    /// Whether this program was built with it.
+    pub fn is_built_in(self) -> bool {
+        match self {
+            Self::Local | Self::Channel => true,
+            Self::Iceoryx2 => cfg!(feature = "iceoryx2"),
+            Self::Mpi => cfg!(feature = "mpi"),
         }
     }
 }
@@ -174,8 +211,12 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
     let ranks = settings.integer("run.ranks", 1..=1024, 1)? as usize;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
-    let transports = [("local", TransportKind::Local), ("channel", TransportKind::Channel)];
-    let transport = settings.choice_of("run.transport", &transports, &["iceoryx2", "mpi"])?;
+    let ranks_asked_for = settings.place("run.ranks").is_some_and(|place| !matches!(place.origin, Origin::File(_)));
+    let transport = settings.choice("run.transport", &TransportKind::WORDS)?;
+    if let Some(kind) = transport.filter(|kind| !kind.is_built_in()) {
+        let place = settings.place("run.transport").expect("it was given").clone();
+        return Err(ConfigError::NotBuiltIn { place, feature: kind.name() });
+    }
     if transport == Some(TransportKind::Local) && ranks > 1 {
         let place = settings.place("run.transport").expect("it was given").clone();
         let reason = format!("one rank at most, and this run has {ranks}; use transport channel, or ranks 1");
@@ -183,7 +224,9 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     }
     let tiles = settings.tiles("run.tiles", MOST_TILES)?;
     let peer_timeout = Duration::from_secs_f64(settings.number("run.peer_timeout", 0.001..=1e6, 30.0)?);
-    Ok(RunConfig { steps, ranks, threads, transport, tiles, peer_timeout })
+    let exchanges = [("alltoallv", MpiExchange::Alltoallv), ("sparse", MpiExchange::Sparse)];
+    let mpi_exchange = settings.choice("run.mpi_exchange", &exchanges)?.unwrap_or_default();
+    Ok(RunConfig { steps, ranks, ranks_asked_for, threads, transport, tiles, peer_timeout, mpi_exchange })
 }
 
 fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, ConfigError> {

@@ -193,27 +193,13 @@ impl Settings {
 
     /// One of some words.
     pub(super) fn choice<T: Copy>(&mut self, key: &'static str, words: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
-        self.choice_of(key, words, &[])
-    }
-
-    /// One of some words; those of `later` are refused as not built in yet.
-    pub(super) fn choice_of<T: Copy>(
-        &mut self,
-        key: &'static str,
-        words: &[(&str, T)],
-        later: &[&str],
-    ) -> Result<Option<T>, ConfigError> {
         let must = one_of(words);
         let Some(text) = self.get(key, &must, |value| value.as_str().map(str::to_owned))? else { return Ok(None) };
-        let place = || self.given[key].place.clone();
         if let Some((_, value)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(Some(*value));
         }
-        if later.contains(&text.as_str()) {
-            return Err(ConfigError::NotYet { place: place(), instead: must });
-        }
         let suggestion = keys::nearest(words.iter().map(|(word, _)| *word), &text);
-        Err(ConfigError::BadValue { place: place(), must, suggestion })
+        Err(ConfigError::BadValue { place: self.given[key].place.clone(), must, suggestion })
     }
 }
 

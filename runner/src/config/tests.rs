@@ -94,6 +94,7 @@ fn every_key_can_be_given() {
         transport = "channel"
         tiles = [4, 5]
         peer_timeout = 2.5
+        mpi_exchange = "sparse"
         [physics]
         hertz = 120
         substeps = 2
@@ -129,6 +130,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.run.steps, config.run.ranks, config.run.threads), (7, 2, 3));
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
+    assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
     assert_eq!((config.params.max_linear_speed, config.params.margin_cap), (f32::INFINITY, 0.4));
     assert_eq!((config.params.sort_interval, config.params.parallel), (16, Parallel::Serial));
@@ -222,13 +224,25 @@ fn unknown_names_come_with_a_suggestion() {
 }
 
 #[test]
-fn what_a_later_version_brings_is_not_an_unknown_word() {
-    for (key, value, instead) in
-        [("transport", "mpi", "\"local\" or \"channel\""), ("transport", "iceoryx2", "\"local\" or \"channel\"")]
-    {
-        let error = read(ROOMS, &[(key, value)]).unwrap_err();
-        assert!(error.ends_with(&format!("={value}: not built into this version yet; use {instead}")), "{error}");
+fn a_transport_that_is_not_built_in_says_how_to_build_it() {
+    for kind in [TransportKind::Mpi, TransportKind::Iceoryx2] {
+        let name = kind.name();
+        match read(ROOMS, &[("transport", name)]) {
+            Ok(config) => assert!(kind.is_built_in() && config.transport() == kind, "{name}"),
+            Err(error) => {
+                let expected = format!("--set run.transport={name}: this program was built without it; build it again");
+                assert!(!kind.is_built_in() && error.starts_with(&expected), "{error}");
+                assert!(error.contains(&format!("--features {name}`")), "{error}");
+            }
+        }
     }
+}
+
+#[test]
+fn ranks_of_the_command_line_are_asked_for() {
+    let asked = |text: &str, overrides: &[(&str, &str)]| read(text, overrides).unwrap().run.ranks_asked_for;
+    assert!(!asked(&format!("{ROOMS}[run]\nranks = 4\n"), &[]));
+    assert!(asked(ROOMS, &[("ranks", "4")]));
 }
 
 #[test]

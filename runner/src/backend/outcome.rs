@@ -1,62 +1,25 @@
-//! Starts the ranks on the transport that was chosen, waits for them, and makes one outcome of theirs.
+//! What the ranks of a run have to say about its end, made one.
 
-use crate::config::TransportKind;
-use crate::drive::{self, Observer, RankEnd, RankError};
+use crate::drive::{RankEnd, RankError};
 use crate::error::RunError;
 use crate::exchange::ExchangeError;
 use crate::plan::Plan;
 use crate::summary::Summary;
 use atoll_core::StepError;
-use atoll_transport::channel::{self, ChannelOptions};
-use atoll_transport::local::Local;
-use atoll_transport::{Rank, RankFailure, Transport, TransportError};
-use std::thread;
+use atoll_transport::{RankFailure, TransportError};
 
-type Ends = Vec<Result<RankEnd, RankFailure>>;
-
-/// Runs a plan on its transport.
-///
-/// # Errors
-/// The one that ended the run, whichever and however many ranks it ended.
-pub fn run(plan: &Plan, observer: &Observer) -> Result<Summary, RunError> {
-    let ends = match plan.transport {
-        TransportKind::Local => local(plan, observer),
-        TransportKind::Channel => {
-            let options = ChannelOptions { peer_timeout: plan.config.run.peer_timeout };
-            channel::run(plan.config.run.ranks, options, |endpoint| {
-                // The ranks share one process, and the first reports its memory.
-                let leads_process = endpoint.rank() == Rank(0);
-                drive::drive(endpoint, plan, observer, leads_process)
-            })
-        }
-    };
-    outcome(plan, ends)
-}
-
-/// A thread of its own all the same: it becomes the first of the rank's thread pool, and the caller's thread could not
-/// leave that again.
-fn local(plan: &Plan, observer: &Observer) -> Ends {
-    let end = thread::scope(|scope| {
-        let thread = thread::Builder::new()
-            .name("rank 0".to_owned())
-            .spawn_scoped(scope, || drive::drive(Local::new(), plan, observer, true));
-        match thread {
-            Ok(thread) => thread.join().map_err(|payload| RankFailure::from_panic(Rank(0), payload)),
-            Err(error) => Err(RankFailure::NotStarted { rank: Rank(0), reason: error.to_string() }),
-        }
-    });
-    vec![end]
-}
+/// How every rank ended, in rank order.
+pub(super) type Ends = Vec<Result<RankEnd, RankFailure>>;
 
 /// What all ranks together have to say. Most errors reach several ranks; the one nearest to the cause is told.
-fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
+pub(super) fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
     let steps = plan.config.run.steps;
     let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(0);
     let (mut summary, mut errors) = (None, Vec::new());
     for end in ends {
         match end.map(|end| end.result) {
             Ok(Ok(None)) => {}
-            Ok(Ok(Some(made))) => summary = Some(made),
+            Ok(Ok(Some(gathered))) => summary = Some(Summary::new(plan, gathered)),
             Ok(Err(error)) => errors.push(told(error, complete, steps)),
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
@@ -70,20 +33,21 @@ fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
         | RunError::Protocol { .. }
         | RunError::FloatMode { .. }
         | RunError::Setup(_)
-        | RunError::Threads { .. } => 0,
+        | RunError::Threads { .. }
+        | RunError::Relayed { .. } => 0,
         // A rank that says itself how it ended, before those that merely miss it.
         RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
         _ => 2,
     });
     match (errors.into_iter().next(), summary) {
         (Some(error), _) => Err(error),
-        (None, Some(summary)) => Ok(*summary),
+        (None, Some(summary)) => Ok(summary),
         (None, None) => unreachable!("a run without errors has a summary from rank 0"),
     }
 }
 
 /// A rank's error as the program tells it.
-fn told(error: RankError, complete: u64, steps: u64) -> RunError {
+pub(super) fn told(error: RankError, complete: u64, steps: u64) -> RunError {
     let transport = |error: TransportError| match error {
         TransportError::PeerLost { rank, reason } => RunError::PeerLost { rank, complete, steps, reason },
         TransportError::Timeout { rank, waited } => {
@@ -96,6 +60,7 @@ fn told(error: RankError, complete: u64, steps: u64) -> RunError {
         RankError::Setup(error) => RunError::Setup(error),
         RankError::Threads { rank, threads, reason } => RunError::Threads { rank, threads, reason },
         RankError::Transport(error) => transport(error),
+        RankError::Told { text, exit } => RunError::Relayed { text, exit },
         RankError::Step(StepError::NonFinite { step, id }) => RunError::NonFinite { step, id },
         RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
         RankError::Step(StepError::FloatMode { step }) => RunError::FloatMode { step },
@@ -110,8 +75,10 @@ fn told(error: RankError, complete: u64, steps: u64) -> RunError {
 mod tests {
     use super::*;
     use crate::config::Config;
+    use crate::drive::{self, Observer};
     use atoll_core::GlobalId;
-    use atoll_transport::{Incoming, Outgoing};
+    use atoll_transport::channel::{self, ChannelOptions};
+    use atoll_transport::{Incoming, Outgoing, Rank, Transport};
 
     fn plan() -> Plan {
         let text = "[scene]\nkind = \"rooms\"\nbodies = 100\n[run]\nranks = 3\nsteps = 9\n";
@@ -192,7 +159,7 @@ mod tests {
     fn a_raised_flag_ends_all_ranks_after_the_same_step() {
         let observer = Observer::default();
         observer.stop.request();
-        let summary = run(&plan(), &observer).unwrap();
+        let summary = super::super::run(&plan(), &observer).unwrap();
         assert_eq!((summary.steps, summary.interrupted, summary.bodies_lost), (1, true, 0));
     }
 }

@@ -1,0 +1,129 @@
+//! Ranks as processes that an MPI launcher started, this one among them.
+
+use super::outcome::told;
+use crate::cmd::complain;
+use crate::config::{Config, MpiExchange};
+use crate::drive::{self, Observer, RankError};
+use crate::error::{Exit, RunError};
+use crate::handshake::{self, Refusal};
+use crate::plan::Plan;
+use crate::summary::Summary;
+use atoll_core::StepError;
+use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
+use atoll_transport::{Rank, RankFailure, Transport, TransportError};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+/// How long ranks wait for each other until they have agreed on a configuration, which says how long.
+const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// This process as a rank of an MPI job.
+///
+/// What goes wrong on every rank alike is told by rank 0 and ends all of them orderly; what goes wrong on this one alone
+/// is told here and ends the whole job, as MPI has no other way to reach the ranks that wait.
+#[derive(Debug)]
+pub struct Job {
+    endpoint: Mpi,
+}
+
+impl Job {
+    /// Joins the job.
+    ///
+    /// # Errors
+    /// If MPI cannot be used as it must be, or the launcher is that of another MPI.
+    pub fn join() -> Result<Self, RunError> {
+        let options = MpiOptions { peer_timeout: AGREEMENT_TIMEOUT, ..MpiOptions::default() };
+        let endpoint = Mpi::init(options).map_err(|error| RunError::Launcher(error.to_string()))?;
+        match mpi::launched_size() {
+            Some(launched) if launched > 1 && endpoint.size() == 1 => {
+                // Each of them is alone and believes itself the first; one is enough to say so.
+                let error = RunError::Launcher(format!(
+                    "the launcher started {launched} processes, but each finds itself alone: it is not that of the \
+                     MPI this program was built with, {}; use that one's mpirun",
+                    Mpi::library()
+                ));
+                Err(if mpi::launched_rank() == Some(0) { error } else { RunError::ToldElsewhere { exit: Exit::Usage } })
+            }
+            _ => Ok(Self { endpoint }),
+        }
+    }
+
+    /// Whether this is the rank that speaks for all.
+    pub fn speaks(&self) -> bool {
+        self.endpoint.rank() == Rank(0)
+    }
+
+    /// The configuration with the number of ranks that the launcher started.
+    ///
+    /// # Errors
+    /// If the command line asks for another number.
+    pub fn adapt(&self, mut config: Config) -> Result<Config, RunError> {
+        let (asked, found) = (config.run.ranks, self.endpoint.size());
+        if config.run.ranks_asked_for && asked != found {
+            return Err(RunError::Launcher(format!(
+                "--ranks {asked}, but the launcher started {found}: leave --ranks out, or start as many with `mpirun -n \
+                 {asked}` of the MPI this program was built with, {}",
+                Mpi::library()
+            )));
+        }
+        config.run.ranks = found;
+        Ok(config)
+    }
+
+    /// Goes on where every rank is ready for the same run.
+    ///
+    /// # Errors
+    /// What keeps them from it; on all ranks but 0, that another one tells.
+    pub fn agree<T>(
+        &mut self,
+        prepared: Result<T, RunError>,
+        plan_of: impl FnOnce(&T) -> &Plan,
+    ) -> Result<T, RunError> {
+        match handshake::agree(&mut self.endpoint, prepared, plan_of) {
+            Ok(prepared) => Ok(prepared),
+            Err(Refusal::Known(error)) => Err(self.common(error)),
+            Err(Refusal::Transport(error)) => self.fail(&RunError::Launcher(error.to_string()), Exit::PeerLost),
+        }
+    }
+
+    /// Runs this rank's part of the plan that all agreed on. Rank 0 gets the summary.
+    ///
+    /// # Errors
+    /// What ended the run on every rank alike. Anything else ends the job.
+    pub fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
+        let run = &plan.config.run;
+        self.endpoint.set_peer_timeout(run.peer_timeout);
+        self.endpoint.set_method(match run.mpi_exchange {
+            MpiExchange::Alltoallv => Method::Alltoallv,
+            MpiExchange::Sparse => Method::Sparse,
+        });
+        // Not given away: while a panic unwinds, the endpoint stays and can end the job.
+        let endpoint = &mut self.endpoint;
+        let end = catch_unwind(AssertUnwindSafe(|| drive::drive(endpoint, plan, observer, true)));
+        let end = end.unwrap_or_else(|payload| {
+            let failure = RankFailure::from_panic(self.endpoint.rank(), payload);
+            self.fail(&failure, Exit::PeerLost)
+        });
+        match end.result {
+            Ok(gathered) => Ok(gathered.map(|gathered| Summary::new(plan, gathered))),
+            Err(error @ RankError::Step(StepError::NonFinite { .. })) => {
+                Err(self.common(told(error, end.complete, run.steps)))
+            }
+            Err(error) => {
+                let error = told(error, end.complete, run.steps);
+                self.fail(&error, error.exit())
+            }
+        }
+    }
+
+    /// An error that every rank has: told once.
+    fn common(&self, error: RunError) -> RunError {
+        if self.speaks() { error } else { RunError::ToldElsewhere { exit: error.exit() } }
+    }
+
+    /// Tells what went wrong on this rank and ends the job.
+    fn fail(&mut self, error: &dyn std::fmt::Display, exit: Exit) -> ! {
+        complain(error);
+        self.endpoint.abort_with(exit as i32)
+    }
+}

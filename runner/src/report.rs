@@ -1,0 +1,139 @@
+//! What a rank in a process of its own reports to the process that started it: one line of JSON on its standard output.
+
+use crate::drive::{RankEnd, RankError};
+use crate::error::Exit;
+use crate::summary::{Gathered, RankFacts};
+use atoll_core::TileFacts;
+use atoll_transport::{Rank, RankFailure, TransportError};
+use bytemuck::Pod;
+use serde::{Deserialize, Serialize};
+
+/// How a rank ended.
+#[derive(Serialize, Deserialize)]
+enum Report {
+    /// It completed so many steps and came to this.
+    Ended { complete: u64, result: Result<Option<Figures>, Trouble> },
+    /// Its code panicked.
+    Panicked { message: String },
+    /// It aborted.
+    Aborted { reason: String },
+}
+
+/// The figures of all ranks as the 64-bit words they consist of.
+#[derive(Serialize, Deserialize)]
+struct Figures {
+    ranks: Vec<u64>,
+    tiles: Vec<u64>,
+}
+
+/// Why a rank ended early.
+#[derive(Serialize, Deserialize)]
+enum Trouble {
+    /// It lost another one.
+    Lost { rank: u32, reason: String },
+    /// Anything else, in words, with an exit code.
+    Other { text: String, exit: u8 },
+}
+
+/// Writes how a rank ended. `told` puts into words, with an exit code, what only this rank can tell.
+pub fn write(end: &Result<RankEnd, RankFailure>, told: impl Fn(&RankError) -> (String, Exit)) -> String {
+    let report = match end {
+        Ok(RankEnd { complete, result }) => {
+            let result = match result {
+                Ok(gathered) => Ok(gathered.as_ref().map(|gathered| Figures {
+                    ranks: bytemuck::cast_slice(&gathered.ranks).to_vec(),
+                    tiles: bytemuck::cast_slice(&gathered.tiles).to_vec(),
+                })),
+                Err(error) => Err(match error.transport() {
+                    Some(TransportError::PeerLost { rank, reason }) => {
+                        Trouble::Lost { rank: rank.0, reason: reason.clone() }
+                    }
+                    _ => {
+                        let (text, exit) = told(error);
+                        Trouble::Other { text, exit: exit as u8 }
+                    }
+                }),
+            };
+            Report::Ended { complete: *complete, result }
+        }
+        Err(RankFailure::Aborted { reason, .. }) => Report::Aborted { reason: reason.clone() },
+        Err(RankFailure::Panicked { message, .. }) => Report::Panicked { message: message.clone() },
+        Err(failure) => Report::Panicked { message: failure.to_string() },
+    };
+    let mut line = serde_json::to_string(&report).expect("numbers and words, under names");
+    line.push('\n');
+    line
+}
+
+/// Reads what a rank wrote, if that is a whole report.
+pub fn read(rank: Rank, bytes: &[u8]) -> Option<Result<RankEnd, RankFailure>> {
+    Some(match serde_json::from_slice(bytes).ok()? {
+        Report::Ended { complete, result } => {
+            let result = match result {
+                Ok(None) => Ok(None),
+                Ok(Some(figures)) => {
+                    Ok(Some(Gathered { ranks: records(&figures.ranks)?, tiles: records(&figures.tiles)? }))
+                }
+                Err(Trouble::Lost { rank, reason }) => {
+                    Err(RankError::Transport(TransportError::PeerLost { rank: Rank(rank), reason }))
+                }
+                Err(Trouble::Other { text, exit }) => Err(RankError::Told { text, exit: Exit::from_code(exit) }),
+            };
+            Ok(RankEnd { complete, result })
+        }
+        Report::Panicked { message } => Err(RankFailure::Panicked { rank, message }),
+        Report::Aborted { reason } => Err(RankFailure::Aborted { rank, reason }),
+    })
+}
+
+fn records<T: Pod>(words: &[u64]) -> Option<Vec<T>> {
+    bytemuck::try_cast_slice(words).ok().map(<[T]>::to_vec)
+}
+
+const _: () = assert!(align_of::<RankFacts>() == 8 && align_of::<TileFacts>() == 8, "both consist of 64-bit words");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn there_and_back(end: Result<RankEnd, RankFailure>) -> Result<RankEnd, RankFailure> {
+        let line = write(&end, |_| ("in words".to_owned(), Exit::Physics));
+        assert_eq!(line.matches('\n').count(), 1);
+        read(Rank(3), line.as_bytes()).expect("a whole report")
+    }
+
+    #[test]
+    fn figures_arrive_bit_for_bit() {
+        let ranks = vec![RankFacts { steps: u64::MAX, wait_nanos: 7, ..RankFacts::default() }; 3];
+        let tiles = vec![TileFacts { mass: 0.1 + 0.2, max_violation: -0.0, ..TileFacts::default() }; 2];
+        let gathered = Gathered { ranks, tiles };
+        let end = there_and_back(Ok(RankEnd { complete: 9, result: Ok(Some(gathered.clone())) })).unwrap();
+        assert_eq!(end.complete, 9);
+        let arrived = end.result.unwrap().unwrap();
+        assert_eq!(arrived, gathered);
+        assert!(arrived.tiles[0].max_violation.is_sign_negative());
+    }
+
+    #[test]
+    fn troubles_keep_what_the_outcome_needs() {
+        let lost = TransportError::PeerLost { rank: Rank(1), reason: "it panicked".to_owned() };
+        let end = there_and_back(Ok(RankEnd { complete: 4, result: Err(RankError::Transport(lost.clone())) })).unwrap();
+        assert!(matches!(end.result, Err(RankError::Transport(error)) if error == lost));
+
+        let usage = RankError::Transport(TransportError::Usage { message: "x".to_owned() });
+        let end = there_and_back(Ok(RankEnd { complete: 4, result: Err(usage) })).unwrap();
+        let Err(RankError::Told { text, exit }) = end.result else { panic!("told in words") };
+        assert_eq!((text.as_str(), exit), ("in words", Exit::Physics));
+
+        let panicked = RankFailure::Panicked { rank: Rank(3), message: "boom".to_owned() };
+        assert_eq!(there_and_back(Err(panicked.clone())).unwrap_err(), panicked);
+    }
+
+    #[test]
+    fn half_a_report_is_none() {
+        let line = write(&Ok(RankEnd { complete: 1, result: Ok(None) }), |_| (String::new(), Exit::Done));
+        for length in 0..line.len() - 1 {
+            assert!(read(Rank(0), &line.as_bytes()[..length]).is_none(), "{length}");
+        }
+    }
+}
