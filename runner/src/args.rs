@@ -5,6 +5,7 @@ use crate::config::Origin;
 use crate::config::{ConfigError, OneLine, Override, Place};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Very large 2-D rigid-body worlds: one trajectory, bit for bit, on one core, one machine or a cluster.
 #[derive(Debug, Parser)]
@@ -70,6 +71,27 @@ pub struct RunArgs {
     /// Show no progress, only the closing report.
     #[arg(long)]
     pub quiet: bool,
+    /// Let a rank panic before a step, to see what becomes of the others.
+    #[arg(long, value_name = "RANK@STEP", hide = true)]
+    pub panic_at: Option<PanicAt>,
+}
+
+/// Where a rank is to panic.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PanicAt {
+    /// The rank.
+    pub rank: u32,
+    /// The step, counted from 0.
+    pub step: u64,
+}
+
+impl FromStr for PanicAt {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let parts = text.split_once('@').and_then(|(rank, step)| Some((rank.parse().ok()?, step.parse().ok()?)));
+        parts.map(|(rank, step)| Self { rank, step }).ok_or("write RANK@STEP, such as 2@100")
+    }
 }
 
 impl RunArgs {

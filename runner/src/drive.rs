@@ -1,5 +1,6 @@
 //! One rank of a run, from an empty world to the last figure.
 
+use crate::args::PanicAt;
 use crate::error::Exit;
 use crate::exchange::{ExchangeError, RankHalo};
 use crate::interrupt::StopFlag;
@@ -20,6 +21,8 @@ pub struct Observer {
     pub show: Show,
     /// Ends the run early.
     pub stop: StopFlag,
+    /// Lets a rank panic.
+    pub panic_at: Option<PanicAt>,
 }
 
 /// Why a rank ended early.
@@ -115,6 +118,9 @@ fn run<T: Transport>(
     while world.step_count() < plan.config.run.steps && !last.stopped {
         if observer.stop.is_requested() {
             world.request_stop();
+        }
+        if observer.panic_at == Some(PanicAt { rank: rank.0, step: world.step_count() }) {
+            panic!("as --panic-at asks");
         }
         if world.step_count() + 1 == plan.config.run.steps {
             world.measure_next_step();

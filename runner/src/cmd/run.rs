@@ -48,7 +48,8 @@ fn load(args: &RunArgs) -> Result<Config, RunError> {
 }
 
 fn observer(args: &RunArgs) -> Observer {
-    Observer { show: if args.quiet { Show::Nothing } else { Show::OnStderr }, stop: StopFlag::default() }
+    let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
+    Observer { show, stop: StopFlag::default(), panic_at: args.panic_at }
 }
 
 /// What the user may want to know before the run starts.
