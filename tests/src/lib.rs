@@ -1,7 +1,9 @@
 //! What the integration tests share. The tests themselves are in `tests/`, one file per subject.
 
 pub mod fuzz;
+pub mod processes;
 pub mod program;
 pub mod ranks;
 pub mod scenes;
+pub mod ways;
 pub mod world;

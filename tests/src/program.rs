@@ -62,6 +62,11 @@ fn build(profile: Profile) -> PathBuf {
     if profile == Profile::Release {
         command.arg("--release");
     }
+    for (feature, wanted) in [("iceoryx2", cfg!(feature = "iceoryx2")), ("mpi", cfg!(feature = "mpi"))] {
+        if wanted {
+            command.args(["--features", feature]);
+        }
+    }
     if let Some(folder) = target_folder() {
         command.arg("--target-dir").arg(folder);
     }
@@ -92,8 +97,14 @@ pub fn command() -> Command {
 /// As [`command`], with a profile of choice.
 pub fn command_of(profile: Profile) -> Command {
     let mut command = Command::new(atoll(profile));
-    command.current_dir(root()).env_remove("RUST_LOG").stdin(Stdio::null());
+    at_home(&mut command);
     command
+}
+
+/// Lets a command run in the root of the repository, without what the environment may say about logging, and with
+/// nothing to read.
+pub fn at_home(command: &mut Command) -> &mut Command {
+    command.current_dir(root()).env_remove("RUST_LOG").stdin(Stdio::null())
 }
 
 /// What a program has left.
@@ -171,6 +182,11 @@ impl Running {
         let stdout = lines(child.stdout.take().expect("it is piped"));
         let stderr = lines(child.stderr.take().expect("it is piped"));
         Self { child, name, stdout, stderr, seen: String::new() }
+    }
+
+    /// Its process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// Waits for a line of standard error that starts so.

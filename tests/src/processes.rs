@@ -1,0 +1,107 @@
+//! The processes of a run: which of them is which rank, and what they must not leave behind.
+
+use crate::program::{Ended, LIMIT, Running};
+use std::collections::BTreeMap;
+use std::fs;
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// What launchers tell each rank in its environment.
+const RANK_VARIABLES: [&str; 3] = ["ATOLL_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK"];
+
+/// A rank in a process of its own.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct RankProcess {
+    /// The rank.
+    pub rank: usize,
+    /// Its process.
+    pub pid: u32,
+}
+
+impl RankProcess {
+    /// Sends a signal, `KILL` for one.
+    ///
+    /// # Panics
+    /// If that cannot be done.
+    pub fn signal(&self, signal: &str) {
+        let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {}", self.pid)]).status();
+        assert!(sent.expect("a shell starts").success(), "SIG{signal} could not be sent to {self:?}");
+    }
+
+    /// Whether it is there and no mere entry in the table of processes.
+    pub fn lives(&self) -> bool {
+        state(self.pid).is_some_and(|(state, _)| state != 'Z' && state != 'X')
+    }
+}
+
+/// The ranks that a program started, directly or through others, in rank order, once all are there.
+///
+/// # Panics
+/// If they are not within [`LIMIT`].
+pub fn ranks_of(program: &Running, ranks: usize) -> Vec<RankProcess> {
+    let deadline = Instant::now() + LIMIT;
+    loop {
+        let found = descendants(program.id()).into_iter().filter_map(|pid| Some((rank_of(pid)?, pid)));
+        let found: BTreeMap<usize, u32> = found.collect();
+        if found.len() == ranks {
+            return found.into_iter().map(|(rank, pid)| RankProcess { rank, pid }).collect();
+        }
+        assert!(Instant::now() < deadline, "{} of {ranks} ranks are there", found.len());
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// Whether the launcher of an MPI job names the process that it lost, by its rank or, where it knows no better, its
+/// number.
+pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
+    let said = format!("{}{}", ended.stdout, ended.stderr);
+    let rank = [format!("rank {} ", lost.rank), format!("RANK {} ", lost.rank)];
+    rank.iter().any(|name| said.contains(name)) || said.contains(&lost.pid.to_string())
+}
+
+/// What is in shared memory, sorted.
+pub fn shared_memory() -> Vec<String> {
+    let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let mut names: Vec<_> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// The rank that a process is told to be.
+fn rank_of(pid: u32) -> Option<usize> {
+    let environment = fs::read(format!("/proc/{pid}/environ")).ok()?;
+    let is_program = fs::read_to_string(format!("/proc/{pid}/comm")).ok()?.trim() == "atoll";
+    let variables =
+        environment.split(|&byte| byte == 0).filter_map(|line| std::str::from_utf8(line).ok()?.split_once('='));
+    let rank = variables.into_iter().find(|(name, _)| RANK_VARIABLES.contains(name))?.1.parse().ok()?;
+    is_program.then_some(rank)
+}
+
+/// State and parent of a process.
+fn state(pid: u32) -> Option<(char, u32)> {
+    let text = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    // The name stands in parentheses and may contain anything.
+    let mut fields = text.rsplit_once(") ")?.1.split(' ');
+    Some((fields.next()?.chars().next()?, fields.next()?.parse().ok()?))
+}
+
+fn descendants(root: u32) -> Vec<u32> {
+    let all: Vec<u32> = fs::read_dir("/proc")
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+        .collect();
+    let parents: BTreeMap<u32, u32> = all.into_iter().filter_map(|pid| Some((pid, state(pid)?.1))).collect();
+    let descends = |mut pid: u32| {
+        while let Some(&parent) = parents.get(&pid) {
+            if parent == root {
+                return true;
+            }
+            pid = parent;
+        }
+        false
+    };
+    parents.keys().copied().filter(|&pid| descends(pid)).collect()
+}

@@ -1,0 +1,82 @@
+//! Every way to run the program on some ranks that this build has.
+
+use crate::program;
+use std::fmt;
+use std::process::Command;
+
+/// What carries the bytes, and how.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Way {
+    /// One rank, alone.
+    Local,
+    /// Threads of one process.
+    Channel,
+    /// Processes that share memory.
+    Iceoryx2,
+    /// Processes started by mpirun, with a value of `mpi_exchange`.
+    Mpi(&'static str),
+}
+
+impl Way {
+    /// Those that are built into the program, as the features of this package say.
+    pub fn all() -> Vec<Self> {
+        let mut ways = vec![Self::Local, Self::Channel];
+        if cfg!(feature = "iceoryx2") {
+            ways.push(Self::Iceoryx2);
+        }
+        if cfg!(feature = "mpi") {
+            ways.extend([Self::Mpi("alltoallv"), Self::Mpi("sparse")]);
+        }
+        ways
+    }
+
+    /// Whether ranks are processes, which can be killed one by one.
+    pub fn has_processes(self) -> bool {
+        matches!(self, Self::Iceoryx2 | Self::Mpi(_))
+    }
+
+    /// Whether it can run so many ranks.
+    pub fn supports(self, ranks: usize) -> bool {
+        self != Self::Local || ranks == 1
+    }
+
+    /// As `--transport` and the summary call it.
+    pub fn transport(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Channel => "channel",
+            Self::Iceoryx2 => "iceoryx2",
+            Self::Mpi(_) => "mpi",
+        }
+    }
+
+    /// `atoll run CONFIG` on so many ranks, started as a user would start it. More options can be added.
+    pub fn command(self, ranks: usize, config: &str) -> Command {
+        let mut command = match self {
+            #[cfg(feature = "mpi")]
+            Self::Mpi(exchange) => {
+                let mut command = crate::mpi::mpirun(ranks);
+                command.arg(program::atoll(program::Profile::CURRENT)).args(["run", config]);
+                command.args(["--set", &format!("mpi_exchange={exchange}")]);
+                program::at_home(&mut command);
+                command
+            }
+            _ => {
+                let mut command = program::command();
+                command.args(["run", config, "--ranks", &ranks.to_string()]);
+                command
+            }
+        };
+        command.args(["--transport", self.transport()]);
+        command
+    }
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mpi(exchange) => write!(f, "mpi ({exchange})"),
+            _ => f.write_str(self.transport()),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! One configuration, one result, whatever carries the bytes: the program on every transport it was built with.
+
+use atoll_tests::program;
+use atoll_tests::ways::Way;
+use serde_json::Value;
+use std::process::Command;
+use tempfile::tempdir;
+
+const RANKS: [usize; 5] = [1, 2, 3, 4, 8];
+
+/// The scenes, each with steps enough to mix ranks well and few enough for the slowest of them. `ATOLL_FULL_LENGTH` runs
+/// them to their end.
+const SCENES: [(&str, &[&str]); 2] = [
+    ("configs/quickstart.toml", &["--tiles", "5x5", "--steps", "60"]),
+    ("configs/pile.toml", &["--bodies", "2000", "--set", "exchange=substep", "--tiles", "4x3", "--steps", "40"]),
+];
+
+fn summary(command: &mut Command) -> Value {
+    let folder = tempdir().unwrap();
+    program::run_to_summary(command.arg("--quiet"), &folder.path().join("summary.json"))
+}
+
+fn options(options: &'static [&'static str]) -> &'static [&'static str] {
+    if std::env::var_os("ATOLL_FULL_LENGTH").is_some() { &options[..options.len() - 2] } else { options }
+}
+
+#[test]
+fn every_transport_and_number_of_ranks_gives_the_same_hashes() {
+    for (config, given) in SCENES {
+        let given = options(given);
+        let expected = summary(Way::Local.command(1, config).args(given));
+        let mut passed_between_ranks = 0;
+        for way in Way::all() {
+            for ranks in RANKS.into_iter().filter(|&ranks| way.supports(ranks)) {
+                let found = summary(way.command(ranks, config).args(given));
+                for key in ["state_hash", "contact_hash", "config_hash", "steps", "bodies_lost"] {
+                    assert_eq!(found[key], expected[key], "{key} of {config} over {way} on {ranks} ranks");
+                }
+                assert_eq!(found["transport"], way.transport());
+                assert_eq!(found["ranks"], ranks, "{way}");
+                passed_between_ranks += u64::from(found["bytes_sent"].as_u64().unwrap() > 0);
+            }
+        }
+        assert!(
+            passed_between_ranks >= 4 * (Way::all().len() as u64 - 1),
+            "{config}: tiles have no neighbours elsewhere"
+        );
+    }
+}
+
+#[test]
+fn the_report_comes_once_and_from_one_rank() {
+    for way in Way::all().into_iter().filter(|way| way.supports(3)) {
+        let ended = program::run(way.command(3, "configs/quickstart.toml").args(["--steps", "20", "--bodies", "2000"]));
+        assert_eq!(ended.code, Some(0), "{way}: {ended}");
+        assert_eq!(ended.stdout.matches("state hash").count(), 1, "{way}: {ended}");
+        assert!(ended.stdout.contains(&format!("3 ranks ({}), 1 thread each", way.transport())), "{way}: {ended}");
+    }
+}
+
+#[test]
+fn bad_input_takes_one_line_on_every_transport() {
+    for way in Way::all().into_iter().filter(|way| way.supports(3)) {
+        for (options, expected) in [
+            (&["--bodies", "-5"][..], "atoll: --bodies -5: must be a whole number"),
+            (&["--json", "no/such/folder/x.json"], "atoll: --json no/such/folder/x.json: "),
+            (&["--set", "hertz=1", "--set", "gravity=[3e38,3e38]"], "atoll: step "),
+        ] {
+            let ended = program::run(way.command(3, "configs/quickstart.toml").arg("--quiet").args(options));
+            let code = if expected.ends_with("step ") { 4 } else { 2 };
+            assert_eq!(ended.code, Some(code), "{way}: {ended}");
+            let lines = ended.complaints().into_iter().filter(|line| line.starts_with(expected)).count();
+            assert_eq!(lines, 1, "{way}: not one line that says {expected}: {ended}");
+            assert!(ended.stdout.is_empty() || way.transport() == "mpi", "{way}: {ended}");
+        }
+    }
+}
+
+#[cfg(feature = "mpi")]
+mod mpi {
+    use super::*;
+    use atoll_tests::mpi::mpirun;
+
+    #[test]
+    fn ranks_asked_for_are_checked_against_those_started() {
+        let ended = program::run(Way::Mpi("alltoallv").command(2, "configs/quickstart.toml").args(["--ranks", "3"]));
+        assert_eq!(ended.code, Some(2), "{ended}");
+        let expected = "atoll: --ranks 3, but the launcher started 2: ";
+        assert_eq!(ended.complaints().iter().filter(|line| line.starts_with(expected)).count(), 1, "{ended}");
+    }
+
+    #[test]
+    fn a_launcher_of_another_mpi_is_caught() {
+        // What such a launcher amounts to: processes that are told of each other in a language they do not speak.
+        for (size, rank) in [("PMI_SIZE", "PMI_RANK"), ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK")] {
+            let mut command = program::command();
+            command.args(["run", "configs/quickstart.toml", "--transport", "mpi", "--quiet"]);
+            let ended = program::run(command.env(size, "4").env(rank, "0"));
+            assert_eq!(ended.code, Some(2), "{ended}");
+            let expected = "atoll: the launcher started 4 processes, but each finds itself alone: ";
+            assert_eq!(ended.complaints().iter().filter(|line| line.starts_with(expected)).count(), 1, "{ended}");
+        }
+    }
+
+    #[test]
+    fn a_rank_started_otherwise_is_named() {
+        let program = program::atoll(program::Profile::CURRENT);
+        let started = |options: &[&str]| {
+            // One rank as it should be, one with options of its own, two more as they should be.
+            let mut command = mpirun(1);
+            let rank = ["run", "configs/quickstart.toml", "--transport", "mpi", "--quiet"];
+            command.arg(program).args(rank);
+            command.args([":", "-n", "1"]).arg(program).args(rank).args(options);
+            command.args([":", "-n", "2"]).arg(program).args(rank);
+            program::run(program::at_home(&mut command))
+        };
+        for (options, expected) in [
+            (&["--seed", "2"][..], "atoll: rank 1 was started with configuration "),
+            (
+                &["--set", "mpi_exchange=sparse"],
+                "atoll: rank 1 was started with mpi_exchange sparse, and most ranks with",
+            ),
+            (&["--bodies", "-1"], "atoll: rank 1: --bodies -1: must be a whole number"),
+        ] {
+            let ended = started(options);
+            assert_eq!(ended.code, Some(2), "{options:?}: {ended}");
+            assert_eq!(ended.complaints().iter().filter(|line| line.starts_with(expected)).count(), 1, "{ended}");
+        }
+    }
+}
