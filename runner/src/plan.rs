@@ -6,6 +6,7 @@ use crate::error::RunError;
 use crate::scene::Scene;
 use crate::tiles;
 use atoll_core::{Blueprint, TileGrid, World};
+use std::thread;
 
 /// A configuration, checked and resolved.
 #[derive(Debug)]
@@ -24,11 +25,11 @@ pub struct Plan {
     pub transport: TransportKind,
 }
 
-/// Refuses a world that this machine cannot hold, before it tries to.
-fn check_memory(bodies: u64, tiles: u64, ranks: u64) -> Result<(), RunError> {
+/// Refuses a world that this machine cannot hold, before it tries to. `here` is how many of the ranks it surely holds.
+fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64) -> Result<(), RunError> {
     // A body takes 48 bytes and its contacts as much again and more; an empty tile a few buffers, and four bytes in
     // every rank's map of tiles; a pair of ranks a channel.
-    let needed = bodies.saturating_mul(200) + tiles * (1000 + 4 * ranks) + ranks * ranks * 500;
+    let needed = (bodies.saturating_mul(200) + tiles * 1000) / ranks * here + here * (4 * tiles + 500 * ranks);
     let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|facts| {
         let line = facts.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
         Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
@@ -47,7 +48,11 @@ impl Plan {
     pub fn new(config: &Config) -> Result<Self, RunError> {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
-        check_memory(scene.bodies(), u64::from(tiles[0]) * u64::from(tiles[1]), config.run.ranks as u64)?;
+        let transport = config.transport();
+        let ranks = config.run.ranks as u64;
+        // Of an MPI job the others may be anywhere.
+        let here = if transport == TransportKind::Mpi { 1 } else { ranks };
+        check_memory(scene.bodies(), u64::from(tiles[0]) * u64::from(tiles[1]), ranks, here)?;
         let (low, high) = scene.domain();
         let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
         let params = config.params.clone();
@@ -61,7 +66,7 @@ impl Plan {
             scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
         }
         let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
-        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport: config.transport() })
+        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport })
     }
 
     /// What the user may want to know before it starts, a sentence each.
@@ -72,6 +77,16 @@ impl Plan {
             let ranks = self.assignment.ranks();
             notes.push(format!(
                 "{idle} of {ranks} ranks stay idle: there are only {tiles} tiles; use fewer ranks or more tiles"
+            ));
+        }
+        let (threads, cores) =
+            (self.config.run.threads, thread::available_parallelism().map_or(usize::MAX, usize::from));
+        if self.transport == TransportKind::Mpi && threads > cores {
+            // Launchers do this unless told otherwise.
+            let cores = if cores == 1 { "one core".to_owned() } else { format!("{cores} cores") };
+            notes.push(format!(
+                "rank 0 is bound to {cores} and has {threads} threads: let the launcher give each rank as many cores, such \
+                 as with `mpirun --map-by slot:PE={threads} --bind-to core`"
             ));
         }
         let halo = tiles::halo_width(&self.blueprint.kinds, &self.blueprint.params);

@@ -1,0 +1,74 @@
+//! What the documentation tells people to type is understood by the program, and the files it names are there.
+
+use atoll::args::{Cli, Command};
+use atoll::config::{Config, ConfigError};
+use atoll_tests::program::root;
+use clap::Parser;
+use std::fs;
+use std::path::PathBuf;
+
+fn pages() -> Vec<PathBuf> {
+    let docs = fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    docs.chain(["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md"].map(|name| root().join(name))).collect()
+}
+
+/// The lines of a page's blocks of shell commands.
+fn commands(text: &str) -> Vec<&str> {
+    let mut within = false;
+    let mut commands = Vec::new();
+    for line in text.lines() {
+        if line.starts_with("```") {
+            within = line == "```sh";
+        } else if within {
+            commands.push(line);
+        }
+    }
+    commands
+}
+
+/// The arguments of the program in a command that runs it, launched or not.
+fn arguments(command: &str) -> Option<Vec<&str>> {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let program = words.windows(2).position(|pair| pair[0].ends_with("atoll") && pair[1] == "run");
+    let cargo = words.windows(2).position(|pair| pair == ["--", "run"]);
+    program.or(cargo).map(|at| words[at + 1..].to_vec())
+}
+
+#[test]
+fn commands_that_run_the_program_are_understood() {
+    let mut understood = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for arguments in commands(&text).into_iter().filter_map(arguments) {
+            let line = arguments.join(" ");
+            if line.contains("CONFIG") {
+                continue;
+            }
+            let at = format!("{}: {line}", page.display());
+            let cli = Cli::try_parse_from([&["atoll"], &arguments[..]].concat());
+            let Command::Run(run) = cli.unwrap_or_else(|error| panic!("{at}: {error}")).command;
+            match Config::load(&root().join(&run.config), &run.overrides().unwrap()) {
+                // A transport that this build leaves out.
+                Ok(_) | Err(ConfigError::NotBuiltIn { .. }) => understood += 1,
+                Err(error) => panic!("{at}: {error}"),
+            }
+        }
+    }
+    assert!(understood >= 14, "only {understood} commands were found");
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut followed = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            if !target.contains("://") && !target.starts_with('#') {
+                let path = page.parent().unwrap().join(target.split('#').next().unwrap());
+                assert!(path.exists(), "{}: there is no {target}", page.display());
+                followed += 1;
+            }
+        }
+    }
+    assert!(followed >= 10, "only {followed} links were found");
+}
