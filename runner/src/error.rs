@@ -52,7 +52,7 @@ pub enum RunError {
         bodies: u64,
         /// Tiles asked for, or by default.
         tiles: u64,
-        /// Ranks, all of this process.
+        /// Ranks.
         ranks: u64,
         /// Bytes, estimated.
         needed: u64,
