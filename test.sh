@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, lints, documentation, and all tests in both build profiles. Stops at the first failure.
-# Needs Rust and nothing else; where rustfmt or clippy is not installed, its check is left out, and the end says so.
+# Checks everything: formatting, lints, documentation, all tests in both build profiles, and the transports whose ranks are
+# processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces. Stops at the first failure.
+#
+# Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu; elsewhere it leaves out what it cannot
+# check, and the end says so.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -14,6 +17,12 @@ step() {
     printf '==> done in %d s\n' "$((SECONDS - start))"
 }
 
+# Notes that something is not checked, and why.
+leave_out() {
+    printf '\n==> left out: %s\n' "$1"
+    left_out+=("$1")
+}
+
 # As step, for the part of Rust named first, which may not be installed.
 step_with() {
     local part=$1
@@ -21,23 +30,74 @@ step_with() {
     if cargo "$part" --version >/dev/null 2>&1; then
         step "$@"
     else
-        printf '\n==> left out, cargo %s is not installed: %s\n' "$part" "$*"
-        left_out+=("cargo $part")
+        leave_out "cargo $part, which is not installed"
     fi
 }
 
+has() {
+    command -v "$1" >/dev/null
+}
+
+has_libclang() {
+    [[ -n ${LIBCLANG_PATH:-} ]] || compgen -G '/usr/lib/llvm-*/lib/libclang*.so*' >/dev/null ||
+        ldconfig -p 2>/dev/null | grep -F libclang >/dev/null
+}
+
+# The packages of what is missing, installed if that can be done.
+provide() {
+    local missing=()
+    has_libclang || missing+=(libclang-dev)
+    has mpicc.openmpi || missing+=(libopenmpi-dev openmpi-bin)
+    has mpicc.mpich || missing+=(libmpich-dev mpich)
+    has ip || missing+=(iproute2)
+    ((${#missing[@]})) && [[ $(id -u) == 0 ]] && has apt-get || return 0
+    export DEBIAN_FRONTEND=noninteractive
+    step apt-get update -qq &&
+        step apt-get install -y -qq --no-install-recommends "${missing[@]}" ||
+        printf '==> %s cannot be installed\n' "${missing[*]}"
+}
+
+provide
+features=()
+if has_libclang; then
+    features+=(--features atoll-tests/iceoryx2)
+    # By its own name, in case another MPI has the common one.
+    if has mpicc.openmpi; then
+        export MPICC=mpicc.openmpi
+    fi
+    if has "${MPICC:-mpicc}"; then
+        features+=(--features atoll-tests/mpi)
+    else
+        leave_out 'transport mpi: no mpicc (libopenmpi-dev, openmpi-bin)'
+    fi
+else
+    leave_out 'transports iceoryx2 and mpi: no libclang (libclang-dev)'
+fi
+
 step_with fmt cargo fmt --all --check
 step_with clippy cargo clippy --workspace --all-targets -- --deny warnings
-step env RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps
-# The program first: tests compare it with the one that has assertions.
+if ((${#features[@]})); then
+    step_with clippy cargo clippy --workspace --all-targets "${features[@]}" -- --deny warnings
+fi
+step env RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps "${features[@]}"
+# The program as Rust alone builds it, first: tests compare it with the one that has assertions.
 step cargo build --release
 step cargo test --workspace
-# Documentation has had its tests; what is compiled for speed is tested again.
-step cargo test --release --workspace --lib --bins --tests
+# Documentation has had its tests; what is compiled for speed is tested again, with every transport.
+step cargo test --release --workspace --lib --bins --tests "${features[@]}"
 
-printf '\nAll passed in %d s' "$SECONDS"
-if ((${#left_out[@]})); then
-    printf ', without'
-    printf ' %s' "${left_out[@]}"
+if [[ ${features[*]} == *mpi* ]]; then
+    if has mpicc.mpich; then
+        # The same again over MPICH, in a folder of its own: two MPIs cannot share what is built.
+        step env MPICC=mpicc.mpich CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/mpich" \
+            cargo test --release -p atoll-tests --features mpi --test mpi_conformance --test transports --test loss
+    else
+        leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
+    fi
+    step tests/cluster.sh
 fi
-printf '\n'
+
+printf '\nAll passed in %d s\n' "$SECONDS"
+if ((${#left_out[@]})); then
+    printf 'left out: %s\n' "${left_out[@]}"
+fi

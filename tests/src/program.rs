@@ -63,7 +63,8 @@ fn build(profile: Profile) -> PathBuf {
         command.arg("--release");
     }
     for (feature, wanted) in [("iceoryx2", cfg!(feature = "iceoryx2")), ("mpi", cfg!(feature = "mpi"))] {
-        if wanted {
+        // The other profile is there to be compared with, in one process.
+        if wanted && profile == Profile::CURRENT {
             command.args(["--features", feature]);
         }
     }
