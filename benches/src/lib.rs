@@ -7,11 +7,13 @@
 //! | `strategies` | What do threads bring within one tile, by islands, by coloring, and by both? |
 //! | `choices` | What does each choice of the report cost, in time and in quality? |
 //! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
+//! | `exchange` | What does an exchange cost over each transport, and what do two ranks bring? |
 //! | `peers` | How do Box2D and rapier2d do on the same scene? With `--features peers` only. |
 //!
 //! They print a table to stderr and one line of JSON per row to stdout, so that
 //! `cargo run --release -p atoll-benches --bin step > row.json` shows the one and keeps the other.
 
+pub mod exchange;
 #[cfg(feature = "peers")]
 pub mod peers;
 

@@ -6,17 +6,26 @@ use tracing::warn;
 
 /// A request to stop, shared by whoever may make it and every rank of this process.
 #[derive(Clone, Default, Debug)]
-pub struct StopFlag(Arc<AtomicBool>);
+pub struct StopFlag {
+    raised: Arc<AtomicBool>,
+    /// Somebody else who may know of one.
+    elsewhere: Option<fn() -> bool>,
+}
 
 impl StopFlag {
     /// Asks the run to end after the step under way.
     pub fn request(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.raised.store(true, Ordering::Relaxed);
     }
 
     /// Whether somebody asked.
     pub fn is_requested(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.raised.load(Ordering::Relaxed) || self.elsewhere.is_some_and(|requested| requested())
+    }
+
+    /// A flag that is also raised when `elsewhere` says so.
+    pub fn asking(elsewhere: fn() -> bool) -> Self {
+        Self { elsewhere: Some(elsewhere), ..Self::default() }
     }
 
     /// A flag that Ctrl-C, SIGTERM and SIGHUP raise. The second time, `quit` is called. Where these signals are handled
@@ -25,7 +34,7 @@ impl StopFlag {
         let flag = Self::default();
         let raised = flag.clone();
         let handled = ctrlc::set_handler(move || {
-            if raised.0.swap(true, Ordering::Relaxed) {
+            if raised.raised.swap(true, Ordering::Relaxed) {
                 quit();
             } else if announce {
                 eprintln!("atoll: stopping after this step; interrupt again to quit at once");

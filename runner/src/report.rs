@@ -7,6 +7,7 @@ use atoll_core::TileFacts;
 use atoll_transport::{Rank, RankFailure, TransportError};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// How a rank ended.
 #[derive(Serialize, Deserialize)]
@@ -31,12 +32,15 @@ struct Figures {
 enum Trouble {
     /// It lost another one.
     Lost { rank: u32, reason: String },
+    /// Another one did not answer for so long.
+    Silent { rank: u32, seconds: f64 },
     /// Anything else, in words, with an exit code.
     Other { text: String, exit: u8 },
 }
 
-/// Writes how a rank ended. `told` puts into words, with an exit code, what only this rank can tell.
-pub fn write(end: &Result<RankEnd, RankFailure>, told: impl Fn(&RankError) -> (String, Exit)) -> String {
+/// Writes how a rank ended. What it failed of must be a loss, or in words already ([`RankError::Told`]): anything else
+/// loses its exit code.
+pub fn write(end: &Result<RankEnd, RankFailure>) -> String {
     let report = match end {
         Ok(RankEnd { complete, result }) => {
             let result = match result {
@@ -44,15 +48,7 @@ pub fn write(end: &Result<RankEnd, RankFailure>, told: impl Fn(&RankError) -> (S
                     ranks: bytemuck::cast_slice(&gathered.ranks).to_vec(),
                     tiles: bytemuck::cast_slice(&gathered.tiles).to_vec(),
                 })),
-                Err(error) => Err(match error.transport() {
-                    Some(TransportError::PeerLost { rank, reason }) => {
-                        Trouble::Lost { rank: rank.0, reason: reason.clone() }
-                    }
-                    _ => {
-                        let (text, exit) = told(error);
-                        Trouble::Other { text, exit: exit as u8 }
-                    }
-                }),
+                Err(error) => Err(trouble(error)),
             };
             Report::Ended { complete: *complete, result }
         }
@@ -63,6 +59,20 @@ pub fn write(end: &Result<RankEnd, RankFailure>, told: impl Fn(&RankError) -> (S
     let mut line = serde_json::to_string(&report).expect("numbers and words, under names");
     line.push('\n');
     line
+}
+
+fn trouble(error: &RankError) -> Trouble {
+    match (error, error.transport()) {
+        (_, Some(TransportError::PeerLost { rank, reason })) => Trouble::Lost { rank: rank.0, reason: reason.clone() },
+        (_, Some(TransportError::Timeout { rank, waited })) => {
+            Trouble::Silent { rank: rank.0, seconds: waited.as_secs_f64() }
+        }
+        (_, Some(error @ TransportError::Usage { .. })) => {
+            Trouble::Other { text: error.to_string(), exit: Exit::PeerLost as u8 }
+        }
+        (RankError::Told { text, exit }, None) => Trouble::Other { text: text.clone(), exit: *exit as u8 },
+        (error, None) => Trouble::Other { text: format!("{error:?}"), exit: Exit::PeerLost as u8 },
+    }
 }
 
 /// Reads what a rank wrote, if that is a whole report.
@@ -77,6 +87,10 @@ pub fn read(rank: Rank, bytes: &[u8]) -> Option<Result<RankEnd, RankFailure>> {
                 Err(Trouble::Lost { rank, reason }) => {
                     Err(RankError::Transport(TransportError::PeerLost { rank: Rank(rank), reason }))
                 }
+                Err(Trouble::Silent { rank, seconds }) => Err(RankError::Transport(TransportError::Timeout {
+                    rank: Rank(rank),
+                    waited: Duration::try_from_secs_f64(seconds).ok()?,
+                })),
                 Err(Trouble::Other { text, exit }) => Err(RankError::Told { text, exit: Exit::from_code(exit) }),
             };
             Ok(RankEnd { complete, result })
@@ -97,7 +111,7 @@ mod tests {
     use super::*;
 
     fn there_and_back(end: Result<RankEnd, RankFailure>) -> Result<RankEnd, RankFailure> {
-        let line = write(&end, |_| ("in words".to_owned(), Exit::Physics));
+        let line = write(&end);
         assert_eq!(line.matches('\n').count(), 1);
         read(Rank(3), line.as_bytes()).expect("a whole report")
     }
@@ -116,12 +130,16 @@ mod tests {
 
     #[test]
     fn troubles_keep_what_the_outcome_needs() {
-        let lost = TransportError::PeerLost { rank: Rank(1), reason: "it panicked".to_owned() };
-        let end = there_and_back(Ok(RankEnd { complete: 4, result: Err(RankError::Transport(lost.clone())) })).unwrap();
-        assert!(matches!(end.result, Err(RankError::Transport(error)) if error == lost));
-
-        let usage = RankError::Transport(TransportError::Usage { message: "x".to_owned() });
-        let end = there_and_back(Ok(RankEnd { complete: 4, result: Err(usage) })).unwrap();
+        let transport = |error| there_and_back(Ok(RankEnd { complete: 4, result: Err(RankError::Transport(error)) }));
+        for error in [
+            TransportError::PeerLost { rank: Rank(1), reason: "it panicked".to_owned() },
+            TransportError::Timeout { rank: Rank(2), waited: Duration::from_millis(1500) },
+        ] {
+            let end = transport(error.clone()).unwrap();
+            assert!(matches!(end.result, Err(RankError::Transport(arrived)) if arrived == error));
+        }
+        let told = RankError::Told { text: "in words".to_owned(), exit: Exit::Physics };
+        let end = there_and_back(Ok(RankEnd { complete: 4, result: Err(told) })).unwrap();
         let Err(RankError::Told { text, exit }) = end.result else { panic!("told in words") };
         assert_eq!((text.as_str(), exit), ("in words", Exit::Physics));
 
@@ -131,7 +149,7 @@ mod tests {
 
     #[test]
     fn half_a_report_is_none() {
-        let line = write(&Ok(RankEnd { complete: 1, result: Ok(None) }), |_| (String::new(), Exit::Done));
+        let line = write(&Ok(RankEnd { complete: 1, result: Ok(None) }));
         for length in 0..line.len() - 1 {
             assert!(read(Rank(0), &line.as_bytes()[..length]).is_none(), "{length}");
         }

@@ -94,6 +94,22 @@ pub enum RankFailure {
         reason: String,
     },
 
+    /// The rank's process ended without a word.
+    #[error("rank {rank} {how}")]
+    Died {
+        /// The rank.
+        rank: Rank,
+        /// How, as a clause that begins with a verb.
+        how: String,
+    },
+
+    /// The rank's process was ended by its launcher after another rank was lost.
+    #[error("rank {rank} was killed, as it did not end by itself when a rank was lost")]
+    Outlived {
+        /// The rank.
+        rank: Rank,
+    },
+
     /// The rank never ran.
     #[error("rank {rank} could not be started: {reason}")]
     NotStarted {
@@ -133,6 +149,8 @@ impl RankFailure {
         match self {
             RankFailure::Panicked { rank, .. }
             | RankFailure::Aborted { rank, .. }
+            | RankFailure::Died { rank, .. }
+            | RankFailure::Outlived { rank }
             | RankFailure::NotStarted { rank, .. } => *rank,
         }
     }

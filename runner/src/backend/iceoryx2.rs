@@ -1,1 +1,139 @@
+//! Ranks as processes of this machine that share memory: the launcher, and what each of them does.
 
+use super::outcome::{Ends, outcome, told};
+use crate::config::Config;
+use crate::drive::{self, Observer, RankEnd, RankError};
+use crate::error::{Exit, RunError};
+use crate::handshake::{self, Refusal};
+use crate::interrupt::StopFlag;
+use crate::plan::Plan;
+use crate::report;
+use crate::summary::Summary;
+use atoll_transport::iceoryx2::{self, Control, LaunchError, LaunchOptions, RankExit};
+use atoll_transport::{Rank, RankFailure, Transport};
+use std::io::Write;
+use std::os::unix::process::ExitStatusExt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::process::Command;
+use std::{env, io};
+
+/// Tells the ranks what they must find in the configuration that they read for themselves.
+const CONFIG_HASH: &str = "ATOLL_CONFIG_HASH";
+
+/// Starts this program once more for each rank, with the arguments it was started with, and waits for all.
+///
+/// # Errors
+/// The one that ended the run, whichever and however many ranks it ended.
+pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
+    if !config.is_file() {
+        // What can be read but once would leave nothing for the ranks.
+        let config = config.display();
+        return Err(RunError::Launcher(format!(
+            "{config}: each rank reads the configuration itself, so with transport iceoryx2 it must be a regular file"
+        )));
+    }
+    let program = env::current_exe()
+        .map_err(|error| RunError::Launcher(format!("this program's own file cannot be found: {error}")))?;
+    let quit = StopFlag::default();
+    let second = quit.clone();
+    let stop = StopFlag::on_signals(true, move || second.request());
+    let control = || match (quit.is_requested(), stop.is_requested()) {
+        (true, _) => Control::Quit,
+        (false, true) => Control::Stop,
+        (false, false) => Control::Run,
+    };
+    let run = &plan.config.run;
+    let options = LaunchOptions { peer_timeout: run.peer_timeout, ..LaunchOptions::default() };
+    let command = |_: Rank| {
+        let mut command = Command::new(&program);
+        command.args(env::args_os().skip(1)).env(CONFIG_HASH, plan.config.hash(plan.tiles));
+        command
+    };
+    let exits = iceoryx2::launch(run.ranks, options, &control, command)
+        .map_err(|error: LaunchError| RunError::Launcher(error.to_string()))?;
+    if quit.is_requested() {
+        return Err(RunError::ToldElsewhere { exit: Exit::Interrupted });
+    }
+    let ends: Ends = exits.iter().map(end).collect();
+    outcome(plan, ends)
+}
+
+/// What the process of a rank has to say, or what is to be said of it.
+fn end(exit: &RankExit) -> Result<RankEnd, RankFailure> {
+    report::read(exit.rank, &exit.stdout).unwrap_or_else(|| {
+        let died = |how| RankFailure::Died { rank: exit.rank, how };
+        Err(match exit.status.signal() {
+            _ if exit.killed => RankFailure::Outlived { rank: exit.rank },
+            Some(signal) => died(format!("was killed by signal {signal}")),
+            None => died(format!("ended without a report, {}", exit.status)),
+        })
+    })
+}
+
+/// This process as a rank that the launcher started.
+#[derive(Debug)]
+pub struct RankProcess(());
+
+impl RankProcess {
+    /// If it is one.
+    pub fn of_this() -> Option<Self> {
+        iceoryx2::is_rank_process().then_some(Self(()))
+    }
+
+    /// Does the rank's work and reports to the launcher, which tells the user.
+    ///
+    /// # Errors
+    /// If the report cannot be written.
+    pub fn run(self, config: Result<Config, RunError>, observer: Observer) -> Result<Exit, RunError> {
+        let rank = iceoryx2::rank_of_process().unwrap_or_default();
+        let observer = Observer { stop: StopFlag::asking(iceoryx2::stop_requested), ..observer };
+        // The endpoint is dropped while a panic unwinds, which tells the other ranks.
+        let end = catch_unwind(AssertUnwindSafe(|| take_part(config, &observer)));
+        let end = end.map_err(|payload| RankFailure::from_panic(rank, payload));
+        let exit = match &end {
+            Ok(RankEnd { result: Ok(_), .. }) => Exit::Done,
+            Ok(RankEnd { result: Err(RankError::Told { exit, .. }), .. }) => *exit,
+            _ => Exit::PeerLost,
+        };
+        let line = report::write(&end);
+        let written = io::stdout().write_all(line.as_bytes()).and_then(|()| io::stdout().flush());
+        match written {
+            Ok(()) => Ok(exit),
+            Err(error) => Err(RunError::Launcher(format!("rank {rank} cannot report to its launcher: {error}"))),
+        }
+    }
+}
+
+/// One rank from start to end.
+fn take_part(config: Result<Config, RunError>, observer: &Observer) -> RankEnd {
+    let ended = |complete, error| RankEnd { complete, result: Err(error) };
+    let mut endpoint = match iceoryx2::join() {
+        Ok(endpoint) => endpoint,
+        Err(error) => return ended(0, RankError::Transport(error)),
+    };
+    let prepared = config.and_then(|config| {
+        let plan = Plan::new(&config)?;
+        if env::var(CONFIG_HASH).is_ok_and(|expected| expected != plan.config.hash(plan.tiles)) {
+            return Err(RunError::Launcher("the configuration was changed while the ranks were started".to_owned()));
+        }
+        Ok(plan)
+    });
+    let plan = match handshake::agree(&mut endpoint, prepared, |plan| plan) {
+        Ok(plan) => plan,
+        Err(Refusal::Transport(error)) => return ended(0, RankError::Transport(error)),
+        Err(Refusal::Known(error)) => {
+            return ended(0, RankError::Told { text: error.to_string(), exit: error.exit() });
+        }
+    };
+    debug_assert_eq!(plan.config.run.ranks, endpoint.size());
+    let end = drive::drive(endpoint, &plan, observer, true);
+    let result = end.result.map_err(|error| match error {
+        error if error.transport().is_some() => error,
+        error => {
+            let error = told(error, end.complete, plan.config.run.steps);
+            RankError::Told { text: error.to_string(), exit: error.exit() }
+        }
+    });
+    RankEnd { complete: end.complete, result }
+}

@@ -15,7 +15,7 @@ pub(super) type Ends = Vec<Result<RankEnd, RankFailure>>;
 pub(super) fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
     let steps = plan.config.run.steps;
     let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(0);
-    let (mut summary, mut errors) = (None, Vec::new());
+    let (mut summary, mut errors, mut outlived) = (None, Vec::new(), Vec::new());
     for end in ends {
         match end.map(|end| end.result) {
             Ok(Ok(None)) => {}
@@ -23,6 +23,8 @@ pub(super) fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
             Ok(Err(error)) => errors.push(told(error, complete, steps)),
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
+                // One that had to be killed may be the lost one itself, or not: the others know better.
+                let errors = if matches!(failure, RankFailure::Outlived { .. }) { &mut outlived } else { &mut errors };
                 errors.push(RunError::PeerLost { rank, complete, steps, reason });
             }
         }
@@ -39,7 +41,7 @@ pub(super) fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
         RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
         _ => 2,
     });
-    match (errors.into_iter().next(), summary) {
+    match (errors.into_iter().chain(outlived).next(), summary) {
         (Some(error), _) => Err(error),
         (None, Some(summary)) => Ok(summary),
         (None, None) => unreachable!("a run without errors has a summary from rank 0"),
