@@ -107,7 +107,8 @@ fn all(transport: &mut impl Transport) -> Result<Vec<Timing>, TransportError> {
 fn one(transport: &mut impl Transport, length: usize) -> Result<Timing, TransportError> {
     let mut ring = Ring::new(transport, length);
     ring.rounds(transport, 3, true)?;
-    let slowest = transport.all_max_u64((ring.rounds(transport, 3, true)? * 1e9) as u64)?;
+    let seconds = ring.rounds(transport, 3, true)?;
+    let slowest = transport.all_max_u64((seconds * 1e9) as u64)?;
     // A fifth of a second, the same number on all ranks.
     let count = (200_000_000 / slowest.max(1)).clamp(5, 5000);
     let (mut bare, mut with_copies) = (Vec::new(), Vec::new());
