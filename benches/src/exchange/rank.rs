@@ -139,23 +139,29 @@ impl Ring {
     /// Seconds per round.
     fn rounds(&mut self, transport: &mut impl Transport, count: u64, copies: bool) -> Result<f64, TransportError> {
         transport.barrier()?;
+        self.round(transport, copies)?;
         let start = Instant::now();
         for _ in 0..count {
-            let outgoing = transport.prepare(&self.lengths)?;
-            if copies {
-                for (_, message) in outgoing.iter_mut().filter(|(_, message)| !message.is_empty()) {
-                    message.copy_from_slice(&self.source);
-                }
-            }
-            transport.exchange(&mut self.incoming)?;
-            if copies {
-                for (_, message) in self.incoming.iter().filter(|(_, message)| !message.is_empty()) {
-                    self.sink.copy_from_slice(message);
-                    black_box(&mut self.sink);
-                }
-            }
+            self.round(transport, copies)?;
         }
         Ok(start.elapsed().as_secs_f64() / count as f64)
+    }
+
+    fn round(&mut self, transport: &mut impl Transport, copies: bool) -> Result<(), TransportError> {
+        let outgoing = transport.prepare(&self.lengths)?;
+        if copies {
+            for (_, message) in outgoing.iter_mut().filter(|(_, message)| !message.is_empty()) {
+                message.copy_from_slice(&self.source);
+            }
+        }
+        transport.exchange(&mut self.incoming)?;
+        if copies {
+            for (_, message) in self.incoming.iter().filter(|(_, message)| !message.is_empty()) {
+                self.sink.copy_from_slice(message);
+                black_box(&mut self.sink);
+            }
+        }
+        Ok(())
     }
 }
 
