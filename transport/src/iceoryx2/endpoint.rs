@@ -182,8 +182,9 @@ impl Iceoryx2 {
             if missing == 0 {
                 return Ok(());
             }
-            for from in self.standing.others().filter(|from| self.awaited[from.index()]).collect::<Vec<_>>() {
-                if let Some(reason) = self.standing.how_it_went(from) {
+            for from in self.standing.others() {
+                let needed = self.awaited[from.index()];
+                if let Some(reason) = needed.then(|| self.standing.how_it_went(from)).flatten() {
                     // It sends no more, but what it had sent may have come after the look above.
                     self.take_arrived(incoming, &mut missing)?;
                     if self.awaited[from.index()] {
