@@ -70,14 +70,18 @@
 //!
 //! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
 
-#![forbid(unsafe_code)]
+// Allowed in the few files that meet memory shared with other processes.
+#![deny(unsafe_code)]
 
 pub mod channel;
 mod collective;
 pub mod conformance;
 mod error;
 mod frame;
+#[cfg(feature = "iceoryx2")]
+pub mod iceoryx2;
 pub mod local;
+mod origin;
 mod rank;
 mod stats;
 

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
 
+use crate::origin::{Origin, left_early};
 use crate::{Incoming, Outgoing, Rank, TransportError};
 
 /// Messages that a channel holds. Lockstep leaves at most two unread, so a send never waits. (With none, a
@@ -13,13 +14,6 @@ const CAPACITY: usize = 2;
 
 /// How long to wait for one peer before looking whether another one, also still needed, is gone.
 const SLICE: Duration = Duration::from_millis(20);
-
-/// What ended the run, by the rank that noticed or caused it first.
-#[derive(Debug)]
-struct Origin {
-    error: TransportError,
-    reporter: Rank,
-}
 
 /// A rank's place in the run.
 #[derive(Debug, PartialEq)]
@@ -197,25 +191,13 @@ impl Links {
     fn fail(&mut self, error: TransportError) -> TransportError {
         let rank = self.rank;
         let origin = self.origin.get_or_init(|| Origin { error, reporter: rank });
-        let report = match &origin.error {
-            // This very rank was too slow for another one. To itself it is not lost; the other one is.
-            TransportError::Timeout { rank: blamed, waited } if *blamed == rank => TransportError::PeerLost {
-                rank: origin.reporter,
-                reason: format!("it gave up after waiting {waited:.1?} for this rank, {rank}"),
-            },
-            error => error.clone(),
-        };
+        let report = origin.as_seen_by(rank);
         self.state = State::Failed(report.clone());
         // At once, not on drop: the caller may keep a failed endpoint for long, and the others must not wait for it.
         self.senders.iter_mut().for_each(|sender| *sender = None);
         self.receivers.iter_mut().for_each(|receiver| *receiver = None);
         report
     }
-}
-
-/// A rank that closed a channel which is still needed, if nothing else is on record.
-fn left_early(rank: Rank) -> TransportError {
-    TransportError::PeerLost { rank, reason: "it left while other ranks still needed it".to_owned() }
 }
 
 impl Drop for Links {

@@ -2,11 +2,16 @@
 //!
 //! Both types hide where their bytes live, so that a backend can hand out memory of its own: each kind of memory is a
 //! variant of two private enums and a file here. Inside one process it is one `Vec<u8>` per rank ([`owned`]): a message
-//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it.
+//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it. Between processes
+//! of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place.
 
+#[cfg(feature = "iceoryx2")]
+mod loaned;
 mod owned;
 
 use crate::{Rank, TransportError};
+#[cfg(feature = "iceoryx2")]
+pub(crate) use loaned::{Loan, LoanedFrame, LoanedIncoming, LoanedOutgoing, Message};
 pub(crate) use owned::{OwnedIncoming, OwnedOutgoing};
 use std::time::Duration;
 
@@ -31,6 +36,8 @@ pub struct Outgoing {
 #[derive(Debug)]
 pub(crate) enum OutgoingMemory {
     Owned(OwnedOutgoing),
+    #[cfg(feature = "iceoryx2")]
+    Loaned(LoanedOutgoing),
 }
 
 impl Outgoing {
@@ -41,6 +48,12 @@ impl Outgoing {
     /// For backends that move a buffer per rank.
     pub(crate) fn owned(size: usize) -> Outgoing {
         Outgoing::new(size, OutgoingMemory::Owned(OwnedOutgoing::new(size)))
+    }
+
+    /// For the backend whose ranks share memory.
+    #[cfg(feature = "iceoryx2")]
+    pub(crate) fn loaned(own: Rank, size: usize) -> Outgoing {
+        Outgoing::new(size, OutgoingMemory::Loaned(LoanedOutgoing::new(own, size)))
     }
 
     /// The number of destinations, which is the number of ranks.
@@ -55,6 +68,8 @@ impl Outgoing {
     pub fn to(&mut self, rank: Rank) -> &mut [u8] {
         match &mut self.memory {
             OutgoingMemory::Owned(frames) => frames.to(rank),
+            #[cfg(feature = "iceoryx2")]
+            OutgoingMemory::Loaned(frames) => frames.to(rank),
         }
     }
 
@@ -62,6 +77,8 @@ impl Outgoing {
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (Rank, &mut [u8])> {
         let frames = match &mut self.memory {
             OutgoingMemory::Owned(frames) => FramesMut::Owned(frames.iter_mut()),
+            #[cfg(feature = "iceoryx2")]
+            OutgoingMemory::Loaned(frames) => FramesMut::Loaned(frames.iter_mut()),
         };
         Rank::all(self.size).zip(frames)
     }
@@ -81,6 +98,17 @@ impl Outgoing {
     pub(crate) fn as_owned(&mut self) -> &mut OwnedOutgoing {
         match &mut self.memory {
             OutgoingMemory::Owned(frames) => frames,
+            #[cfg(feature = "iceoryx2")]
+            OutgoingMemory::Loaned(_) => unreachable!("an endpoint keeps the kind of memory it was made with"),
+        }
+    }
+
+    /// The buffers of the backend whose ranks share memory.
+    #[cfg(feature = "iceoryx2")]
+    pub(crate) fn as_loaned(&mut self) -> &mut LoanedOutgoing {
+        match &mut self.memory {
+            OutgoingMemory::Loaned(frames) => frames,
+            OutgoingMemory::Owned(_) => unreachable!("an endpoint keeps the kind of memory it was made with"),
         }
     }
 
@@ -117,6 +145,8 @@ impl Outgoing {
 /// The buffers of [`Outgoing`], in rank order.
 enum FramesMut<'a> {
     Owned(std::slice::IterMut<'a, Vec<u8>>),
+    #[cfg(feature = "iceoryx2")]
+    Loaned(std::slice::IterMut<'a, LoanedFrame>),
 }
 
 impl<'a> Iterator for FramesMut<'a> {
@@ -125,6 +155,8 @@ impl<'a> Iterator for FramesMut<'a> {
     fn next(&mut self) -> Option<&'a mut [u8]> {
         match self {
             FramesMut::Owned(frames) => frames.next().map(Vec::as_mut_slice),
+            #[cfg(feature = "iceoryx2")]
+            FramesMut::Loaned(frames) => frames.next().map(LoanedFrame::bytes),
         }
     }
 }
@@ -146,6 +178,8 @@ pub struct Incoming {
 #[derive(Debug)]
 pub(crate) enum IncomingMemory {
     Owned(OwnedIncoming),
+    #[cfg(feature = "iceoryx2")]
+    Loaned(LoanedIncoming),
 }
 
 impl Default for IncomingMemory {
@@ -167,6 +201,8 @@ impl Incoming {
     pub fn from(&self, rank: Rank) -> &[u8] {
         match &self.memory {
             IncomingMemory::Owned(frames) => frames.from(rank),
+            #[cfg(feature = "iceoryx2")]
+            IncomingMemory::Loaned(frames) => frames.from(rank),
         }
     }
 
@@ -200,10 +236,28 @@ impl Incoming {
         self.waited = waited;
     }
 
-    /// Buffers for a backend that moves one per rank.
+    /// Buffers for a backend that moves one per rank. Memory of another kind, from another endpoint, is given back.
     pub(crate) fn as_owned(&mut self) -> &mut OwnedIncoming {
+        #[cfg(feature = "iceoryx2")]
+        if !matches!(self.memory, IncomingMemory::Owned(_)) {
+            self.memory = IncomingMemory::default();
+        }
         match &mut self.memory {
             IncomingMemory::Owned(frames) => frames,
+            #[cfg(feature = "iceoryx2")]
+            IncomingMemory::Loaned(_) => unreachable!("was replaced"),
+        }
+    }
+
+    /// Places for the backend whose ranks share memory. Memory of another kind is given up.
+    #[cfg(feature = "iceoryx2")]
+    pub(crate) fn as_loaned(&mut self) -> &mut LoanedIncoming {
+        if !matches!(self.memory, IncomingMemory::Loaned(_)) {
+            self.memory = IncomingMemory::Loaned(LoanedIncoming::default());
+        }
+        match &mut self.memory {
+            IncomingMemory::Loaned(frames) => frames,
+            IncomingMemory::Owned(_) => unreachable!("was replaced"),
         }
     }
 

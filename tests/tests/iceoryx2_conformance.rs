@@ -1,0 +1,267 @@
+//! Ranks as processes that share memory: the conformance suite, and what happens when processes are killed.
+
+use atoll_tests::program::LIMIT;
+use atoll_transport::conformance::process::recorded;
+use atoll_transport::conformance::{CASES, Case, Harness, Outcome, check};
+use atoll_transport::iceoryx2::{Control, LaunchError, LaunchOptions, MAX_RANKS, RankExit, launch};
+use std::collections::HashMap;
+use std::fs;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread::{self, sleep};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Between two looks at something that another process does.
+const POLL: Duration = Duration::from_millis(10);
+
+fn rank_program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_ipc_rank"))
+}
+
+/// Runs `test` on a thread and fails if it does not end. (Its processes end with this one.)
+fn watched<R: Send + 'static>(test: impl FnOnce() -> R + Send + 'static) -> R {
+    let (sender, receiver) = channel();
+    let thread = thread::spawn(move || drop(sender.send(test())));
+    match receiver.recv_timeout(LIMIT) {
+        Ok(result) => result,
+        Err(RecvTimeoutError::Timeout) => panic!("it hangs"),
+        Err(RecvTimeoutError::Disconnected) => match thread.join() {
+            Err(payload) => std::panic::resume_unwind(payload),
+            Ok(()) => unreachable!("a result was sent"),
+        },
+    }
+}
+
+/// Launches ranks without end conditions of the launcher's own.
+fn run(size: usize, options: LaunchOptions, arguments: &[&str]) -> Vec<RankExit> {
+    let command = |_| {
+        let mut command = rank_program();
+        command.args(arguments);
+        command
+    };
+    launch(size, options, &|| Control::Run, command).expect("the run starts")
+}
+
+/// Runs each case in a launch of its own, and all that lose no rank in one per number of ranks.
+#[derive(Default)]
+struct Processes {
+    healthy: Mutex<HashMap<usize, Vec<(&'static str, Vec<Outcome>)>>>,
+}
+
+impl Processes {
+    fn outcomes(size: usize, cases: &[&'static Case]) -> Vec<(&'static str, Vec<Outcome>)> {
+        let folder = TempDir::new().expect("a temporary folder");
+        let path = folder.path().to_str().expect("a UTF-8 path").to_owned();
+        let names = cases.iter().map(|case| case.name);
+        let arguments: Vec<&str> = ["cases", &path].into_iter().chain(names).collect();
+        let options = LaunchOptions { peer_timeout: cases[0].peer_timeout, ..LaunchOptions::default() };
+        // What deliberate panics say goes to standard error; the outcomes have it as well.
+        let exits = run(size, options, &arguments);
+        let outcome = |case: &Case, exit: &RankExit| {
+            let silent = || Outcome::Panicked(format!("it told nothing and ended as {}", exit.status));
+            recorded(folder.path(), case, exit.rank).unwrap_or_else(silent)
+        };
+        cases.iter().map(|case| (case.name, exits.iter().map(|exit| outcome(case, exit)).collect())).collect()
+    }
+}
+
+impl Harness for Processes {
+    fn run(&self, size: usize, case: &'static Case) -> Vec<Outcome> {
+        if case.loses_victim {
+            return Processes::outcomes(size, &[case]).remove(0).1;
+        }
+        let mut healthy = self.healthy.lock().expect("no run panics");
+        let outcomes = healthy.entry(size).or_insert_with(|| {
+            let cases: Vec<_> = CASES.iter().filter(|case| !case.loses_victim && case.sizes.contains(&size)).collect();
+            Processes::outcomes(size, &cases)
+        });
+        outcomes.iter().find(|(name, _)| *name == case.name).expect("every case of this size was run").1.clone()
+    }
+}
+
+fn conforms(size: usize) {
+    let failures: Vec<String> = watched(move || {
+        let harness = Processes::default();
+        let cases = CASES.iter().filter(|case| case.sizes.contains(&size));
+        let failures = cases.filter_map(|case| check(&harness, case, size).err());
+        failures.collect()
+    });
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn one_process_conforms() {
+    conforms(1);
+}
+
+#[test]
+fn two_processes_conform() {
+    conforms(2);
+}
+
+#[test]
+fn three_processes_conform() {
+    conforms(3);
+}
+
+#[test]
+fn four_processes_conform() {
+    conforms(4);
+}
+
+#[test]
+fn eight_processes_conform() {
+    conforms(8);
+}
+
+/// What ranks in `rounds` have told about themselves.
+struct Told {
+    run_folder: PathBuf,
+    processes: Vec<i32>,
+}
+
+impl Told {
+    /// Waits until all ranks have told.
+    fn by(folder: &Path, size: usize) -> Told {
+        let started = Instant::now();
+        let text = |name: &str, rank: usize| loop {
+            match fs::read_to_string(folder.join(format!("{name}.{rank}"))) {
+                Ok(text) => return text,
+                Err(_) if started.elapsed() < LIMIT => sleep(POLL),
+                Err(error) => panic!("rank {rank} does not join: {error}"),
+            }
+        };
+        let processes = (0..size).map(|rank| text("process", rank).parse().expect("a process id")).collect();
+        Told { run_folder: PathBuf::from(text("run", 0)), processes }
+    }
+
+    fn shared_memory(&self) -> Vec<String> {
+        let run = self.run_folder.file_name().expect("a run has a name").to_str().expect("in UTF-8");
+        let names = fs::read_dir("/dev/shm").expect("there is shared memory").map(|entry| entry.expect("an entry"));
+        names.map(|entry| entry.file_name().to_string_lossy().into_owned()).filter(|name| name.contains(run)).collect()
+    }
+
+    fn assert_nothing_left(&self) {
+        assert!(!self.run_folder.exists(), "{} is left", self.run_folder.display());
+        assert_eq!(self.shared_memory(), [""; 0], "left in shared memory");
+    }
+
+    fn alive(&self) -> usize {
+        let alive = |process: &&i32| Path::new(&format!("/proc/{process}")).exists();
+        self.processes.iter().filter(alive).count()
+    }
+}
+
+/// Launches `rounds` on a thread; ranks tell about themselves in the folder.
+fn start_rounds(size: usize, count: u64) -> (TempDir, thread::JoinHandle<Vec<RankExit>>) {
+    let folder = TempDir::new().expect("a temporary folder");
+    let path = folder.path().to_str().expect("a UTF-8 path").to_owned();
+    let arguments = ["rounds".to_owned(), path, count.to_string()];
+    let thread = thread::spawn(move || {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        run(size, LaunchOptions::default(), &arguments)
+    });
+    (folder, thread)
+}
+
+fn kill(process: i32) {
+    let killed = Command::new("kill").args(["-9", &process.to_string()]).status().expect("kill starts");
+    assert!(killed.success(), "process {process} was there to be killed");
+}
+
+#[test]
+fn a_killed_rank_is_blamed_by_all_and_nothing_is_left() {
+    const SIZE: usize = 4;
+    watched(|| {
+        for (victim, delay) in [(0, 1), (2, 40), (3, 130)] {
+            let (folder, running) = start_rounds(SIZE, u64::MAX);
+            let told = Told::by(folder.path(), SIZE);
+            assert!(!told.shared_memory().is_empty(), "this test looks for the wrong names");
+            sleep(Duration::from_millis(delay));
+            kill(told.processes[victim]);
+            let exits = running.join().expect("the launcher does not panic");
+            for (rank, exit) in exits.iter().enumerate() {
+                assert!(!exit.killed, "rank {rank} had to be killed");
+                if rank == victim {
+                    assert_eq!(exit.status.signal(), Some(9));
+                } else {
+                    let text = String::from_utf8_lossy(&exit.stdout);
+                    let blame = format!("lost rank {victim}: it was killed by signal 9;");
+                    assert!(text.starts_with(&blame), "rank {rank}: {text}");
+                    assert_eq!(exit.status.code(), Some(3), "rank {rank}");
+                }
+            }
+            told.assert_nothing_left();
+        }
+    });
+}
+
+#[test]
+fn without_a_launcher_the_ranks_end_and_the_next_launch_cleans_up() {
+    const SIZE: usize = 3;
+    watched(|| {
+        let folder = TempDir::new().expect("a temporary folder");
+        let mut launcher = rank_program();
+        launcher.arg("launch").arg(folder.path()).arg(SIZE.to_string()).stderr(Stdio::null());
+        let mut launcher = launcher.spawn().expect("the launcher starts");
+        let told = Told::by(folder.path(), SIZE);
+        launcher.kill().expect("the launcher is killed");
+        launcher.wait().expect("the launcher has ended");
+        // The limit is the watchdog's: no rank waits for anything.
+        while told.alive() > 0 {
+            sleep(POLL);
+        }
+        assert!(told.run_folder.exists(), "nobody was there to remove it");
+        let exits = run(1, LaunchOptions::default(), &["rounds", folder.path().to_str().expect("UTF-8"), "1"]);
+        assert_eq!(exits[0].stdout, b"1 rounds\n");
+        told.assert_nothing_left();
+    });
+}
+
+#[test]
+fn runs_at_the_same_time_do_not_meet() {
+    watched(|| {
+        let runs: Vec<_> = (0..3).map(|index| start_rounds(2 + index % 2, 300)).collect();
+        for (folder, running) in runs {
+            let exits = running.join().expect("the launcher does not panic");
+            for exit in &exits {
+                let (status, text) = (exit.status, String::from_utf8_lossy(&exit.stdout));
+                assert!(status.success() && text == "300 rounds\n", "{status}: {text}");
+            }
+            Told::by(folder.path(), exits.len()).assert_nothing_left();
+        }
+    });
+}
+
+#[test]
+fn ranks_that_are_told_to_stop_agree_where() {
+    const SIZE: usize = 3;
+    watched(|| {
+        let folder = TempDir::new().expect("a temporary folder");
+        let path = folder.path().to_owned();
+        let joined = || (0..SIZE).all(|rank| path.join(format!("process.{rank}")).exists());
+        let control = || if joined() { Control::Stop } else { Control::Run };
+        let command = |_| {
+            let mut command = rank_program();
+            command.arg("rounds").arg(&path).arg(u64::MAX.to_string());
+            command
+        };
+        let exits = launch(SIZE, LaunchOptions::default(), &control, command).expect("the run starts");
+        for exit in &exits {
+            assert!(exit.status.success(), "{exit:?}");
+            assert_eq!(exit.stdout, exits[0].stdout, "ranks stopped in different rounds");
+        }
+    });
+}
+
+#[test]
+fn what_does_not_fit_this_machine_is_refused() {
+    let refused = launch(MAX_RANKS + 1, LaunchOptions::default(), &|| Control::Run, |_| rank_program());
+    let error = refused.expect_err("too many ranks");
+    assert!(matches!(error, LaunchError::Limits(_)));
+    assert!(error.to_string().starts_with("65 ranks asked for"), "{error}");
+}
