@@ -70,7 +70,7 @@
 //!
 //! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod channel;
 mod collective;
@@ -78,6 +78,8 @@ pub mod conformance;
 mod error;
 mod frame;
 pub mod local;
+#[cfg(feature = "mpi")]
+pub mod mpi;
 mod rank;
 mod stats;
 

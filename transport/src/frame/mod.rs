@@ -2,11 +2,16 @@
 //!
 //! Both types hide where their bytes live, so that a backend can hand out memory of its own: each kind of memory is a
 //! variant of two private enums and a file here. Inside one process it is one `Vec<u8>` per rank ([`owned`]): a message
-//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it.
+//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it. A
+//! message-passing library gets one buffer with a part for each rank (`flat`).
 
+#[cfg(feature = "mpi")]
+mod flat;
 mod owned;
 
 use crate::{Rank, TransportError};
+#[cfg(feature = "mpi")]
+pub(crate) use flat::Flat;
 pub(crate) use owned::{OwnedIncoming, OwnedOutgoing};
 use std::time::Duration;
 
@@ -31,6 +36,8 @@ pub struct Outgoing {
 #[derive(Debug)]
 pub(crate) enum OutgoingMemory {
     Owned(OwnedOutgoing),
+    #[cfg(feature = "mpi")]
+    Flat(Flat),
 }
 
 impl Outgoing {
@@ -41,6 +48,12 @@ impl Outgoing {
     /// For backends that move a buffer per rank.
     pub(crate) fn owned(size: usize) -> Outgoing {
         Outgoing::new(size, OutgoingMemory::Owned(OwnedOutgoing::new(size)))
+    }
+
+    /// For backends that scatter one buffer.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn flat(size: usize) -> Outgoing {
+        Outgoing::new(size, OutgoingMemory::Flat(Flat::new(size)))
     }
 
     /// The number of destinations, which is the number of ranks.
@@ -55,6 +68,8 @@ impl Outgoing {
     pub fn to(&mut self, rank: Rank) -> &mut [u8] {
         match &mut self.memory {
             OutgoingMemory::Owned(frames) => frames.to(rank),
+            #[cfg(feature = "mpi")]
+            OutgoingMemory::Flat(flat) => flat.part_mut(rank),
         }
     }
 
@@ -62,6 +77,8 @@ impl Outgoing {
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (Rank, &mut [u8])> {
         let frames = match &mut self.memory {
             OutgoingMemory::Owned(frames) => FramesMut::Owned(frames.iter_mut()),
+            #[cfg(feature = "mpi")]
+            OutgoingMemory::Flat(flat) => FramesMut::Flat(flat.iter_mut()),
         };
         Rank::all(self.size).zip(frames)
     }
@@ -81,6 +98,17 @@ impl Outgoing {
     pub(crate) fn as_owned(&mut self) -> &mut OwnedOutgoing {
         match &mut self.memory {
             OutgoingMemory::Owned(frames) => frames,
+            #[cfg(feature = "mpi")]
+            OutgoingMemory::Flat(_) => unreachable!("a backend makes its own outgoing memory"),
+        }
+    }
+
+    /// The buffer of a backend that scatters one.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn as_flat(&mut self) -> &mut Flat {
+        match &mut self.memory {
+            OutgoingMemory::Flat(flat) => flat,
+            OutgoingMemory::Owned(_) => unreachable!("a backend makes its own outgoing memory"),
         }
     }
 
@@ -117,6 +145,8 @@ impl Outgoing {
 /// The buffers of [`Outgoing`], in rank order.
 enum FramesMut<'a> {
     Owned(std::slice::IterMut<'a, Vec<u8>>),
+    #[cfg(feature = "mpi")]
+    Flat(flat::PartsMut<'a>),
 }
 
 impl<'a> Iterator for FramesMut<'a> {
@@ -125,6 +155,8 @@ impl<'a> Iterator for FramesMut<'a> {
     fn next(&mut self) -> Option<&'a mut [u8]> {
         match self {
             FramesMut::Owned(frames) => frames.next().map(Vec::as_mut_slice),
+            #[cfg(feature = "mpi")]
+            FramesMut::Flat(parts) => parts.next(),
         }
     }
 }
@@ -146,6 +178,8 @@ pub struct Incoming {
 #[derive(Debug)]
 pub(crate) enum IncomingMemory {
     Owned(OwnedIncoming),
+    #[cfg(feature = "mpi")]
+    Flat(Flat),
 }
 
 impl Default for IncomingMemory {
@@ -167,6 +201,8 @@ impl Incoming {
     pub fn from(&self, rank: Rank) -> &[u8] {
         match &self.memory {
             IncomingMemory::Owned(frames) => frames.from(rank),
+            #[cfg(feature = "mpi")]
+            IncomingMemory::Flat(flat) => flat.part(rank),
         }
     }
 
@@ -200,10 +236,28 @@ impl Incoming {
         self.waited = waited;
     }
 
-    /// Buffers for a backend that moves one per rank.
+    /// Buffers for a backend that moves one per rank. Memory of another kind, from another backend, is let go.
     pub(crate) fn as_owned(&mut self) -> &mut OwnedIncoming {
+        #[cfg(feature = "mpi")]
+        if let IncomingMemory::Flat(_) = self.memory {
+            self.memory = IncomingMemory::default();
+        }
         match &mut self.memory {
             IncomingMemory::Owned(frames) => frames,
+            #[cfg(feature = "mpi")]
+            IncomingMemory::Flat(_) => unreachable!("it was replaced"),
+        }
+    }
+
+    /// The buffer for a backend that gathers into one. Memory of another kind, from another backend, is let go.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn as_flat(&mut self) -> &mut Flat {
+        if let IncomingMemory::Owned(_) = self.memory {
+            self.memory = IncomingMemory::Flat(Flat::new(self.size));
+        }
+        match &mut self.memory {
+            IncomingMemory::Flat(flat) => flat,
+            IncomingMemory::Owned(_) => unreachable!("it was replaced"),
         }
     }
 
