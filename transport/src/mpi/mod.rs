@@ -51,9 +51,12 @@ use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
 /// The exit code of a job that a rank ended by [`abort`](Transport::abort) or by a panic.
 pub const ABORTED: i32 = 3;
 
-/// How long the library may take to end the job before the process ends without it. Where the network is cut, the library
-/// may wait for ever.
+/// How long ending the job may take before the process ends by itself. Where the network is cut, the library may wait
+/// for ever.
 const ABORT_LIMIT: Duration = Duration::from_secs(3);
+
+/// How long a rank stays that ends the job, because some launchers lose what was printed just before.
+const LAST_WORDS: Duration = Duration::from_millis(100);
 
 /// How a round is exchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -201,6 +204,7 @@ impl Mpi {
             raw::exit_at_once(code);
         });
         let _ = stdout().flush();
+        thread::sleep(LAST_WORDS);
         match self.state {
             State::Closed => std::process::exit(code),
             State::Open(_) | State::Failed(_) => raw::abort_job(code),
@@ -296,7 +300,7 @@ impl Transport for Mpi {
     /// Prints the reason on standard error and ends all processes of the job with exit code [`ABORTED`].
     fn abort(&mut self, reason: &str) -> ! {
         // A closed standard error must not keep the job from ending.
-        let _ = writeln!(stderr(), "rank {}: {reason}", self.rank);
+        let _ = stderr().write_all(format!("rank {}: {reason}\n", self.rank).as_bytes());
         self.abort_with(ABORTED)
     }
 }

@@ -309,6 +309,9 @@ impl Transfers {
         assert!(sent <= self.outgoing.len() && received <= self.incoming.len(), "the buffers hold all parts");
         assert!(self.taken == 0, "the beginning of the buffer is free");
         self.taken = received;
+        // The address of a vector that never held anything is 1, and that is how one library says `MPI_IN_PLACE`.
+        self.outgoing.reserve_exact(usize::from(self.outgoing.is_empty()));
+        self.incoming.reserve_exact(usize::from(self.incoming.is_empty()));
         let outgoing = self.outgoing.as_ptr().cast::<c_void>();
         let incoming = self.incoming.as_mut_ptr().cast::<c_void>();
         // SAFETY: the tables have an entry per rank, all parts lie within their buffers, and all of this stays where it
