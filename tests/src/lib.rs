@@ -1,6 +1,8 @@
 //! What the integration tests share. The tests themselves are in `tests/`, one file per subject.
 
 pub mod fuzz;
+#[cfg(feature = "mpi")]
+pub mod mpi;
 pub mod processes;
 pub mod program;
 pub mod ranks;

@@ -81,6 +81,8 @@ mod frame;
 #[cfg(feature = "iceoryx2")]
 pub mod iceoryx2;
 pub mod local;
+#[cfg(feature = "mpi")]
+pub mod mpi;
 mod origin;
 mod rank;
 mod stats;

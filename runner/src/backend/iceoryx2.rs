@@ -86,7 +86,7 @@ impl RankProcess {
     /// # Errors
     /// If the report cannot be written.
     pub fn run(self, config: Result<Config, RunError>, observer: Observer) -> Result<Exit, RunError> {
-        let rank = iceoryx2::rank_of_process().unwrap_or_default();
+        let rank = iceoryx2::process_rank().unwrap_or_default();
         let observer = Observer { stop: StopFlag::asking(iceoryx2::stop_requested), ..observer };
         // The endpoint is dropped while a panic unwinds, which tells the other ranks.
         let end = catch_unwind(AssertUnwindSafe(|| take_part(config, &observer)));

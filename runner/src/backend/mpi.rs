@@ -10,7 +10,7 @@ use crate::plan::Plan;
 use crate::summary::Summary;
 use atoll_core::StepError;
 use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
-use atoll_transport::{Rank, RankFailure, Transport, TransportError};
+use atoll_transport::{Rank, RankFailure, Transport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
@@ -34,15 +34,18 @@ impl Job {
     pub fn join() -> Result<Self, RunError> {
         let options = MpiOptions { peer_timeout: AGREEMENT_TIMEOUT, ..MpiOptions::default() };
         let endpoint = Mpi::init(options).map_err(|error| RunError::Launcher(error.to_string()))?;
-        match mpi::launched_size() {
-            Some(launched) if launched > 1 && endpoint.size() == 1 => {
+        match mpi::launched() {
+            Some(launched) if launched.size > 1 && endpoint.size() == 1 => {
                 // Each of them is alone and believes itself the first; one is enough to say so.
-                let error = RunError::Launcher(format!(
-                    "the launcher started {launched} processes, but each finds itself alone: it is not that of the \
-                     MPI this program was built with, {}; use that one's mpirun",
+                if launched.rank != Rank(0) {
+                    return Err(RunError::ToldElsewhere { exit: Exit::Usage });
+                }
+                Err(RunError::Launcher(format!(
+                    "the launcher started {} processes, but each finds itself alone: it is not that of the MPI this \
+                     program was built with, {}; use that one's mpirun, or the --mpi of srun that suits it",
+                    launched.size,
                     Mpi::library()
-                ));
-                Err(if mpi::launched_rank() == Some(0) { error } else { RunError::ToldElsewhere { exit: Exit::Usage } })
+                )))
             }
             _ => Ok(Self { endpoint }),
         }
@@ -92,7 +95,7 @@ impl Job {
     /// What ended the run on every rank alike. Anything else ends the job.
     pub fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
         let run = &plan.config.run;
-        self.endpoint.set_peer_timeout(run.peer_timeout);
+        self.endpoint.set_peer_timeout(run.peer_timeout).expect("the configuration has none of zero");
         self.endpoint.set_method(match run.mpi_exchange {
             MpiExchange::Alltoallv => Method::Alltoallv,
             MpiExchange::Sparse => Method::Sparse,

@@ -3,13 +3,18 @@
 //! Both types hide where their bytes live, so that a backend can hand out memory of its own: each kind of memory is a
 //! variant of two private enums and a file here. Inside one process it is one `Vec<u8>` per rank ([`owned`]): a message
 //! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it. Between processes
-//! of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place.
+//! of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place. A message-passing library
+//! gets one buffer with a part for each rank (`flat`).
 
+#[cfg(feature = "mpi")]
+mod flat;
 #[cfg(feature = "iceoryx2")]
 mod loaned;
 mod owned;
 
 use crate::{Rank, TransportError};
+#[cfg(feature = "mpi")]
+pub(crate) use flat::Flat;
 #[cfg(feature = "iceoryx2")]
 pub(crate) use loaned::{Loan, LoanedFrame, LoanedIncoming, LoanedOutgoing, Message};
 pub(crate) use owned::{OwnedIncoming, OwnedOutgoing};
@@ -38,6 +43,8 @@ pub(crate) enum OutgoingMemory {
     Owned(OwnedOutgoing),
     #[cfg(feature = "iceoryx2")]
     Loaned(LoanedOutgoing),
+    #[cfg(feature = "mpi")]
+    Flat(Flat),
 }
 
 impl Outgoing {
@@ -56,6 +63,12 @@ impl Outgoing {
         Outgoing::new(size, OutgoingMemory::Loaned(LoanedOutgoing::new(own, size)))
     }
 
+    /// For backends that scatter one buffer.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn flat(size: usize) -> Outgoing {
+        Outgoing::new(size, OutgoingMemory::Flat(Flat::new(size)))
+    }
+
     /// The number of destinations, which is the number of ranks.
     pub fn size(&self) -> usize {
         self.size
@@ -70,6 +83,8 @@ impl Outgoing {
             OutgoingMemory::Owned(frames) => frames.to(rank),
             #[cfg(feature = "iceoryx2")]
             OutgoingMemory::Loaned(frames) => frames.to(rank),
+            #[cfg(feature = "mpi")]
+            OutgoingMemory::Flat(flat) => flat.part_mut(rank),
         }
     }
 
@@ -79,6 +94,8 @@ impl Outgoing {
             OutgoingMemory::Owned(frames) => FramesMut::Owned(frames.iter_mut()),
             #[cfg(feature = "iceoryx2")]
             OutgoingMemory::Loaned(frames) => FramesMut::Loaned(frames.iter_mut()),
+            #[cfg(feature = "mpi")]
+            OutgoingMemory::Flat(flat) => FramesMut::Flat(flat.iter_mut()),
         };
         Rank::all(self.size).zip(frames)
     }
@@ -98,8 +115,8 @@ impl Outgoing {
     pub(crate) fn as_owned(&mut self) -> &mut OwnedOutgoing {
         match &mut self.memory {
             OutgoingMemory::Owned(frames) => frames,
-            #[cfg(feature = "iceoryx2")]
-            OutgoingMemory::Loaned(_) => unreachable!("an endpoint keeps the kind of memory it was made with"),
+            #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
+            _ => unreachable!("an endpoint keeps the kind of memory it was made with"),
         }
     }
 
@@ -108,7 +125,16 @@ impl Outgoing {
     pub(crate) fn as_loaned(&mut self) -> &mut LoanedOutgoing {
         match &mut self.memory {
             OutgoingMemory::Loaned(frames) => frames,
-            OutgoingMemory::Owned(_) => unreachable!("an endpoint keeps the kind of memory it was made with"),
+            _ => unreachable!("an endpoint keeps the kind of memory it was made with"),
+        }
+    }
+
+    /// The buffer of a backend that scatters one.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn as_flat(&mut self) -> &mut Flat {
+        match &mut self.memory {
+            OutgoingMemory::Flat(flat) => flat,
+            _ => unreachable!("an endpoint keeps the kind of memory it was made with"),
         }
     }
 
@@ -147,6 +173,8 @@ enum FramesMut<'a> {
     Owned(std::slice::IterMut<'a, Vec<u8>>),
     #[cfg(feature = "iceoryx2")]
     Loaned(std::slice::IterMut<'a, LoanedFrame>),
+    #[cfg(feature = "mpi")]
+    Flat(flat::PartsMut<'a>),
 }
 
 impl<'a> Iterator for FramesMut<'a> {
@@ -157,6 +185,8 @@ impl<'a> Iterator for FramesMut<'a> {
             FramesMut::Owned(frames) => frames.next().map(Vec::as_mut_slice),
             #[cfg(feature = "iceoryx2")]
             FramesMut::Loaned(frames) => frames.next().map(LoanedFrame::bytes),
+            #[cfg(feature = "mpi")]
+            FramesMut::Flat(parts) => parts.next(),
         }
     }
 }
@@ -180,6 +210,8 @@ pub(crate) enum IncomingMemory {
     Owned(OwnedIncoming),
     #[cfg(feature = "iceoryx2")]
     Loaned(LoanedIncoming),
+    #[cfg(feature = "mpi")]
+    Flat(Flat),
 }
 
 impl Default for IncomingMemory {
@@ -203,6 +235,8 @@ impl Incoming {
             IncomingMemory::Owned(frames) => frames.from(rank),
             #[cfg(feature = "iceoryx2")]
             IncomingMemory::Loaned(frames) => frames.from(rank),
+            #[cfg(feature = "mpi")]
+            IncomingMemory::Flat(flat) => flat.part(rank),
         }
     }
 
@@ -238,14 +272,14 @@ impl Incoming {
 
     /// Buffers for a backend that moves one per rank. Memory of another kind, from another endpoint, is given back.
     pub(crate) fn as_owned(&mut self) -> &mut OwnedIncoming {
-        #[cfg(feature = "iceoryx2")]
+        #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
         if !matches!(self.memory, IncomingMemory::Owned(_)) {
             self.memory = IncomingMemory::default();
         }
         match &mut self.memory {
             IncomingMemory::Owned(frames) => frames,
-            #[cfg(feature = "iceoryx2")]
-            IncomingMemory::Loaned(_) => unreachable!("was replaced"),
+            #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
+            _ => unreachable!("it was replaced"),
         }
     }
 
@@ -257,7 +291,19 @@ impl Incoming {
         }
         match &mut self.memory {
             IncomingMemory::Loaned(frames) => frames,
-            IncomingMemory::Owned(_) => unreachable!("was replaced"),
+            _ => unreachable!("it was replaced"),
+        }
+    }
+
+    /// The buffer for a backend that gathers into one. Memory of another kind is given up.
+    #[cfg(feature = "mpi")]
+    pub(crate) fn as_flat(&mut self) -> &mut Flat {
+        if !matches!(self.memory, IncomingMemory::Flat(_)) {
+            self.memory = IncomingMemory::Flat(Flat::new(self.size));
+        }
+        match &mut self.memory {
+            IncomingMemory::Flat(flat) => flat,
+            _ => unreachable!("it was replaced"),
         }
     }
 

@@ -3,13 +3,13 @@
 use crate::Rank;
 
 /// Buffers at most this large are never trimmed, in bytes.
-const KEEP_BYTES: usize = 64 * 1024;
+pub(super) const KEEP_BYTES: usize = 64 * 1024;
 
 /// A buffer is trimmed when it has more than this many times the room that its edge needed lately.
-const KEEP_RATIO: usize = 4;
+pub(super) const KEEP_RATIO: usize = 4;
 
 /// How slowly "lately" fades: the remembered need of an edge shrinks by one part in this many per round.
-const FADE: usize = 1024;
+pub(super) const FADE: usize = 1024;
 
 /// The buffers that one rank fills.
 #[derive(Debug)]

@@ -18,6 +18,11 @@ pub fn is_rank_process() -> bool {
     env::var_os(FOLDER).is_some()
 }
 
+/// Which rank this process was started as, if as any.
+pub fn process_rank() -> Option<Rank> {
+    Environment::get().ok().map(|environment| environment.rank)
+}
+
 /// What a rank has to know to join.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Environment {
