@@ -128,8 +128,8 @@ pub enum RunError {
         /// The exit code they go with.
         exit: Exit,
     },
-    /// What another rank tells the user.
-    #[error("see what another rank says")]
+    /// What the user has been told already, by this rank or another.
+    #[error("see what was said before")]
     ToldElsewhere {
         /// The exit code that goes with it.
         exit: Exit,

@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 /// Stands in front of the words of a rank that is not ready.
 const ERROR: &str = "error";
 
+/// Stands in front of the words of a rank that speaks for all: which rank it is makes no difference.
+const COMMON_ERROR: &str = "common error";
+
 /// Why ranks do not run together.
 #[derive(Debug)]
 pub enum Refusal {
@@ -29,7 +32,11 @@ pub fn agree<T>(
 ) -> Result<T, Refusal> {
     let hello = match &prepared {
         Ok(prepared) => hello(plan_of(prepared)),
-        Err(error) => vec![(ERROR.to_owned(), format!("{} {error}", error.exit() as u8))],
+        Err(error) => {
+            // Output is the business of one rank.
+            let name = if matches!(error, RunError::BadOutput { .. }) { COMMON_ERROR } else { ERROR };
+            vec![(name.to_owned(), format!("{} {error}", error.exit() as u8))]
+        }
     };
     let hellos = transport.all_gather(encode(&hello).as_bytes()).map_err(Refusal::Transport)?;
     let hellos: Vec<Hello> = hellos.iter().map(|bytes| decode(bytes)).collect();
@@ -70,13 +77,12 @@ fn decode(bytes: &[u8]) -> Hello {
 fn refusal(hellos: &[Hello]) -> Option<RunError> {
     let value = |hello: &Hello, name: &str| hello.iter().find(|line| line.0 == name).map(|line| line.1.clone());
     let errors: Vec<Option<String>> = hellos.iter().map(|hello| value(hello, ERROR)).collect();
-    if let Some(first) = errors.iter().flatten().next() {
-        let (code, text) = first.split_once(' ').unwrap_or(("", first));
-        let exit = code.parse().map_or(Exit::Usage, Exit::from_code);
-        let everywhere = errors.iter().all(|error| error.as_ref() == Some(first));
-        let rank = errors.iter().position(Option::is_some).unwrap_or(0);
-        let text = if everywhere { text.to_owned() } else { format!("rank {rank}: {text}") };
-        return Some(RunError::Relayed { text, exit });
+    if let Some(rank) = errors.iter().position(Option::is_some) {
+        let everywhere = errors.iter().all(|error| *error == errors[rank]);
+        return errors[rank].as_deref().map(|error| relayed(error, (!everywhere).then_some(rank)));
+    }
+    if let Some(error) = hellos.iter().find_map(|hello| value(hello, COMMON_ERROR)) {
+        return Some(relayed(&error, None));
     }
     // In the order in which they explain each other: another version has other hashes as well.
     for (name, _) in hellos.first()? {
@@ -93,6 +99,13 @@ fn refusal(hellos: &[Hello]) -> Option<RunError> {
         }
     }
     None
+}
+
+/// Exit code and words of an error, which is that of one rank or of all.
+fn relayed(error: &str, rank: Option<usize>) -> RunError {
+    let (code, text) = error.split_once(' ').unwrap_or(("", error));
+    let text = rank.map_or(text.to_owned(), |rank| format!("rank {rank}: {text}"));
+    RunError::Relayed { text, exit: code.parse().map_or(Exit::Usage, Exit::from_code) }
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ impl Job {
     /// Goes on where every rank is ready for the same run.
     ///
     /// # Errors
-    /// What keeps them from it; on all ranks but 0, that another one tells.
+    /// What keeps them from it, told by rank 0.
     pub fn agree<T>(
         &mut self,
         prepared: Result<T, RunError>,
@@ -84,7 +84,7 @@ impl Job {
     ) -> Result<T, RunError> {
         match handshake::agree(&mut self.endpoint, prepared, plan_of) {
             Ok(prepared) => Ok(prepared),
-            Err(Refusal::Known(error)) => Err(self.common(error)),
+            Err(Refusal::Known(error)) => Err(self.common(&error)),
             Err(Refusal::Transport(error)) => self.fail(&RunError::Launcher(error.to_string()), Exit::PeerLost),
         }
     }
@@ -92,7 +92,7 @@ impl Job {
     /// Runs this rank's part of the plan that all agreed on. Rank 0 gets the summary.
     ///
     /// # Errors
-    /// What ended the run on every rank alike. Anything else ends the job.
+    /// What ended the run on every rank alike, told by rank 0. Anything else ends the job.
     pub fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
         let run = &plan.config.run;
         self.endpoint.set_peer_timeout(run.peer_timeout).expect("the configuration has none of zero");
@@ -110,7 +110,7 @@ impl Job {
         match end.result {
             Ok(gathered) => Ok(gathered.map(|gathered| Summary::new(plan, gathered))),
             Err(error @ RankError::Step(StepError::NonFinite { .. })) => {
-                Err(self.common(told(error, end.complete, run.steps)))
+                Err(self.common(&told(error, end.complete, run.steps)))
             }
             Err(error) => {
                 let error = told(error, end.complete, run.steps);
@@ -119,9 +119,13 @@ impl Job {
         }
     }
 
-    /// An error that every rank has: told once.
-    fn common(&self, error: RunError) -> RunError {
-        if self.speaks() { error } else { RunError::ToldElsewhere { exit: error.exit() } }
+    /// An error that every rank has: told once, while the job is still there. Ranks leave it together, and where the first
+    /// exit code arrives that is not 0 a launcher ends whatever is left.
+    fn common(&self, error: &RunError) -> RunError {
+        if self.speaks() {
+            complain(error);
+        }
+        RunError::ToldElsewhere { exit: error.exit() }
     }
 
     /// Tells what went wrong on this rank and ends the job.

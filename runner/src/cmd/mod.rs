@@ -9,6 +9,7 @@ use crate::telemetry;
 use clap::Parser;
 use clap::error::ErrorKind;
 use std::fmt::Display;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 /// Reads the command line and does what it says.
@@ -31,7 +32,9 @@ pub fn main() -> ExitCode {
 
 /// On one line, whatever names and values the user has given.
 pub(crate) fn complain(error: &dyn Display) {
-    eprintln!("atoll: {}", OneLine(&error.to_string()));
+    // In one piece, so that nothing that others say comes between, and whether or not anybody listens.
+    let line = format!("atoll: {}\n", OneLine(&error.to_string()));
+    let _ = io::stderr().write_all(line.as_bytes());
 }
 
 /// Help and version as they are; complaints on one line.
