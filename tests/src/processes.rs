@@ -1,7 +1,7 @@
 //! The processes of a run: which of them is which rank, and what they must not leave behind.
 
 use crate::program::{Ended, LIMIT, Running};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::process::Command;
 use std::thread::sleep;
@@ -60,12 +60,36 @@ pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
     rank.iter().any(|name| said.contains(name)) || said.contains(&lost.pid.to_string())
 }
 
-/// What is in shared memory, sorted.
-pub fn shared_memory() -> Vec<String> {
+/// What is in shared memory, by name.
+pub fn shared_memory() -> BTreeSet<String> {
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    let mut names: Vec<_> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
+    entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
+}
+
+/// What is in shared memory that was not there before and that no process uses; other runs on this machine come and go,
+/// so only what stays is counted.
+pub fn left_in_shared_memory(before: &BTreeSet<String>) -> BTreeSet<String> {
+    let unused = || -> BTreeSet<String> {
+        let added: BTreeSet<String> = shared_memory().difference(before).cloned().collect();
+        let maps: Vec<String> =
+            processes().into_iter().filter_map(|pid| fs::read_to_string(format!("/proc/{pid}/maps")).ok()).collect();
+        let used = |name: &str| maps.iter().any(|map| map.contains(&format!("/dev/shm/{name}")));
+        // Those of a run whose launcher lives are its own business: atoll-USER-LAUNCHER-...
+        let launched = |name: &str| {
+            let launcher = name.strip_prefix("atoll-").and_then(|rest| rest.split('-').nth(1)?.parse().ok());
+            launcher.is_some_and(|pid| state(pid).is_some())
+        };
+        added.into_iter().filter(|name| !used(name) && !launched(name)).collect()
+    };
+    let mut left = unused();
+    for _ in 0..10 {
+        if left.is_empty() {
+            break;
+        }
+        sleep(Duration::from_millis(200));
+        left = left.intersection(&unused()).cloned().collect();
+    }
+    left
 }
 
 /// The rank that a process is told to be.
@@ -86,14 +110,13 @@ fn state(pid: u32) -> Option<(char, u32)> {
     Some((fields.next()?.chars().next()?, fields.next()?.parse().ok()?))
 }
 
+fn processes() -> Vec<u32> {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect()
+}
+
 fn descendants(root: u32) -> Vec<u32> {
-    let all: Vec<u32> = fs::read_dir("/proc")
-        .into_iter()
-        .flatten()
-        .flatten()
-        .filter_map(|entry| entry.file_name().to_str()?.parse().ok())
-        .collect();
-    let parents: BTreeMap<u32, u32> = all.into_iter().filter_map(|pid| Some((pid, state(pid)?.1))).collect();
+    let parents: BTreeMap<u32, u32> = processes().into_iter().filter_map(|pid| Some((pid, state(pid)?.1))).collect();
     let descends = |mut pid: u32| {
         while let Some(&parent) = parents.get(&pid) {
             if parent == root {

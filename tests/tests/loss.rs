@@ -1,7 +1,7 @@
 //! A rank that dies in the middle of a run: all others end soon, the exit code says so, a line names the dead one, and
 //! nothing is left behind.
 
-use atoll_tests::processes::{self, RankProcess};
+use atoll_tests::processes::{self, RankProcess, left_in_shared_memory};
 use atoll_tests::program::{Ended, LIMIT, Running};
 use atoll_tests::ways::Way;
 use atoll_tests::world::noise;
@@ -52,7 +52,8 @@ fn a_rank_that_panics_ends_all_others() {
                 // Over MPI the rank itself tells, and the launcher ends all others before they can.
                 assert_eq!(named(&ended, rank), Some(step), "{way}: {ended}");
             }
-            assert_eq!(processes::shared_memory(), before, "{way}: left behind");
+            let left = left_in_shared_memory(&before);
+            assert!(left.is_empty(), "{way}: left behind {left:?}");
         }
     }
 }
@@ -83,7 +84,8 @@ fn a_rank_that_is_killed_ends_all_others() {
                 assert!(ended.code != Some(0), "{way}: {ended}");
                 assert!(processes::launcher_names(&ended, victim), "{way}: rank {rank} is not named: {ended}");
             }
-            assert_eq!(processes::shared_memory(), before, "{way}: left behind");
+            let left = left_in_shared_memory(&before);
+            assert!(left.is_empty(), "{way}: left behind {left:?}");
         }
     }
 }
@@ -101,7 +103,8 @@ fn a_rank_that_hangs_is_given_up() {
         assert_eq!(ended.code, Some(3), "{way}: {ended}");
         assert!(named(&ended, 2).is_some(), "{way}: rank 2 is not named: {ended}");
         wait_for_end(&ranks);
-        assert_eq!(processes::shared_memory(), before, "{way}: left behind");
+        let left = left_in_shared_memory(&before);
+        assert!(left.is_empty(), "{way}: left behind {left:?}");
     }
 }
 
