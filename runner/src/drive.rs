@@ -11,6 +11,8 @@ use atoll_core::{SetupError, StepError, StepReport, TileFacts, World};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use bytemuck::Pod;
 use rayon::ThreadPoolBuilder;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use tracing::{debug, info, info_span};
 
@@ -23,6 +25,8 @@ pub struct Observer {
     pub stop: StopFlag,
     /// Lets a rank panic.
     pub panic_at: Option<PanicAt>,
+    /// Steps that were completed here, by the rank that said so last; so that they are known even after a panic.
+    pub complete: Arc<AtomicU64>,
 }
 
 /// Why a rank ended early.
@@ -128,6 +132,7 @@ fn run<T: Transport>(
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
         *complete = world.step_count();
+        observer.complete.store(*complete, Ordering::Relaxed);
         progress.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }

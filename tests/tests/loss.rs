@@ -48,10 +48,7 @@ fn a_rank_that_panics_ends_all_others() {
             assert_eq!(ended.code, Some(3), "{way}, rank {rank} at step {step}: {ended}");
             let complaint = format!("rank {rank} panicked: as --panic-at asks");
             assert!(ended.stderr.contains(&complaint), "{way}, rank {rank} at step {step}: {ended}");
-            if !matches!(way, Way::Mpi(_)) {
-                // Over MPI the rank itself tells, and the launcher ends all others before they can.
-                assert_eq!(named(&ended, rank), Some(step), "{way}: {ended}");
-            }
+            assert_eq!(named(&ended, rank), Some(step), "{way}: {ended}");
             let left = left_in_shared_memory(&before);
             assert!(left.is_empty(), "{way}: left behind {left:?}");
         }

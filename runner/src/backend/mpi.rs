@@ -12,6 +12,7 @@ use atoll_core::StepError;
 use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
 use atoll_transport::{Rank, RankFailure, Transport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// How long ranks wait for each other until they have agreed on a configuration, which says how long.
@@ -104,8 +105,10 @@ impl Job {
         let endpoint = &mut self.endpoint;
         let end = catch_unwind(AssertUnwindSafe(|| drive::drive(endpoint, plan, observer, true)));
         let end = end.unwrap_or_else(|payload| {
-            let failure = RankFailure::from_panic(self.endpoint.rank(), payload);
-            self.fail(&failure, Exit::PeerLost)
+            let rank = self.endpoint.rank();
+            let (complete, steps) = (observer.complete.load(Ordering::Relaxed), run.steps);
+            let reason = RankFailure::from_panic(rank, payload).to_string();
+            self.fail(&RunError::PeerLost { rank, complete, steps, reason }, Exit::PeerLost)
         });
         match end.result {
             Ok(gathered) => Ok(gathered.map(|gathered| Summary::new(plan, gathered))),

@@ -49,7 +49,7 @@ fn load(args: &RunArgs) -> Result<Config, RunError> {
 
 fn observer(args: &RunArgs) -> Observer {
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
-    Observer { show, stop: StopFlag::default(), panic_at: args.panic_at }
+    Observer { show, panic_at: args.panic_at, ..Observer::default() }
 }
 
 /// What the user may want to know before the run starts.
@@ -84,7 +84,8 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     if speaks {
         tell(&plan);
     }
-    let stop = StopFlag::on_signals(speaks, || std::process::exit(Exit::Interrupted as i32));
+    // Silently: the launcher sends signals of its own when it ends a job.
+    let stop = StopFlag::on_signals(false, || std::process::exit(Exit::Interrupted as i32));
     match job.run(&plan, &Observer { stop, ..observer(args) })? {
         Some(summary) => conclude(&summary, &outputs),
         None => Ok(Exit::Done),
