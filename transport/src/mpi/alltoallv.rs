@@ -37,12 +37,11 @@ impl Session {
         let (own, size) = (data.rank(), data.size());
         let longest = longest_in_collective(size);
 
-        let [mut announced, heard] = std::mem::take(records);
+        let [mut announced, mut heard] = std::mem::take(records);
         let [high, low] = to_halves(outgoing.flag_word());
         let sent = outgoing.as_flat();
         announced.clear();
         announced.extend(Rank::all(size).flat_map(|to| [sent.place_of(to).len() as u64, high, low]));
-        let mut heard = heard;
         heard.resize(announced.len(), 0);
         let mut counts = data.all_to_all(announced, heard);
         let mut waited = watch.wait(started, || counts.test())?;

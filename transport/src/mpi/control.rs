@@ -117,6 +117,8 @@ impl Watch {
         self.wait(since, || barrier.test())?;
         barrier.finish();
         self.flush();
+        // Those that came early may have said so to some that never had to look.
+        drop(self.receive());
         Ok(())
     }
 
@@ -136,12 +138,8 @@ impl Watch {
     /// Reads what other ranks have told.
     fn look(&mut self) -> Result<(), TransportError> {
         self.retire_sends();
-        while let Some(message) = self.communicator.arrived(TAG) {
-            self.receives.push((message.from, message.receive()));
-        }
-        let complete: Vec<_> = self.receives.extract_if(.., |(_, receive)| receive.test()).collect();
-        for (from, receive) in complete {
-            self.hear(from, &receive.finish())?;
+        for (from, bytes) in self.receive() {
+            self.hear(from, &bytes)?;
         }
         match self.stage {
             Stage::Rounds => self.check_left(),
@@ -152,6 +150,15 @@ impl Watch {
             }
             Stage::Leaving { .. } => Ok(()),
         }
+    }
+
+    /// What has arrived since the last time.
+    fn receive(&mut self) -> Vec<(Rank, Vec<u8>)> {
+        while let Some(message) = self.communicator.arrived(TAG) {
+            self.receives.push((message.from, message.receive()));
+        }
+        let complete = self.receives.extract_if(.., |(_, receive)| receive.test());
+        complete.map(|(from, receive)| (from, receive.finish())).collect()
     }
 
     fn hear(&mut self, from: Rank, bytes: &[u8]) -> Result<(), TransportError> {

@@ -25,9 +25,12 @@
 //!
 //! The library has no notion of a peer that is gone; an operation that needs it just never ends. So nothing here blocks:
 //! a rank that waits asks the library again and again, and now and then looks for notices of other ranks: that one left
-//! before this round, or gave up, and why. At the peer timeout it asks all others for a sign of life, which each gives that waits
-//! itself, and blames the lowest one that gives none: it computes for too long, hangs, or is cut off.
-//! These notices go from every rank to every other, but only where something is wrong, or at the end.
+//! before this round, or gave up, and why. At the peer timeout it asks all others for a sign of life, which each gives
+//! that waits itself, and a second later blames the lowest one that gave none: it computes for too long, hangs, or is
+//! cut off. These notices go from every rank to every other, but only where something is wrong, or at the end.
+//!
+//! Where a host is cut off, the ranks on both sides end; the launcher may still wait for that host, Open MPI's for many
+//! minutes. Start it under a time limit where that matters.
 
 mod alltoallv;
 mod control;
@@ -166,10 +169,11 @@ impl Mpi {
         })
     }
 
-    /// The name and version of the MPI library, in its own words, on one line.
+    /// The name and version of the MPI library, in its own words, on one line. It need not be initialized.
     pub fn library() -> String {
         let version = ::mpi::environment::library_version().unwrap_or_else(|_| "an MPI library".to_owned());
-        version.split(['\n', '\0']).next().unwrap_or_default().trim().to_owned()
+        let line = version.split(['\n', '\0']).next().unwrap_or_default();
+        line.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
     /// How rounds are exchanged.

@@ -150,7 +150,8 @@ impl Communicator {
     /// A message of this tag that has arrived, if there is one. It has to be received.
     pub(super) fn arrived(&self, tag: c_int) -> Option<Arrived> {
         let mut found = 0;
-        let (mut handle, mut status) = (MaybeUninit::uninit(), MaybeUninit::uninit());
+        // The library need not write the whole status, so it begins with zeros.
+        let (mut handle, mut status) = (MaybeUninit::uninit(), MaybeUninit::zeroed());
         // SAFETY: each place is written by the call; handle and status only where something is found.
         unsafe {
             let any = ffi::RSMPI_ANY_SOURCE;
@@ -160,7 +161,7 @@ impl Communicator {
             return None;
         }
         let mut length = 0;
-        // SAFETY: a message was found, so both places are written.
+        // SAFETY: a message was found, so both places are written, and zeros are a status as well.
         let (handle, status) = unsafe { (handle.assume_init(), status.assume_init()) };
         // SAFETY: the status is that of a message of bytes.
         unsafe { ffi::MPI_Get_count(&status, ffi::RSMPI_UINT8_T, &mut length) };

@@ -15,11 +15,11 @@ pub(super) struct Session {
     pub(super) watch: Watch,
     pub(super) least: Least,
     pub(super) transfers: Transfers,
-    /// Memory kept from round to round: what ranks announce, sent and received;
+    /// What ranks announce to each other, sent and received. Like the two below, this is memory kept between rounds.
     pub(super) records: [Vec<u64>; 2],
-    /// the lengths that were announced;
+    /// The lengths that were announced to this rank.
     pub(super) lengths: Vec<usize>,
-    /// and where messages are that nobody had announced.
+    /// Where messages are that nobody had announced.
     pub(super) places: Vec<(Rank, Place)>,
 }
 
