@@ -206,7 +206,9 @@ fn without_a_launcher_the_ranks_end_and_the_next_launch_cleans_up() {
     watched(|| {
         let folder = TempDir::new().expect("a temporary folder");
         let mut launcher = rank_program();
-        launcher.arg("launch").arg(folder.path()).arg(SIZE.to_string()).stderr(Stdio::null());
+        launcher.arg("launch").arg(SIZE.to_string()).arg("rounds").arg(folder.path()).arg(u64::MAX.to_string());
+        // The ranks say there that they end.
+        launcher.stderr(Stdio::null());
         let mut launcher = launcher.spawn().expect("the launcher starts");
         let told = Told::by(folder.path(), SIZE);
         launcher.kill().expect("the launcher is killed");
@@ -264,4 +266,30 @@ fn what_does_not_fit_this_machine_is_refused() {
     let error = refused.expect_err("too many ranks");
     assert!(matches!(error, LaunchError::Limits(_)));
     assert!(error.to_string().starts_with("65 ranks asked for"), "{error}");
+}
+
+#[test]
+fn messages_that_do_not_fit_this_machine_end_the_run() {
+    watched(|| {
+        let exits = run(3, LaunchOptions::default(), &["grow", &(1_u64 << 50).to_string(), &u64::MAX.to_string()]);
+        for exit in &exits {
+            let text = String::from_utf8_lossy(&exit.stdout);
+            assert!(
+                text.starts_with("lost rank 1: it is out of shared memory: /dev/shm has "),
+                "rank {}: {text}",
+                exit.rank
+            );
+            assert_eq!((exit.status.code(), exit.killed), (Some(3), false));
+        }
+    });
+}
+
+#[test]
+fn messages_grow_many_times() {
+    watched(|| {
+        let exits = run(3, LaunchOptions::default(), &["grow", "1000", "10000000"]);
+        for exit in &exits {
+            assert_eq!(String::from_utf8_lossy(&exit.stdout), "28 rounds\n", "{}", exit.status);
+        }
+    });
 }

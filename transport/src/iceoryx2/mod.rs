@@ -3,7 +3,7 @@
 //! A launcher process starts the others and watches over them: [`launch`]. A process that finds itself started so
 //! ([`is_rank_process`]) calls [`join`], once, and has an endpoint like any other. A message is written once, by its
 //! sender, into memory that its receiver reads in place: [`Outgoing`](crate::Outgoing) holds loaned slices,
-//! [`Incoming`](crate::Incoming) received ones. Messages begin at multiples of 16 bytes.
+//! [`Incoming`](crate::Incoming) received ones. Messages begin at multiples of 8 bytes.
 //!
 //! ```no_run
 //! use atoll_transport::Collective;
