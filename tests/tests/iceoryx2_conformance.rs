@@ -205,21 +205,24 @@ fn without_a_launcher_the_ranks_end_and_the_next_launch_cleans_up() {
     const SIZE: usize = 3;
     watched(|| {
         let folder = TempDir::new().expect("a temporary folder");
-        let mut launcher = rank_program();
-        launcher.arg("launch").arg(SIZE.to_string()).arg("rounds").arg(folder.path()).arg(u64::MAX.to_string());
-        // The ranks say there that they end.
-        launcher.stderr(Stdio::null());
-        let mut launcher = launcher.spawn().expect("the launcher starts");
+        let launcher = |ranks: usize, rounds: u64| {
+            let mut launcher = rank_program();
+            launcher.arg("launch").arg(ranks.to_string()).arg("rounds").arg(folder.path()).arg(rounds.to_string());
+            // Runs of their own, or another test's launch would clean up. What ranks say there is that they end.
+            launcher.env("TMPDIR", folder.path()).stdout(Stdio::piped()).stderr(Stdio::null());
+            launcher.spawn().expect("the launcher starts")
+        };
+        let mut killed = launcher(SIZE, u64::MAX);
         let told = Told::by(folder.path(), SIZE);
-        launcher.kill().expect("the launcher is killed");
-        launcher.wait().expect("the launcher has ended");
+        killed.kill().expect("the launcher is killed");
+        killed.wait().expect("the launcher has ended");
         // The limit is the watchdog's: no rank waits for anything.
         while told.alive() > 0 {
             sleep(POLL);
         }
         assert!(told.run_folder.exists(), "nobody was there to remove it");
-        let exits = run(1, LaunchOptions::default(), &["rounds", folder.path().to_str().expect("UTF-8"), "1"]);
-        assert_eq!(exits[0].stdout, b"1 rounds\n");
+        let next = launcher(1, 1).wait_with_output().expect("the next launcher ends");
+        assert_eq!(String::from_utf8_lossy(&next.stdout), "rank 0, exit status: 0: 1 rounds\n");
         told.assert_nothing_left();
     });
 }

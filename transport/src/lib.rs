@@ -58,8 +58,10 @@
 //!    [`TransportError::Timeout`]. No rank waits for ever. The error names the rank *where it began*: if rank 1
 //!    gives up because rank 2 is gone, rank 0 hears of rank 2. What a rank had sent before it left still arrives, so
 //!    ranks may end a run at different times. After such an error every call gives the same error again.
-//! 7. **Abort.** [`abort`](Transport::abort) tells the other ranks why and never returns. Where ranks are threads,
-//!    it unwinds the calling one with an [`Aborted`] payload and leaves the process alone.
+//!    A rank that itself cannot go on, for want of memory or of its launcher, is lost in this sense, to itself as well.
+//! 7. **Abort.** [`abort`](Transport::abort) tells the other ranks why and never returns. Where ranks are threads, or
+//!    processes that a launcher watches over, it unwinds the calling thread with an [`Aborted`] payload and leaves the
+//!    process alone.
 //!
 //! # Backends
 //!
@@ -67,6 +69,7 @@
 //! |---|---|---|
 //! | [`local`] | the calling thread, alone | one rank |
 //! | [`channel`] | threads of one process | one machine, and emulating any other run |
+//! | `iceoryx2` (a feature) | processes of one machine, which share memory | one machine, without one process for all |
 //!
 //! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
 
@@ -119,7 +122,8 @@ pub trait Transport {
 
     /// Ends this rank and lets every other rank know why.
     ///
-    /// Where ranks are threads, this unwinds the calling one with an [`Aborted`] payload and never ends the process.
+    /// Where ranks are threads or watched processes, this unwinds the calling thread with an [`Aborted`] payload and
+    /// never ends the process.
     fn abort(&mut self, reason: &str) -> !;
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Both types hide where their bytes live, so that a backend can hand out memory of its own: each kind of memory is a
 //! variant of two private enums and a file here. Inside one process it is one `Vec<u8>` per rank ([`owned`]): a message
-//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it. Between processes
-//! of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place.
+//! is moved, never copied, and the buffer that arrives from a peer is the next one to be filled for it. Between
+//! processes of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place.
 
 #[cfg(feature = "iceoryx2")]
 mod loaned;
