@@ -4,12 +4,11 @@ use atoll_tests::program::LIMIT;
 use atoll_transport::conformance::process::recorded;
 use atoll_transport::conformance::{CASES, Case, Harness, Outcome, check};
 use atoll_transport::iceoryx2::{Control, LaunchError, LaunchOptions, MAX_RANKS, RankExit, launch};
-use std::collections::HashMap;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
+use std::sync::OnceLock;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
@@ -46,14 +45,17 @@ fn run(size: usize, options: LaunchOptions, arguments: &[&str]) -> Vec<RankExit>
     launch(size, options, &|| Control::Run, command).expect("the run starts")
 }
 
-/// Runs each case in a launch of its own, and all that lose no rank in one per number of ranks.
+/// How the ranks ended in each of some cases, by the name of the case.
+type Outcomes = Vec<(&'static str, Vec<Outcome>)>;
+
+/// Runs each case that loses a rank in a launch of its own and all others in one; for one number of ranks.
 #[derive(Default)]
 struct Processes {
-    healthy: Mutex<HashMap<usize, Vec<(&'static str, Vec<Outcome>)>>>,
+    healthy: OnceLock<Outcomes>,
 }
 
 impl Processes {
-    fn outcomes(size: usize, cases: &[&'static Case]) -> Vec<(&'static str, Vec<Outcome>)> {
+    fn outcomes(size: usize, cases: &[&'static Case]) -> Outcomes {
         let folder = TempDir::new().expect("a temporary folder");
         let path = folder.path().to_str().expect("a UTF-8 path").to_owned();
         let names = cases.iter().map(|case| case.name);
@@ -74,8 +76,7 @@ impl Harness for Processes {
         if case.loses_victim {
             return Processes::outcomes(size, &[case]).remove(0).1;
         }
-        let mut healthy = self.healthy.lock().expect("no run panics");
-        let outcomes = healthy.entry(size).or_insert_with(|| {
+        let outcomes = self.healthy.get_or_init(|| {
             let cases: Vec<_> = CASES.iter().filter(|case| !case.loses_victim && case.sizes.contains(&size)).collect();
             Processes::outcomes(size, &cases)
         });
