@@ -64,6 +64,9 @@ for i in "${!hosts[@]}"; do
     ip -n "$tag-$host" addr add "$net.$((i + 1))/24" dev eth0
     ip -n "$tag-$host" link set eth0 up
     ip -n "$tag-$host" link set lo up
+    # How often a host sends again what is not acknowledged. By default it goes on for a quarter of an hour, and for so long
+    # mpirun waits for a host that is cut off.
+    ip netns exec "$tag-$host" sysctl -q -w net.ipv4.tcp_retries2=4
 done
 
 atoll=${1:-}

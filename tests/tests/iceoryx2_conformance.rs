@@ -4,12 +4,11 @@ use atoll_tests::program::LIMIT;
 use atoll_transport::conformance::process::recorded;
 use atoll_transport::conformance::{CASES, Case, Harness, Outcome, check};
 use atoll_transport::iceoryx2::{Control, LaunchError, LaunchOptions, MAX_RANKS, RankExit, launch};
-use std::collections::HashMap;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
+use std::sync::OnceLock;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
@@ -46,14 +45,17 @@ fn run(size: usize, options: LaunchOptions, arguments: &[&str]) -> Vec<RankExit>
     launch(size, options, &|| Control::Run, command).expect("the run starts")
 }
 
-/// Runs each case in a launch of its own, and all that lose no rank in one per number of ranks.
+/// How the ranks ended in each of some cases, by the name of the case.
+type Outcomes = Vec<(&'static str, Vec<Outcome>)>;
+
+/// Runs each case that loses a rank in a launch of its own and all others in one; for one number of ranks.
 #[derive(Default)]
 struct Processes {
-    healthy: Mutex<HashMap<usize, Vec<(&'static str, Vec<Outcome>)>>>,
+    healthy: OnceLock<Outcomes>,
 }
 
 impl Processes {
-    fn outcomes(size: usize, cases: &[&'static Case]) -> Vec<(&'static str, Vec<Outcome>)> {
+    fn outcomes(size: usize, cases: &[&'static Case]) -> Outcomes {
         let folder = TempDir::new().expect("a temporary folder");
         let path = folder.path().to_str().expect("a UTF-8 path").to_owned();
         let names = cases.iter().map(|case| case.name);
@@ -74,8 +76,7 @@ impl Harness for Processes {
         if case.loses_victim {
             return Processes::outcomes(size, &[case]).remove(0).1;
         }
-        let mut healthy = self.healthy.lock().expect("no run panics");
-        let outcomes = healthy.entry(size).or_insert_with(|| {
+        let outcomes = self.healthy.get_or_init(|| {
             let cases: Vec<_> = CASES.iter().filter(|case| !case.loses_victim && case.sizes.contains(&size)).collect();
             Processes::outcomes(size, &cases)
         });
@@ -205,19 +206,24 @@ fn without_a_launcher_the_ranks_end_and_the_next_launch_cleans_up() {
     const SIZE: usize = 3;
     watched(|| {
         let folder = TempDir::new().expect("a temporary folder");
-        let mut launcher = rank_program();
-        launcher.arg("launch").arg(folder.path()).arg(SIZE.to_string()).stderr(Stdio::null());
-        let mut launcher = launcher.spawn().expect("the launcher starts");
+        let launcher = |ranks: usize, rounds: u64| {
+            let mut launcher = rank_program();
+            launcher.arg("launch").arg(ranks.to_string()).arg("rounds").arg(folder.path()).arg(rounds.to_string());
+            // Runs of their own, or another test's launch would clean up. What ranks say there is that they end.
+            launcher.env("TMPDIR", folder.path()).stdout(Stdio::piped()).stderr(Stdio::null());
+            launcher.spawn().expect("the launcher starts")
+        };
+        let mut killed = launcher(SIZE, u64::MAX);
         let told = Told::by(folder.path(), SIZE);
-        launcher.kill().expect("the launcher is killed");
-        launcher.wait().expect("the launcher has ended");
+        killed.kill().expect("the launcher is killed");
+        killed.wait().expect("the launcher has ended");
         // The limit is the watchdog's: no rank waits for anything.
         while told.alive() > 0 {
             sleep(POLL);
         }
         assert!(told.run_folder.exists(), "nobody was there to remove it");
-        let exits = run(1, LaunchOptions::default(), &["rounds", folder.path().to_str().expect("UTF-8"), "1"]);
-        assert_eq!(exits[0].stdout, b"1 rounds\n");
+        let next = launcher(1, 1).wait_with_output().expect("the next launcher ends");
+        assert_eq!(String::from_utf8_lossy(&next.stdout), "rank 0, exit status: 0: 1 rounds\n");
         told.assert_nothing_left();
     });
 }
@@ -264,4 +270,30 @@ fn what_does_not_fit_this_machine_is_refused() {
     let error = refused.expect_err("too many ranks");
     assert!(matches!(error, LaunchError::Limits(_)));
     assert!(error.to_string().starts_with("65 ranks asked for"), "{error}");
+}
+
+#[test]
+fn messages_that_do_not_fit_this_machine_end_the_run() {
+    watched(|| {
+        let exits = run(3, LaunchOptions::default(), &["grow", &(1_u64 << 50).to_string(), &u64::MAX.to_string()]);
+        for exit in &exits {
+            let text = String::from_utf8_lossy(&exit.stdout);
+            assert!(
+                text.starts_with("lost rank 1: it is out of shared memory: /dev/shm has "),
+                "rank {}: {text}",
+                exit.rank
+            );
+            assert_eq!((exit.status.code(), exit.killed), (Some(3), false));
+        }
+    });
+}
+
+#[test]
+fn messages_grow_many_times() {
+    watched(|| {
+        let exits = run(3, LaunchOptions::default(), &["grow", "1000", "10000000"]);
+        for exit in &exits {
+            assert_eq!(String::from_utf8_lossy(&exit.stdout), "28 rounds\n", "{}", exit.status);
+        }
+    });
 }

@@ -58,10 +58,11 @@
 //!    [`TransportError::Timeout`]. No rank waits for ever. The error names the rank *where it began*: if rank 1
 //!    gives up because rank 2 is gone, rank 0 hears of rank 2. What a rank had sent before it left still arrives, so
 //!    ranks may end a run at different times. After such an error every call gives the same error again.
-//!    Where the ranks are processes of one job, the end of a rank may be the end of all, before they can say anything.
-//! 7. **Abort.** [`abort`](Transport::abort) tells the other ranks why and never returns. Where ranks are threads,
-//!    it unwinds the calling one with an [`Aborted`] payload and leaves the process alone. Where they are processes of
-//!    one job, it ends them all, with the reason on standard error.
+//!    Where the ranks are processes of one job, the end of a rank may be the end of all, before they can say anything. A
+//!    rank that itself cannot go on, for want of memory or of its launcher, is lost in this sense, to itself as well.
+//! 7. **Abort.** [`abort`](Transport::abort) tells the other ranks why and never returns. Where ranks are threads, or
+//!    processes that a launcher watches over, it unwinds the calling thread with an [`Aborted`] payload and leaves the
+//!    process alone. Where they are processes of one job, it ends them all, with the reason on standard error.
 //!
 //! # Backends
 //!
@@ -69,6 +70,7 @@
 //! |---|---|---|
 //! | [`local`] | the calling thread, alone | one rank |
 //! | [`channel`] | threads of one process | one machine, and emulating any other run |
+//! | `iceoryx2`, with the cargo feature `iceoryx2` | processes of one machine, which share memory | one machine |
 //! | `mpi`, with the cargo feature `mpi` | processes of an MPI job | clusters, and one machine |
 //!
 //! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
@@ -124,8 +126,8 @@ pub trait Transport {
 
     /// Ends this rank and lets every other rank know why.
     ///
-    /// Where ranks are threads, this unwinds the calling one with an [`Aborted`] payload and never ends the process.
-    /// Where they are processes of one job, it ends them all.
+    /// Where ranks are threads or watched processes, this unwinds the calling thread with an [`Aborted`] payload and
+    /// never ends the process. Where they are processes of one job, it ends them all.
     fn abort(&mut self, reason: &str) -> !;
 }
 

@@ -3,11 +3,14 @@
 //! - `ipc_rank cases FOLDER NAME...` runs conformance cases and leaves how they ended in FOLDER.
 //! - `ipc_rank rounds FOLDER COUNT` exchanges so many rounds, with messages that grow now and then, or until it is told
 //!   to stop; leaves its run folder in FOLDER, writes how many rounds it made, or its error.
-//! - `ipc_rank launch FOLDER RANKS` launches `rounds` without an end.
+//! - `ipc_rank grow FROM TO` has rank 1 send messages twice as long each round, from FROM bytes on and below TO.
+//! - `ipc_rank launch RANKS MODE...` launches ranks that run another mode.
 
 use atoll_transport::conformance::{case, process::record};
 use atoll_transport::iceoryx2::{self, Control, LaunchOptions, join, launch, stop_requested};
 use atoll_transport::{Incoming, Rank, Transport, TransportError};
+use std::io::{Write, stdout};
+use std::iter::successors;
 use std::path::Path;
 use std::process::{Command, ExitCode, id};
 use std::{env, fs};
@@ -20,29 +23,33 @@ fn main() -> ExitCode {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words.as_slice() {
         ["cases", folder, names @ ..] => cases(Path::new(folder), names),
-        ["rounds", folder, count] => match rounds(Path::new(folder), count.parse().expect("a number of rounds")) {
-            Ok(count) => {
-                println!("{count} rounds");
-                ExitCode::SUCCESS
-            }
-            Err(error) => {
-                println!("{error}");
-                ExitCode::from(LOST)
-            }
-        },
-        ["launch", folder, ranks] => {
+        ["rounds", folder, count] => told(rounds(Path::new(folder), count.parse().expect("a number of rounds"))),
+        ["grow", from, to] => told(grow(from.parse().expect("a length"), to.parse().expect("a length"))),
+        ["launch", ranks, mode @ ..] => {
             assert!(!iceoryx2::is_rank_process());
             let rank = |_| {
                 let mut command = Command::new(env::current_exe().expect("this program has a path"));
-                command.args(["rounds", folder, &u64::MAX.to_string()]);
+                command.args(mode);
                 command
             };
             let ranks = ranks.parse().expect("a number of ranks");
-            launch(ranks, LaunchOptions::default(), &|| Control::Run, rank).expect("the run starts");
+            let exits = launch(ranks, LaunchOptions::default(), &|| Control::Run, rank).expect("the run starts");
+            for exit in exits {
+                print!("rank {}, {}: {}", exit.rank, exit.status, String::from_utf8_lossy(&exit.stdout));
+            }
             ExitCode::SUCCESS
         }
         _ => panic!("not understood: {words:?}"),
     }
+}
+
+/// Writes what came of it, if anybody is left to read that.
+fn told(result: Result<u64, TransportError>) -> ExitCode {
+    let _ = match &result {
+        Ok(count) => writeln!(stdout(), "{count} rounds"),
+        Err(error) => writeln!(stdout(), "{error}"),
+    };
+    if result.is_ok() { ExitCode::SUCCESS } else { ExitCode::from(LOST) }
 }
 
 fn cases(folder: &Path, names: &[&str]) -> ExitCode {
@@ -74,6 +81,24 @@ fn rounds(folder: &Path, count: u64) -> Result<u64, TransportError> {
         }
         if incoming.flag_word() == 0 {
             return Ok(round + 1);
+        }
+    }
+    Ok(count)
+}
+
+fn grow(from: usize, to: usize) -> Result<u64, TransportError> {
+    let mut endpoint = join()?;
+    let (own, size) = (endpoint.rank(), endpoint.size());
+    let mut incoming = Incoming::default();
+    let mut count = 0;
+    for length in successors(Some(from), |length| length.checked_mul(2)).take_while(|&length| length < to) {
+        for byte in [1, 2] {
+            let lengths = vec![if own == Rank(1) { length } else { 0 }; size];
+            endpoint.prepare(&lengths)?.iter_mut().for_each(|(_, bytes)| bytes.fill(byte));
+            endpoint.exchange(&mut incoming)?;
+            let bytes = incoming.from(Rank(1));
+            assert!(bytes.len() == length && bytes.iter().all(|&seen| seen == byte), "{length} bytes");
+            count += 1;
         }
     }
     Ok(count)

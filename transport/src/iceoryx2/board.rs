@@ -87,8 +87,8 @@ impl Board {
 
     fn seat(&self, rank: Rank) -> &Seat {
         assert!(rank.index() < self.size, "rank {rank} of {}", self.size);
-        // SAFETY: the mapping holds `size` seats for as long as `self` lives, page-aligned; every bit pattern is a seat,
-        // and all processes access it through atomics only.
+        // SAFETY: the mapping holds `size` seats for as long as `self` lives, page-aligned; every bit pattern is a
+        // seat, and all processes access it through atomics only.
         unsafe { self.seats.add(rank.index()).as_ref() }
     }
 

@@ -106,9 +106,9 @@ pub enum LaunchError {
 /// error is left as it is. Each process leads a process group of its own, so that Ctrl-C on a terminal reaches the
 /// caller alone, who says by `control` what to do about it.
 ///
-/// However the run ends, nothing of it remains: no process, no shared memory, no file. What runs have left whose
-/// launcher was killed is removed at the start of the next one of the same user. The limit on open files of this process
-/// is raised as far as it goes.
+/// However the run ends, nothing of it remains: no rank, no shared memory, no file. What runs have left whose launcher
+/// was killed is removed at the start of the next one of the same user. The limit on open files of this process is
+/// raised as far as it goes.
 ///
 /// # Errors
 /// If the run could not be started. A rank that fails is no error but a [`RankExit`].

@@ -11,17 +11,20 @@ use crate::Rank;
 /// Where the kernel keeps named shared memory.
 pub(super) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// The most ranks that one run may have. The number of queues grows with its square; more work for one machine belongs
-/// into threads of a rank.
+/// The most ranks that one run may have. The number of queues grows with its square; more work for one machine
+/// belongs into threads of a rank.
 pub const MAX_RANKS: usize = 64;
 
-/// Shared memory that a rank takes, in bytes, and that each directed pair of ranks takes, with all that a queue of short
-/// messages can ever touch. Measured, and rounded up.
-const RANK_BYTES: u64 = 1 << 20;
-const PAIR_BYTES: u64 = 160 << 10;
+/// Shared memory that a rank takes, in bytes. Measured, and rounded up.
+const RANK_BYTES: u64 = 256 << 10;
 
-/// Files that a rank has open, its own and the program's, and for each other rank. Measured, and rounded up.
+/// Shared memory that each directed pair of ranks takes, in bytes: a queue, and messages of some tens of kilobytes.
+const PAIR_BYTES: u64 = 96 << 10;
+
+/// Files that a rank has open, its own and the program's. Measured, and rounded up.
 const RANK_FILES: u64 = 64;
+
+/// Files that a rank has open for each other rank.
 const PEER_FILES: u64 = 10;
 
 /// Shared memory that is left free when messages grow, for what is not counted.
@@ -56,7 +59,8 @@ impl Machine {
     pub(super) fn check(&self, ranks: usize) -> Result<(), String> {
         if ranks == 0 || ranks > MAX_RANKS {
             return Err(format!(
-                "{ranks} ranks asked for, but a run by shared memory has 1 to {MAX_RANKS}: use fewer ranks with more threads"
+                "{ranks} ranks asked for, but a run by shared memory has 1 to {MAX_RANKS}: use fewer ranks, with more \
+                 threads"
             ));
         }
         let count = ranks as u64;

@@ -3,7 +3,8 @@
 //! A launcher process starts the others and watches over them: [`launch`]. A process that finds itself started so
 //! ([`is_rank_process`]) calls [`join`], once, and has an endpoint like any other. A message is written once, by its
 //! sender, into memory that its receiver reads in place: [`Outgoing`](crate::Outgoing) holds loaned slices,
-//! [`Incoming`](crate::Incoming) received ones. Messages begin at multiples of 16 bytes.
+//! [`Incoming`](crate::Incoming) received ones. Messages to others begin at multiples of 8 bytes. At most three values
+//! of [`Incoming`](crate::Incoming) hold messages at once; an exchange with a fourth may fail.
 //!
 //! ```no_run
 //! use atoll_transport::Collective;
@@ -15,7 +16,8 @@
 //!     println!("{}", endpoint.all_sum_u64(1)?);
 //! } else {
 //!     let program = std::env::current_exe()?;
-//!     let exits = iceoryx2::launch(4, LaunchOptions::default(), &|| Control::Run, |_rank| Command::new(&program))?;
+//!     let options = LaunchOptions::default();
+//!     let exits = iceoryx2::launch(4, options, &|| Control::Run, |_rank| Command::new(&program))?;
 //!     assert!(exits.iter().all(|exit| exit.status.success() && exit.stdout == b"4\n"));
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -23,33 +25,33 @@
 //!
 //! # A rank process
 //!
-//! Its standard input belongs to this module from [`join`] on: the launcher tells there who has ended, and that it is to
-//! stop ([`stop_requested`]). If the launcher is gone, every wait ends with
+//! Its standard input belongs to this module from [`join`] on: the launcher tells there who has ended, and that it is
+//! to stop ([`stop_requested`]). If the launcher is gone, every wait ends with
 //! [`PeerLost`](crate::TransportError::PeerLost), which blames the rank itself and says why, and 5 s later the process
-//! ends with exit code 3, whatever it is doing.
+//! ends with exit code 3, whatever it is doing. Its standard output then leads nowhere, so that `println!` panics.
 //!
 //! # How a rank ends
 //!
-//! As among threads, the first failure is recorded, here in a file of the run, before anybody can notice it, and all ranks
-//! report that record. A rank that is killed has no time for that, so the launcher records it. Dropping an endpoint while
-//! panicking counts as a panic. After [`abort`](crate::Transport::abort) has unwound, ending the process is up to the
-//! program. When a rank was lost, by a signal or with an exit code that is not 0, the launcher gives the others
-//! [some time](LaunchOptions::grace) to end by themselves.
+//! As among threads, the first failure is recorded, here in a file of the run, before anybody can notice it, and all
+//! ranks report that record. A rank that is killed has no time for that, so the launcher records it. Dropping an
+//! endpoint while panicking counts as a panic. After [`abort`](crate::Transport::abort) has unwound, ending the process
+//! is up to the program. When a rank was lost, by a signal or with an exit code that is not 0, the launcher gives the
+//! others [some time](LaunchOptions::grace) to end by themselves.
 //!
 //! Dropping an endpoint waits until the others have received what it sent, which they are about to do, at most for the
 //! peer timeout.
 //!
 //! # What is left
 //!
-//! Nothing. All files of a run are in a folder of its own below `<temporary folder>/atoll-<user>`, all its shared memory
-//! bears the run's name, and the launcher removes both when its ranks have ended. If it cannot, because it was killed,
+//! Nothing. All files of a run are in a folder of its own below `<temporary folder>/atoll-<user>`, all its shared
+//! memory bears the run's name, and the launcher removes both when its ranks have ended. If it cannot, because it was killed,
 //! the next launch by the same user does.
 //!
 //! # Memory
 //!
-//! Each directed pair of ranks has a segment in `/dev/shm` that grows, to the next power of two, with the longest message
-//! and never shrinks; only pages that were written to take memory. A run that needs more than there is, at the start or
-//! later, ends with an error that says so.
+//! Each directed pair of ranks has a segment in `/dev/shm` that grows with the longest message and never shrinks; only
+//! pages that were written to take memory, those of some messages at a time. A run that needs more than there is, at
+//! the start or later, ends with an error that says so.
 //!
 //! [iceoryx2]: https://iceoryx.io
 

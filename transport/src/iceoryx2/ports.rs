@@ -18,6 +18,7 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::ipc_threadsafe::Service;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use rustix::io::Errno;
 
 use super::limits;
 use super::memory::{Backed, with_old_bytes};
@@ -49,6 +50,10 @@ const KEPT: usize = 4;
 /// The length of a message, in bytes, for which memory is reserved from the start.
 const FIRST_LENGTH: usize = 4096;
 
+/// Messages begin at multiples of this. Not more: the slices of iceoryx2 0.10 begin where only 8 bytes are aligned, and
+/// with a greater alignment each growth of a segment loses it one slice, until there are none.
+const ALIGNMENT: usize = 8;
+
 /// How long one process waits for another that is just making the same thing.
 const CREATION_TIMEOUT: Duration = Duration::from_secs(30);
 
@@ -73,7 +78,7 @@ pub(super) struct Ports {
     /// None where there is no other rank.
     subscriber: Option<Subscriber<Service, [u8], Header>>,
     /// Last, as the ports above belong to it.
-    _node: Node<Service>,
+    node: Node<Service>,
 }
 
 /// Why a message could not be sent.
@@ -106,7 +111,7 @@ impl Ports {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| failed("node", &error))?;
-        let mut ports = Ports { publishers: Rank::all(size).map(|_| None).collect(), subscriber: None, _node: node };
+        let mut ports = Ports { publishers: Rank::all(size).map(|_| None).collect(), subscriber: None, node };
         // Every rank begins with another service, its own, so that they do not all make the same one.
         for to in (0..size).filter(|_| size > 1).map(|offset| Rank::from_index((own.index() + offset) % size)) {
             go_on()?;
@@ -140,8 +145,8 @@ impl Ports {
     /// The service by which `to` receives.
     fn service(&self, to: Rank, size: usize) -> Result<PortFactory<Service, [u8], Header>, Box<dyn std::error::Error>> {
         let name = ServiceName::new(&format!("to {to}"))?;
-        let alignment = Alignment::new(16).ok_or("16 is a power of two")?;
-        let builder = self._node.service_builder(&name).publish_subscribe::<[u8]>().user_header::<Header>();
+        let alignment = Alignment::new(ALIGNMENT).ok_or("an alignment is a power of two")?;
+        let builder = self.node.service_builder(&name).publish_subscribe::<[u8]>().user_header::<Header>();
         let service = builder
             .payload_alignment(alignment)
             .enable_safe_overflow(false)
@@ -182,7 +187,11 @@ impl Ports {
                         error => short(&error),
                     })?;
                     let mut loan = with_old_bytes(loan);
-                    port.backed.ensure(&mut loan).map_err(|error| short(&error))?;
+                    port.backed.ensure(&mut loan).map_err(|error| match error {
+                        // An address that is good, but has no page and gets none.
+                        Errno::FAULT => short(&"no page is left"),
+                        error => short(&error),
+                    })?;
                     *place = Some(loan);
                 }
                 (LoanedFrame::Own(bytes), _) => bytes.resize(length, 0),

@@ -1,9 +1,9 @@
 //! The folder of one run, and what dead runs have left.
 //!
-//! All runs of a user have folders in `<temporary folder>/atoll-<user>`, which nobody else may enter. Every process of
-//! a run holds a shared lock on a file in that run's folder: where the lock can be had alone, all of them are gone. Runs
-//! are made and dead ones removed under a lock on the common folder, so a run that is just starting is not mistaken for
-//! a dead one.
+//! All runs of a user have folders in `<temporary folder>/atoll-<user>`, which nobody else may enter. Every process
+//! of a run holds a shared lock on a file in that run's folder: where the lock can be had alone, all of them are gone.
+//! Runs are made and dead ones removed under a lock on the common folder, so a run that is just starting is not
+//! mistaken for a dead one.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io;
