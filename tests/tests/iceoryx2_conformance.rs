@@ -1,10 +1,12 @@
 //! Ranks as processes that share memory: the conformance suite, and what happens when processes are killed.
 
 use atoll_tests::program::LIMIT;
+use atoll_transport::Rank;
 use atoll_transport::conformance::process::recorded;
 use atoll_transport::conformance::{CASES, Case, Harness, Outcome, check};
 use atoll_transport::iceoryx2::{Control, LaunchError, LaunchOptions, MAX_RANKS, RankExit, launch};
 use std::fs;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -178,7 +180,9 @@ fn kill(process: i32) {
 fn a_killed_rank_is_blamed_by_all_and_nothing_is_left() {
     const SIZE: usize = 4;
     watched(|| {
-        for (victim, delay) in [(0, 1), (2, 40), (3, 130)] {
+        for victim in [0, 2, 3] {
+            // Another moment in every run of this test.
+            let delay = RandomState::new().build_hasher().finish() % 150;
             let (folder, running) = start_rounds(SIZE, u64::MAX);
             let told = Told::by(folder.path(), SIZE);
             assert!(!told.shared_memory().is_empty(), "this test looks for the wrong names");
@@ -186,17 +190,44 @@ fn a_killed_rank_is_blamed_by_all_and_nothing_is_left() {
             kill(told.processes[victim]);
             let exits = running.join().expect("the launcher does not panic");
             for (rank, exit) in exits.iter().enumerate() {
-                assert!(!exit.killed, "rank {rank} had to be killed");
+                assert!(!exit.killed, "rank {rank} had to be killed, after {delay} ms");
                 if rank == victim {
                     assert_eq!(exit.status.signal(), Some(9));
                 } else {
                     let text = String::from_utf8_lossy(&exit.stdout);
                     let blame = format!("lost rank {victim}: it was killed by signal 9;");
-                    assert!(text.starts_with(&blame), "rank {rank}: {text}");
-                    assert_eq!(exit.status.code(), Some(3), "rank {rank}");
+                    assert!(text.starts_with(&blame), "rank {rank}, after {delay} ms: {text}");
+                    assert_eq!(exit.status.code(), Some(3), "rank {rank}, after {delay} ms");
                 }
             }
             told.assert_nothing_left();
+        }
+    });
+}
+
+#[test]
+fn a_rank_that_does_not_join_is_blamed_by_all() {
+    let ends = [
+        ("kill -9 $$", "it was killed by signal 9"),
+        ("exit 7", "it ended with exit code 7"),
+        ("exit 0", "it left while other ranks still needed it"),
+    ];
+    watched(move || {
+        for (script, reason) in ends {
+            let folder = TempDir::new().expect("a temporary folder");
+            let command = |rank: Rank| {
+                let mut command = if rank == Rank(1) { Command::new("sh") } else { rank_program() };
+                match rank {
+                    Rank(1) => command.args(["-c", script]),
+                    _ => command.arg("rounds").arg(folder.path()).arg("1"),
+                };
+                command
+            };
+            let exits = launch(3, LaunchOptions::default(), &|| Control::Run, command).expect("the run starts");
+            for exit in exits.iter().filter(|exit| exit.rank != Rank(1)) {
+                let text = String::from_utf8_lossy(&exit.stdout);
+                assert!(text.starts_with(&format!("lost rank 1: {reason};")), "rank {}: {text}", exit.rank);
+            }
         }
     });
 }
@@ -291,9 +322,14 @@ fn messages_that_do_not_fit_this_machine_end_the_run() {
 #[test]
 fn messages_grow_many_times() {
     watched(|| {
-        let exits = run(3, LaunchOptions::default(), &["grow", "1000", "10000000"]);
-        for exit in &exits {
-            assert_eq!(String::from_utf8_lossy(&exit.stdout), "28 rounds\n", "{}", exit.status);
-        }
+        let grow = |to: &str, rounds: &str| {
+            for exit in run(4, LaunchOptions::default(), &["grow", "1250", to]) {
+                assert_eq!(String::from_utf8_lossy(&exit.stdout), rounds, "rank {}: {}", exit.rank, exit.status);
+            }
+        };
+        grow("10000000", "13 rounds\n");
+        // The last message makes its segment grow, and its sender leaves at once: by turns before and after the
+        // receivers have looked.
+        (0..10).for_each(|_| grow("10000", "3 rounds\n"));
     });
 }
