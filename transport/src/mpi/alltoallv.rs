@@ -44,7 +44,7 @@ impl Session {
         announced.extend(Rank::all(size).flat_map(|to| [sent.place_of(to).len() as u64, high, low]));
         heard.resize(announced.len(), 0);
         let mut counts = data.all_to_all(announced, heard);
-        let mut waited = watch.wait(started, || counts.test())?;
+        let mut waited = watch.wait(started, 0, || counts.test())?;
         *records = counts.finish();
 
         lengths.clear();
@@ -66,7 +66,8 @@ impl Session {
         for other in Rank::all(size).filter(|&rank| rank != own && sent.place_of(rank).len() > longest) {
             transfers.send(data, other, TAG, sent.place_of(other));
         }
-        waited += watch.wait(started, || transfers.test())?;
+        let bytes = Rank::all(size).map(|to| sent.place_of(to).len()).chain(lengths.iter().copied()).sum();
+        waited += watch.wait(started, bytes, || transfers.test())?;
         let ended = transfers.end();
         sent.put(ended.outgoing);
         received.put(ended.incoming);

@@ -5,7 +5,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::notice::Notice;
-use super::pause::pause;
+use super::pause::{awake, pause};
 use super::raw::{Communicator, Pending};
 use crate::{Rank, TransportError};
 
@@ -82,7 +82,8 @@ impl Watch {
         self.rounds += 1;
     }
 
-    /// Asks `done` again and again, and returns how long it took until it said yes.
+    /// Asks `done` again and again, and returns how long it took until it said yes. Meanwhile so many `bytes` may be on
+    /// their way.
     ///
     /// # Errors
     /// If a rank that is needed has left, if another one has given up, or if the peer timeout has passed since
@@ -90,8 +91,10 @@ impl Watch {
     pub(super) fn wait(
         &mut self,
         started: Instant,
+        bytes: usize,
         mut done: impl FnMut() -> bool,
     ) -> Result<Duration, TransportError> {
+        let awake = awake(bytes);
         let began = Instant::now();
         let mut looked = began;
         while !done() {
@@ -104,7 +107,7 @@ impl Watch {
                     break;
                 }
             }
-            pause(now - began);
+            pause((now - began).saturating_sub(awake));
         }
         Ok(began.elapsed())
     }
@@ -114,7 +117,7 @@ impl Watch {
         let since = Instant::now();
         self.stage = Stage::Leaving { since, told: false };
         let mut barrier = self.communicator.barrier();
-        self.wait(since, || barrier.test())?;
+        self.wait(since, 0, || barrier.test())?;
         barrier.finish();
         self.flush();
         // Those that came early may have said so to some that never had to look.

@@ -43,7 +43,9 @@ impl Session {
         }
         places.clear();
         let mut reduction: Option<Pending<_>> = None;
-        let waited = watch.wait(started, || {
+        // What comes is not known; it is about as much as what goes.
+        let bytes = 2 * Rank::all(size).map(|to| sent.place_of(to).len()).sum::<usize>();
+        let waited = watch.wait(started, bytes, || {
             while let Some(message) = data.arrived(tag) {
                 places.push((message.from, transfers.receive_arrived(message)));
             }
