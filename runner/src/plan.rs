@@ -75,9 +75,8 @@ impl Plan {
         let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.grid.tiles());
         if idle > 0 {
             let ranks = self.assignment.ranks();
-            notes.push(format!(
-                "{idle} of {ranks} ranks stay idle: there are only {tiles} tiles; use fewer ranks or more tiles"
-            ));
+            let tiles = if tiles == 1 { "is only one tile".to_owned() } else { format!("are only {tiles} tiles") };
+            notes.push(format!("{idle} of {ranks} ranks stay idle: there {tiles}; use fewer ranks or more tiles"));
         }
         let (threads, cores) =
             (self.config.run.threads, thread::available_parallelism().map_or(usize::MAX, usize::from));

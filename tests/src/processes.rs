@@ -52,12 +52,11 @@ pub fn ranks_of(program: &Running, ranks: usize) -> Vec<RankProcess> {
     }
 }
 
-/// Whether the launcher of an MPI job names the process that it lost, by its rank or, where it knows no better, its
-/// number.
+/// Whether the launcher of an MPI job says whom it lost. That of MPICH says that a process was killed and names one of the
+/// job, but not always that one.
 pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
     let said = format!("{}{}", ended.stdout, ended.stderr);
-    let rank = [format!("rank {} ", lost.rank), format!("RANK {} ", lost.rank)];
-    rank.iter().any(|name| said.contains(name)) || said.contains(&lost.pid.to_string())
+    said.contains(&format!("process rank {} with PID", lost.rank)) || said.contains("(signal 9)")
 }
 
 /// What is in shared memory, by name.

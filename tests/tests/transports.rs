@@ -1,6 +1,7 @@
 //! One configuration, one result, whatever carries the bytes: the program on every transport it was built with.
 
-use atoll_tests::program;
+use atoll_tests::processes;
+use atoll_tests::program::{self, Running};
 use atoll_tests::ways::Way;
 use serde_json::Value;
 use std::process::Command;
@@ -73,6 +74,73 @@ fn bad_input_takes_one_line_on_every_transport() {
             assert_eq!(lines, 1, "{way}: not one line that says {expected}: {ended}");
             assert!(ended.stdout.is_empty() || way.transport() == "mpi", "{way}: {ended}");
         }
+    }
+}
+
+#[test]
+fn a_request_to_stop_ends_all_ranks_after_the_same_step() {
+    for way in Way::all().into_iter().filter(|way| way.supports(3)) {
+        let folder = tempdir().unwrap();
+        let json = folder.path().join("summary.json");
+        let mut command = way.command(3, "configs/quickstart.toml");
+        let mut running = Running::start(command.args(["--steps", "4000000000", "--json"]).arg(&json));
+        running.wait_for_line("step ");
+        if let Way::Mpi(_) = way {
+            // The launcher would end them all at once. One of them hears of it, and not the one that speaks.
+            processes::ranks_of(&running, 3)[2].signal("TERM");
+        } else {
+            running.signal("TERM");
+        }
+        let ended = running.end();
+        assert_eq!(ended.code, Some(130), "{way}: {ended}");
+        assert!(ended.stdout.contains("interrupted"), "{way}: {ended}");
+        let summary = program::summary(&json);
+        assert!(summary["interrupted"] == true && summary["bodies_lost"] == 0, "{way}: {summary:#}");
+    }
+}
+
+#[cfg(feature = "iceoryx2")]
+mod iceoryx2 {
+    use super::*;
+
+    #[test]
+    fn a_second_interrupt_ends_even_ranks_that_hang() {
+        let before = processes::shared_memory();
+        let mut running =
+            Running::start(Way::Iceoryx2.command(3, "configs/quickstart.toml").args(["--steps", "4000000000"]));
+        running.wait_for_line("step ");
+        let ranks = processes::ranks_of(&running, 3);
+        ranks[1].signal("STOP");
+        running.signal("INT");
+        running.wait_for_line("atoll: stopping after this step");
+        running.signal("INT");
+        let ended = running.end();
+        assert_eq!(ended.code, Some(130), "{ended}");
+        assert!(ranks.iter().all(|rank| !rank.lives()), "a rank lives on");
+        let left = processes::left_in_shared_memory(&before);
+        assert!(left.is_empty(), "left behind {left:?}");
+    }
+
+    #[test]
+    fn a_configuration_that_can_be_read_but_once_is_refused() {
+        let folder = tempdir().unwrap();
+        let pipe = folder.path().join("world.toml");
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
+        let writer = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::write(pipe, "[scene]\nkind = \"rooms\"\nbodies = 400\n[run]\ntiles = [2, 2]\n")
+        });
+        let ended = program::run(&mut Way::Iceoryx2.command(2, pipe.to_str().unwrap()));
+        writer.join().unwrap().unwrap();
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+        assert!(ended.stderr.contains("with transport iceoryx2 it must be a regular file"), "{ended}");
+    }
+
+    #[test]
+    fn more_ranks_than_a_machine_is_meant_for_are_refused() {
+        let ended = program::run(Way::Iceoryx2.command(65, "configs/quickstart.toml").args(["--tiles", "9x9"]));
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+        assert!(ended.stderr.starts_with("atoll: 65 ranks asked for, but"), "{ended}");
     }
 }
 

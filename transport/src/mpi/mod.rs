@@ -172,7 +172,8 @@ impl Mpi {
     /// The name and version of the MPI library, in its own words, on one line. It need not be initialized.
     pub fn library() -> String {
         let version = ::mpi::environment::library_version().unwrap_or_else(|_| "an MPI library".to_owned());
-        let line = version.split(['\n', '\0']).next().unwrap_or_default();
+        // Behind the version some tell how and when they were built.
+        let line = version.split(['\n', '\0', ',']).next().unwrap_or_default();
         line.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
