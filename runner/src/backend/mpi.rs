@@ -61,7 +61,11 @@ impl Job {
     ///
     /// # Errors
     /// If the command line asks for another number.
-    pub fn adapt(&self, mut config: Config) -> Result<Config, RunError> {
+    pub fn adapt(&mut self, mut config: Config) -> Result<Config, RunError> {
+        if config.run.peer_timeout > AGREEMENT_TIMEOUT {
+            // The world may be so large that working out the plan takes longer.
+            self.set_peer_timeout(config.run.peer_timeout);
+        }
         let (asked, found) = (config.run.ranks, self.endpoint.size());
         if config.run.ranks_asked_for && asked != found {
             return Err(RunError::Launcher(format!(
@@ -96,7 +100,7 @@ impl Job {
     /// What ended the run on every rank alike, told by rank 0. Anything else ends the job.
     pub fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
         let run = &plan.config.run;
-        self.endpoint.set_peer_timeout(run.peer_timeout).expect("the configuration has none of zero");
+        self.set_peer_timeout(run.peer_timeout);
         self.endpoint.set_method(match run.mpi_exchange {
             MpiExchange::Alltoallv => Method::Alltoallv,
             MpiExchange::Sparse => Method::Sparse,
@@ -120,6 +124,10 @@ impl Job {
                 self.fail(&error, error.exit())
             }
         }
+    }
+
+    fn set_peer_timeout(&mut self, timeout: Duration) {
+        self.endpoint.set_peer_timeout(timeout).expect("the configuration has none of zero");
     }
 
     /// An error that every rank has: told once, while the job is still there. Ranks leave it together, and where the first
