@@ -117,9 +117,9 @@ pub enum RunError {
         /// What the others have.
         expected: String,
     },
-    /// A launcher that does not fit.
+    /// The processes that are to be the ranks cannot be started, or do not find together.
     #[error("{0}")]
-    Launcher(String),
+    Ranks(String),
     /// What a rank in a process of its own said.
     #[error("{text}")]
     Relayed {
@@ -202,7 +202,7 @@ impl RunError {
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }
             | Self::Mismatch { .. }
-            | Self::Launcher(_) => Exit::Usage,
+            | Self::Ranks(_) => Exit::Usage,
             Self::Relayed { exit, .. } | Self::ToldElsewhere { exit } => *exit,
             Self::PeerLost { .. } | Self::Transport { .. } => Exit::PeerLost,
             Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {

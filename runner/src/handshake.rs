@@ -1,5 +1,6 @@
 //! What processes tell each other before they run together: whether each is ready, and that all mean the same run.
 
+use crate::config::OneLine;
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
 use atoll_transport::{Collective, Rank, Transport, TransportError};
@@ -35,7 +36,7 @@ pub fn agree<T>(
         Err(error) => {
             // Output is the business of one rank.
             let name = if matches!(error, RunError::BadOutput { .. }) { COMMON_ERROR } else { ERROR };
-            vec![(name.to_owned(), format!("{} {error}", error.exit() as u8))]
+            vec![(name.to_owned(), format!("{} {}", error.exit() as u8, OneLine(&error.to_string())))]
         }
     };
     let hellos = transport.all_gather(encode(&hello).as_bytes()).map_err(Refusal::Transport)?;

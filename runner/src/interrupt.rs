@@ -1,5 +1,6 @@
 //! Stopping a run early, so that all ranks end after the same step.
 
+use crate::cmd::complain;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing::warn;
@@ -23,9 +24,9 @@ impl StopFlag {
         self.raised.load(Ordering::Relaxed) || self.elsewhere.is_some_and(|requested| requested())
     }
 
-    /// A flag that is also raised when `elsewhere` says so.
-    pub fn asking(elsewhere: fn() -> bool) -> Self {
-        Self { elsewhere: Some(elsewhere), ..Self::default() }
+    /// This flag, raised as well when `elsewhere` says so.
+    pub fn asking(self, elsewhere: fn() -> bool) -> Self {
+        Self { elsewhere: Some(elsewhere), ..self }
     }
 
     /// A flag that Ctrl-C, SIGTERM and SIGHUP raise. The second time, `quit` is called. Where these signals are handled
@@ -37,7 +38,7 @@ impl StopFlag {
             if raised.raised.swap(true, Ordering::Relaxed) {
                 quit();
             } else if announce {
-                eprintln!("atoll: stopping after this step; interrupt again to quit at once");
+                complain(&"stopping after this step; interrupt again to quit at once");
             }
         });
         if let Err(error) = handled {

@@ -15,7 +15,7 @@ enum Report {
     /// It completed so many steps and came to this.
     Ended { complete: u64, result: Result<Option<Figures>, Trouble> },
     /// Its code panicked.
-    Panicked { message: String },
+    Panicked { complete: u64, message: String },
     /// It aborted.
     Aborted { reason: String },
 }
@@ -39,8 +39,9 @@ enum Trouble {
 }
 
 /// Writes how a rank ended. What it failed of must be a loss, or in words already ([`RankError::Told`]): anything else
-/// loses its exit code.
-pub fn write(end: &Result<RankEnd, RankFailure>) -> String {
+/// loses its exit code. It completed so many steps, also where it
+/// could not say so itself.
+pub fn write(end: &Result<RankEnd, RankFailure>, complete: u64) -> String {
     let report = match end {
         Ok(RankEnd { complete, result }) => {
             let result = match result {
@@ -53,8 +54,8 @@ pub fn write(end: &Result<RankEnd, RankFailure>) -> String {
             Report::Ended { complete: *complete, result }
         }
         Err(RankFailure::Aborted { reason, .. }) => Report::Aborted { reason: reason.clone() },
-        Err(RankFailure::Panicked { message, .. }) => Report::Panicked { message: message.clone() },
-        Err(failure) => Report::Panicked { message: failure.to_string() },
+        Err(RankFailure::Panicked { message, .. }) => Report::Panicked { complete, message: message.clone() },
+        Err(failure) => Report::Panicked { complete, message: failure.to_string() },
     };
     let mut line = serde_json::to_string(&report).expect("numbers and words, under names");
     line.push('\n');
@@ -75,9 +76,11 @@ fn trouble(error: &RankError) -> Trouble {
     }
 }
 
-/// Reads what a rank wrote, if that is a whole report.
-pub fn read(rank: Rank, bytes: &[u8]) -> Option<Result<RankEnd, RankFailure>> {
-    Some(match serde_json::from_slice(bytes).ok()? {
+/// Reads what a rank wrote, if that is a whole report: how it ended, and the steps it had completed where that does not
+/// say so.
+pub fn read(rank: Rank, bytes: &[u8]) -> Option<(Result<RankEnd, RankFailure>, u64)> {
+    let mut before = 0;
+    let end = match serde_json::from_slice(bytes).ok()? {
         Report::Ended { complete, result } => {
             let result = match result {
                 Ok(None) => Ok(None),
@@ -95,9 +98,13 @@ pub fn read(rank: Rank, bytes: &[u8]) -> Option<Result<RankEnd, RankFailure>> {
             };
             Ok(RankEnd { complete, result })
         }
-        Report::Panicked { message } => Err(RankFailure::Panicked { rank, message }),
+        Report::Panicked { complete, message } => {
+            before = complete;
+            Err(RankFailure::Panicked { rank, message })
+        }
         Report::Aborted { reason } => Err(RankFailure::Aborted { rank, reason }),
-    })
+    };
+    Some((end, before))
 }
 
 fn records<T: Pod>(words: &[u64]) -> Option<Vec<T>> {
@@ -111,9 +118,11 @@ mod tests {
     use super::*;
 
     fn there_and_back(end: Result<RankEnd, RankFailure>) -> Result<RankEnd, RankFailure> {
-        let line = write(&end);
+        let line = write(&end, 17);
         assert_eq!(line.matches('\n').count(), 1);
-        read(Rank(3), line.as_bytes()).expect("a whole report")
+        let (read, before) = read(Rank(3), line.as_bytes()).expect("a whole report");
+        assert_eq!(before, if read.is_ok() { 0 } else { 17 });
+        read
     }
 
     #[test]
@@ -149,7 +158,7 @@ mod tests {
 
     #[test]
     fn half_a_report_is_none() {
-        let line = write(&Ok(RankEnd { complete: 1, result: Ok(None) }));
+        let line = write(&Ok(RankEnd { complete: 1, result: Ok(None) }), 1);
         for length in 0..line.len() - 1 {
             assert!(read(Rank(0), &line.as_bytes()[..length]).is_none(), "{length}");
         }

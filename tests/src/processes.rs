@@ -31,8 +31,13 @@ impl RankProcess {
 
     /// Whether it is there and no mere entry in the table of processes.
     pub fn lives(&self) -> bool {
-        state(self.pid).is_some_and(|(state, _)| state != 'Z' && state != 'X')
+        is_alive(self.pid)
     }
+}
+
+/// Whether there is such a process that is no mere entry in the table of processes, left because nobody asks for its end.
+pub fn is_alive(pid: u32) -> bool {
+    state(pid).is_some_and(|(state, _)| state != 'Z' && state != 'X')
 }
 
 /// The ranks that a program started, directly or through others, in rank order, once all are there.
@@ -54,15 +59,38 @@ pub fn ranks_of(program: &Running, ranks: usize) -> Vec<RankProcess> {
 
 /// Whether the launcher of an MPI job says whom it lost. That of MPICH says that a process was killed and names one of the
 /// job, but not always that one.
+#[cfg(feature = "mpi")]
 pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
     let said = format!("{}{}", ended.stdout, ended.stderr);
-    said.contains(&format!("process rank {} with PID", lost.rank)) || said.contains("(signal 9)")
+    if atoll_transport::mpi::Mpi::library().contains("MPICH") {
+        said.contains("EXIT STRING: Killed (signal 9)")
+    } else {
+        said.contains(&format!("process rank {} with PID", lost.rank))
+    }
 }
 
-/// What is in shared memory, by name.
+/// Nobody launches MPI jobs.
+#[cfg(not(feature = "mpi"))]
+pub fn launcher_names(_: &Ended, _: &RankProcess) -> bool {
+    false
+}
+
+/// What is in shared memory, by name, and the folders of runs in theirs.
 pub fn shared_memory() -> BTreeSet<String> {
-    let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
+    let names = |folder: &str| {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect::<Vec<_>>()
+    };
+    let mut all = BTreeSet::new();
+    for name in names("/dev/shm") {
+        let within = names(&format!("/dev/shm/{name}"));
+        // A lock, without any run, is one that is just being taken.
+        all.extend(within.iter().filter(|run| *run != "lock").map(|run| format!("{name}/{run}")));
+        if within.is_empty() {
+            all.insert(name);
+        }
+    }
+    all
 }
 
 /// What is in shared memory that was not there before and that no process uses; other runs on this machine come and go,
@@ -73,9 +101,9 @@ pub fn left_in_shared_memory(before: &BTreeSet<String>) -> BTreeSet<String> {
         let maps: Vec<String> =
             processes().into_iter().filter_map(|pid| fs::read_to_string(format!("/proc/{pid}/maps")).ok()).collect();
         let used = |name: &str| maps.iter().any(|map| map.contains(&format!("/dev/shm/{name}")));
-        // Those of a run whose launcher lives are its own business: atoll-USER-LAUNCHER-...
+        // Those of a run whose launcher lives are its own business: atoll-USER-LAUNCHER-... and atoll-USER/LAUNCHER-...
         let launched = |name: &str| {
-            let launcher = name.strip_prefix("atoll-").and_then(|rest| rest.split('-').nth(1)?.parse().ok());
+            let launcher = name.strip_prefix("atoll-").and_then(|rest| rest.split(['-', '/']).nth(1)?.parse().ok());
             launcher.is_some_and(|pid| state(pid).is_some())
         };
         added.into_iter().filter(|name| !used(name) && !launched(name)).collect()

@@ -1,6 +1,7 @@
 //! Ranks as processes that share memory: the conformance suite, and what happens when processes are killed.
 
-use atoll_tests::program::LIMIT;
+use atoll_tests::processes::is_alive;
+use atoll_tests::program::{self, LIMIT};
 use atoll_transport::Rank;
 use atoll_transport::conformance::process::recorded;
 use atoll_transport::conformance::{CASES, Case, Harness, Outcome, check};
@@ -11,7 +12,6 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
-use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -25,16 +25,7 @@ fn rank_program() -> Command {
 
 /// Runs `test` on a thread and fails if it does not end. (Its processes end with this one.)
 fn watched<R: Send + 'static>(test: impl FnOnce() -> R + Send + 'static) -> R {
-    let (sender, receiver) = channel();
-    let thread = thread::spawn(move || drop(sender.send(test())));
-    match receiver.recv_timeout(LIMIT) {
-        Ok(result) => result,
-        Err(RecvTimeoutError::Timeout) => panic!("it hangs"),
-        Err(RecvTimeoutError::Disconnected) => match thread.join() {
-            Err(payload) => std::panic::resume_unwind(payload),
-            Ok(()) => unreachable!("a result was sent"),
-        },
-    }
+    program::watched("processes that share memory", test)
 }
 
 /// Launches ranks without end conditions of the launcher's own.
@@ -154,8 +145,7 @@ impl Told {
     }
 
     fn alive(&self) -> usize {
-        let alive = |process: &&i32| Path::new(&format!("/proc/{process}")).exists();
-        self.processes.iter().filter(alive).count()
+        self.processes.iter().filter(|&&process| is_alive(process as u32)).count()
     }
 }
 
@@ -241,7 +231,7 @@ fn without_a_launcher_the_ranks_end_and_the_next_launch_cleans_up() {
             let mut launcher = rank_program();
             launcher.arg("launch").arg(ranks.to_string()).arg("rounds").arg(folder.path()).arg(rounds.to_string());
             // Runs of their own, or another test's launch would clean up. What ranks say there is that they end.
-            launcher.env("TMPDIR", folder.path()).stdout(Stdio::piped()).stderr(Stdio::null());
+            launcher.env("ATOLL_RUN_FOLDERS", folder.path().join("runs")).stdout(Stdio::piped()).stderr(Stdio::null());
             launcher.spawn().expect("the launcher starts")
         };
         let mut killed = launcher(SIZE, u64::MAX);

@@ -16,6 +16,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::Command;
+use std::sync::atomic::Ordering;
 use std::{env, io};
 
 /// Tells the ranks what they must find in the configuration that they read for themselves.
@@ -29,12 +30,12 @@ pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
     if !config.is_file() {
         // What can be read but once would leave nothing for the ranks.
         let config = config.display();
-        return Err(RunError::Launcher(format!(
+        return Err(RunError::Ranks(format!(
             "{config}: each rank reads the configuration itself, so with transport iceoryx2 it must be a regular file"
         )));
     }
     let program = env::current_exe()
-        .map_err(|error| RunError::Launcher(format!("this program's own file cannot be found: {error}")))?;
+        .map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))?;
     let quit = StopFlag::default();
     let second = quit.clone();
     let stop = StopFlag::on_signals(true, move || second.request());
@@ -51,23 +52,24 @@ pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
         command
     };
     let exits = iceoryx2::launch(run.ranks, options, &control, command)
-        .map_err(|error: LaunchError| RunError::Launcher(error.to_string()))?;
+        .map_err(|error: LaunchError| RunError::Ranks(error.to_string()))?;
     if quit.is_requested() {
         return Err(RunError::ToldElsewhere { exit: Exit::Interrupted });
     }
-    let ends: Ends = exits.iter().map(end).collect();
-    outcome(plan, ends)
+    let (ends, before): (Ends, Vec<u64>) = exits.iter().map(end).unzip();
+    outcome(plan, ends, before.into_iter().max().unwrap_or(0))
 }
 
-/// What the process of a rank has to say, or what is to be said of it.
-fn end(exit: &RankExit) -> Result<RankEnd, RankFailure> {
+/// What the process of a rank has to say, or what is to be said of it, and as in [`report::read`].
+fn end(exit: &RankExit) -> (Result<RankEnd, RankFailure>, u64) {
     report::read(exit.rank, &exit.stdout).unwrap_or_else(|| {
         let died = |how| RankFailure::Died { rank: exit.rank, how };
-        Err(match exit.status.signal() {
+        let failure = match exit.status.signal() {
             _ if exit.killed => RankFailure::Outlived { rank: exit.rank },
             Some(signal) => died(format!("was killed by signal {signal}")),
             None => died(format!("ended without a report, {}", exit.status)),
-        })
+        };
+        (Err(failure), 0)
     })
 }
 
@@ -81,13 +83,12 @@ impl RankProcess {
         iceoryx2::is_rank_process().then_some(Self(()))
     }
 
-    /// Does the rank's work and reports to the launcher, which tells the user.
-    ///
-    /// # Errors
-    /// If the report cannot be written.
-    pub fn run(self, config: Result<Config, RunError>, observer: Observer) -> Result<Exit, RunError> {
+    /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end.
+    pub fn run(self, config: Result<Config, RunError>, observer: Observer) -> Exit {
         let rank = iceoryx2::process_rank().unwrap_or_default();
-        let observer = Observer { stop: StopFlag::asking(iceoryx2::stop_requested), ..observer };
+        // Whoever signals all processes at once means what the launcher is about to say.
+        let stop = StopFlag::on_signals(false, || {}).asking(iceoryx2::stop_requested);
+        let observer = Observer { stop, ..observer };
         // The endpoint is dropped while a panic unwinds, which tells the other ranks.
         let end = catch_unwind(AssertUnwindSafe(|| take_part(config, &observer)));
         let end = end.map_err(|payload| RankFailure::from_panic(rank, payload));
@@ -96,11 +97,12 @@ impl RankProcess {
             Ok(RankEnd { result: Err(RankError::Told { exit, .. }), .. }) => *exit,
             _ => Exit::PeerLost,
         };
-        let line = report::write(&end);
+        let line = report::write(&end, observer.complete.load(Ordering::Relaxed));
         let written = io::stdout().write_all(line.as_bytes()).and_then(|()| io::stdout().flush());
         match written {
-            Ok(()) => Ok(exit),
-            Err(error) => Err(RunError::Launcher(format!("rank {rank} cannot report to its launcher: {error}"))),
+            Ok(()) => exit,
+            // The launcher is gone, and with it whoever could be told.
+            Err(_) => Exit::PeerLost,
         }
     }
 }
@@ -108,16 +110,19 @@ impl RankProcess {
 /// One rank from start to end.
 fn take_part(config: Result<Config, RunError>, observer: &Observer) -> RankEnd {
     let ended = |complete, error| RankEnd { complete, result: Err(error) };
+    // Before joining: from then on, ranks wait for each other no longer than the peer timeout.
+    let planned = config.and_then(|config| Plan::new(&config));
     let mut endpoint = match iceoryx2::join() {
         Ok(endpoint) => endpoint,
         Err(error) => return ended(0, RankError::Transport(error)),
     };
-    let prepared = config.and_then(|config| {
-        let plan = Plan::new(&config)?;
-        if env::var(CONFIG_HASH).is_ok_and(|expected| expected != plan.config.hash(plan.tiles)) {
-            return Err(RunError::Launcher("the configuration was changed while the ranks were started".to_owned()));
-        }
-        Ok(plan)
+    let is_meant = |plan: &Plan| {
+        let hash = env::var(CONFIG_HASH);
+        hash.is_ok_and(|hash| hash == plan.config.hash(plan.tiles)) && plan.config.run.ranks == endpoint.size()
+    };
+    let prepared = planned.and_then(|plan| {
+        let changed = || RunError::Ranks("the configuration was changed while the ranks were started".to_owned());
+        if is_meant(&plan) { Ok(plan) } else { Err(changed()) }
     });
     let plan = match handshake::agree(&mut endpoint, prepared, |plan| plan) {
         Ok(plan) => plan,
@@ -126,7 +131,6 @@ fn take_part(config: Result<Config, RunError>, observer: &Observer) -> RankEnd {
             return ended(0, RankError::Told { text: error.to_string(), exit: error.exit() });
         }
     };
-    debug_assert_eq!(plan.config.run.ranks, endpoint.size());
     let end = drive::drive(endpoint, &plan, observer, true);
     let result = end.result.map_err(|error| match error {
         error if error.transport().is_some() => error,

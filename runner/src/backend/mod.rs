@@ -16,6 +16,7 @@ use crate::error::RunError;
 use crate::plan::Plan;
 use crate::summary::Summary;
 use outcome::{Ends, outcome};
+use std::sync::atomic::Ordering;
 
 /// Runs a plan whose ranks are threads of this process.
 ///
@@ -29,5 +30,5 @@ pub fn run(plan: &Plan, observer: &Observer) -> Result<Summary, RunError> {
             return Err(RunError::NeedsProcesses { transport: plan.transport.name() });
         }
     };
-    outcome(plan, ends)
+    outcome(plan, ends, observer.complete.load(Ordering::Relaxed))
 }

@@ -34,14 +34,14 @@ impl Job {
     /// If MPI cannot be used as it must be, or the launcher is that of another MPI.
     pub fn join() -> Result<Self, RunError> {
         let options = MpiOptions { peer_timeout: AGREEMENT_TIMEOUT, ..MpiOptions::default() };
-        let endpoint = Mpi::init(options).map_err(|error| RunError::Launcher(error.to_string()))?;
+        let endpoint = Mpi::init(options).map_err(|error| RunError::Ranks(error.to_string()))?;
         match mpi::launched() {
             Some(launched) if launched.size > 1 && endpoint.size() == 1 => {
                 // Each of them is alone and believes itself the first; one is enough to say so.
                 if launched.rank != Rank(0) {
                     return Err(RunError::ToldElsewhere { exit: Exit::Usage });
                 }
-                Err(RunError::Launcher(format!(
+                Err(RunError::Ranks(format!(
                     "the launcher started {} processes, but each finds itself alone: it is not that of the MPI this \
                      program was built with, {}; use that one's mpirun, or the --mpi of srun that suits it",
                     launched.size,
@@ -68,7 +68,7 @@ impl Job {
         }
         let (asked, found) = (config.run.ranks, self.endpoint.size());
         if config.run.ranks_asked_for && asked != found {
-            return Err(RunError::Launcher(format!(
+            return Err(RunError::Ranks(format!(
                 "--ranks {asked}, but the launcher started {found}: leave --ranks out, or start as many with `mpirun -n \
                  {asked}` of the MPI this program was built with, {}",
                 Mpi::library()
@@ -90,7 +90,7 @@ impl Job {
         match handshake::agree(&mut self.endpoint, prepared, plan_of) {
             Ok(prepared) => Ok(prepared),
             Err(Refusal::Known(error)) => Err(self.common(&error)),
-            Err(Refusal::Transport(error)) => self.fail(&RunError::Launcher(error.to_string()), Exit::PeerLost),
+            Err(Refusal::Transport(error)) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
         }
     }
 
@@ -139,9 +139,28 @@ impl Job {
         RunError::ToldElsewhere { exit: error.exit() }
     }
 
-    /// Tells what went wrong on this rank and ends the job.
+    /// Leaves the job, together with all other ranks.
+    pub fn close(mut self) {
+        if let Err(error) = self.endpoint.close() {
+            self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost);
+        }
+    }
+
+    /// Tells what went wrong on this rank, unless another one does, and ends the job.
     fn fail(&mut self, error: &dyn std::fmt::Display, exit: Exit) -> ! {
-        complain(error);
+        if !self.endpoint.told_by_other() {
+            complain(error);
+        }
         self.endpoint.abort_with(exit as i32)
+    }
+
+    /// Ends this process at once, which makes the launcher end the others.
+    pub fn quit() -> ! {
+        Mpi::exit_at_once(Exit::Interrupted as i32)
+    }
+
+    /// Whether a launcher started this process among others.
+    pub fn is_launched() -> bool {
+        mpi::launched().is_some_and(|launched| launched.size > 1)
     }
 }

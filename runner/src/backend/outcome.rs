@@ -11,10 +11,11 @@ use atoll_transport::{RankFailure, TransportError};
 /// How every rank ended, in rank order.
 pub(super) type Ends = Vec<Result<RankEnd, RankFailure>>;
 
-/// What all ranks together have to say. Most errors reach several ranks; the one nearest to the cause is told.
-pub(super) fn outcome(plan: &Plan, ends: Ends) -> Result<Summary, RunError> {
+/// What all ranks together have to say. Most errors reach several ranks; the one nearest to the cause is told. If no rank
+/// says how far it came, it is as far as `before`.
+pub(super) fn outcome(plan: &Plan, ends: Ends, before: u64) -> Result<Summary, RunError> {
     let steps = plan.config.run.steps;
-    let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(0);
+    let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(before);
     let (mut summary, mut errors, mut outlived) = (None, Vec::new(), Vec::new());
     for end in ends {
         match end.map(|end| end.result) {
@@ -99,7 +100,7 @@ mod tests {
     #[test]
     fn a_lost_rank_is_named_with_its_own_words_and_the_last_complete_step() {
         let panicked = RankFailure::Panicked { rank: Rank(1), message: "boom".to_owned() };
-        let error = outcome(&plan(), vec![failed(4, lost(1)), Err(panicked), failed(3, lost(1))]).unwrap_err();
+        let error = outcome(&plan(), vec![failed(4, lost(1)), Err(panicked), failed(3, lost(1))], 9).unwrap_err();
         assert_eq!(error.to_string(), "rank 1 was lost after 3 of 9 steps: rank 1 panicked: boom");
         assert_eq!(error.exit() as u8, 3);
     }
@@ -107,7 +108,7 @@ mod tests {
     #[test]
     fn a_state_that_is_not_finite_is_told_once() {
         let error = || RankError::Step(StepError::NonFinite { step: 5, id: GlobalId(77) });
-        let told = outcome(&plan(), vec![failed(6, error()), failed(6, error()), failed(5, lost(0))]).unwrap_err();
+        let told = outcome(&plan(), vec![failed(6, error()), failed(6, error()), failed(5, lost(0))], 0).unwrap_err();
         assert!(told.to_string().starts_with("step 5: the state of body 77 is no longer finite"), "{told}");
         assert_eq!(told.exit() as u8, 4);
     }
@@ -153,7 +154,7 @@ mod tests {
         let ends = channel::run(3, ChannelOptions::default(), |inner| {
             drive::drive(Dying { inner, rounds_left: 5 }, &plan, &Observer::default(), false)
         });
-        let error = outcome(&plan, ends).unwrap_err();
+        let error = outcome(&plan, ends, 0).unwrap_err();
         assert_eq!(error.to_string(), "rank 1 was lost after 4 of 9 steps: rank 1 panicked: on purpose");
     }
 

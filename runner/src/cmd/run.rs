@@ -1,5 +1,6 @@
 //! `atoll run`: a scene from start to end.
 
+use super::complain;
 use crate::args::RunArgs;
 use crate::backend;
 use crate::config::Config;
@@ -23,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     #[cfg(feature = "iceoryx2")]
     if let Some(rank) = backend::iceoryx2::RankProcess::of_this() {
-        return rank.run(load(args), observer(args));
+        return Ok(rank.run(load(args), observer(args)));
     }
     let config = load(args);
     #[cfg(feature = "mpi")]
@@ -55,17 +56,17 @@ fn observer(args: &RunArgs) -> Observer {
 /// What the user may want to know before the run starts.
 fn tell(plan: &Plan) {
     for note in plan.notes() {
-        eprintln!("atoll: {note}");
+        complain(&note);
     }
 }
 
-/// Whether ranks are to be joined by MPI. A configuration that cannot be read leaves the command line to say so, and
-/// then the ranks meet to complain once.
+/// Whether ranks are to be joined by MPI. Where the configuration cannot be read, the command line says so, or that a
+/// launcher started this process among others: then the ranks meet to complain once.
 #[cfg(feature = "mpi")]
 fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
     match config {
         Ok(config) => config.transport() == TransportKind::Mpi,
-        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()),
+        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()) || backend::mpi::Job::is_launched(),
     }
 }
 
@@ -85,11 +86,13 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         tell(&plan);
     }
     // Silently: the launcher sends signals of its own when it ends a job.
-    let stop = StopFlag::on_signals(false, || std::process::exit(Exit::Interrupted as i32));
-    match job.run(&plan, &Observer { stop, ..observer(args) })? {
+    let stop = StopFlag::on_signals(false, || backend::mpi::Job::quit());
+    let concluded = match job.run(&plan, &Observer { stop, ..observer(args) })? {
         Some(summary) => conclude(&summary, &outputs),
         None => Ok(Exit::Done),
-    }
+    };
+    job.close();
+    concluded
 }
 
 /// Shows and writes what became of a run, and says with which exit code to end.

@@ -209,7 +209,6 @@ impl Config {
 
 fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
-    let ranks = settings.integer("run.ranks", 1..=1024, 1)? as usize;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
     let ranks_asked_for = settings.place("run.ranks").is_some_and(|place| !matches!(place.origin, Origin::File(_)));
     let transport = settings.choice("run.transport", &TransportKind::WORDS)?;
@@ -217,6 +216,9 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
         let place = settings.place("run.transport").expect("it was given").clone();
         return Err(ConfigError::NotBuiltIn { place, feature: kind.name() });
     }
+    // Those of a cluster are for its launcher to limit.
+    let most_ranks = if transport == Some(TransportKind::Mpi) { u64::from(u32::MAX) } else { 1024 };
+    let ranks = settings.integer("run.ranks", 1..=most_ranks, 1)? as usize;
     if transport == Some(TransportKind::Local) && ranks > 1 {
         let place = settings.place("run.transport").expect("it was given").clone();
         let reason = format!("one rank at most, and this run has {ranks}; use transport channel, or ranks 1");

@@ -11,10 +11,10 @@ use crate::{Incoming, Transport, TransportError};
 pub(super) const DELIBERATE: &str = "lost on purpose";
 
 /// The peer timeout of the case that reaches it.
-pub(super) const SILENT_PEER_TIMEOUT: Duration = Duration::from_millis(250);
+pub(super) const SILENT_PEER_TIMEOUT: Duration = Duration::from_millis(600);
 
 /// How long the silent rank is silent. The others have by far the most of it to notice.
-const SILENCE: Duration = Duration::from_secs(3);
+const SILENCE: Duration = Duration::from_secs(4);
 
 /// Rounds that all ranks complete before the loss.
 const GOOD_ROUNDS: u64 = 3;

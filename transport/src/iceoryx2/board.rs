@@ -132,8 +132,9 @@ impl Board {
         let started = Instant::now();
         let wake_at = seen.wrapping_add(missing);
         seat.wake_at.store(wake_at, Release);
-        seat.asleep.store(1, SeqCst);
         loop {
+            // Anew before each look: a late ringer of the wait before may have taken the mark.
+            seat.asleep.store(1, SeqCst);
             let now = seat.bell.load(SeqCst);
             let left = limit.saturating_sub(started.elapsed());
             if reached(now, wake_at) || left.is_zero() {

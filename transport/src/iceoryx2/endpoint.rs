@@ -25,6 +25,9 @@ const JOIN_TIMEOUT: Duration = Duration::from_secs(60);
 /// Between two looks, on leaving, at whether the others have received everything.
 const LINGER_POLL: Duration = Duration::from_micros(200);
 
+/// The most that leaving takes after a failure.
+const FAILED_LINGER: Duration = Duration::from_millis(500);
+
 /// The endpoint of one rank among processes of one machine. [`join`](super::join) makes it.
 #[derive(Debug)]
 pub struct Iceoryx2 {
@@ -237,14 +240,16 @@ impl Iceoryx2 {
     /// receiver has not yet mapped is lost when its sender's ports are dropped. It takes moments, because a round that
     /// is complete here is one that all others are already in.
     fn linger(&self) {
-        let Standing { board, heard, timeout, .. } = &self.standing;
+        let Standing { board, heard, timeout, failed, .. } = &self.standing;
+        // Where the run has failed, some will never come.
+        let limit = if failed.is_some() { FAILED_LINGER.min(*timeout) } else { *timeout };
         let started = Instant::now();
         for peer in self.standing.others() {
             while board.completed(peer) < self.round
                 && !board.is_gone(peer)
                 && heard.how_it_ended(peer).is_none()
                 && !heard.is_launcher_gone()
-                && started.elapsed() < *timeout
+                && started.elapsed() < limit
             {
                 sleep(LINGER_POLL);
             }
@@ -264,15 +269,17 @@ fn open_ports(standing: &Standing, folder: &super::run_folder::RunFolder) -> Res
         }
     }
     let started = Instant::now();
-    let go_on = || {
+    let go_on = |awaited: Option<Rank>| {
         let lost = |(rank, reason)| Stop::Error(TransportError::PeerLost { rank, reason });
         standing.check_launcher().map_err(Stop::Error)?;
         let gone = standing.others().find_map(|rank| standing.how_it_went(rank).map(|reason| (rank, reason)));
         gone.map_or(Ok(()), |gone| Err(lost(gone)))?;
-        if started.elapsed() >= standing.timeout {
-            return Err(Stop::Reason(format!("it waited {:.1?} for the others to join", started.elapsed())));
+        let waited = started.elapsed();
+        match awaited {
+            _ if waited < standing.timeout => Ok(()),
+            Some(rank) => Err(Stop::Error(TransportError::Timeout { rank, waited })),
+            None => Err(Stop::Reason(format!("it took {waited:.1?} to make its ports"))),
         }
-        Ok(())
     };
     Ports::open(folder, standing.rank, standing.size, go_on).map_err(|stop| match stop {
         Stop::Error(error) => error,

@@ -35,13 +35,13 @@ pub struct LaunchOptions {
     /// It must exceed the longest time by which one rank may lag behind another. Raising it lengthens the wait for a
     /// rank that hangs; ranks that end in whatever way are noticed at once.
     pub peer_timeout: Duration,
-    /// How long the others may take to end by themselves when a rank was lost, before they are killed. Default 10 s.
+    /// How long the others may take to end by themselves when a rank was lost, before they are killed. Default 5 s.
     pub grace: Duration,
 }
 
 impl Default for LaunchOptions {
     fn default() -> LaunchOptions {
-        LaunchOptions { peer_timeout: Duration::from_secs(30), grace: Duration::from_secs(10) }
+        LaunchOptions { peer_timeout: Duration::from_secs(30), grace: Duration::from_secs(5) }
     }
 }
 
@@ -79,7 +79,7 @@ pub enum LaunchError {
     Limits(String),
 
     /// The folder of the run could not be made.
-    #[error("cannot make the folder of the run in {}: {source}; set TMPDIR to a folder of your own", .folder.display())]
+    #[error("cannot make the folder of the run in {}: {source}; check that it is yours to write", .folder.display())]
     Folder {
         /// Where.
         folder: PathBuf,

@@ -1,6 +1,6 @@
 //! What the launcher tells a rank: lines on the rank's standard input.
 
-use std::io::BufRead;
+use std::io::{BufRead, Write, stderr};
 use std::process;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::SeqCst;
@@ -114,7 +114,9 @@ pub(super) fn listen(
         told.launcher_gone.store(true, SeqCst);
         board.alarm(own);
         thread::sleep(GRACE);
-        eprintln!("rank {own}: the launcher of this run is gone, so this rank ends; start the run again");
+        // Whether or not anybody can hear it.
+        let _ =
+            writeln!(stderr(), "rank {own}: the launcher of this run is gone, so this rank ends; start the run again");
         process::exit(LAUNCHER_GONE);
     })?;
     Ok(heard)

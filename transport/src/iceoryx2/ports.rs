@@ -90,21 +90,19 @@ pub(super) enum SendFailure {
 }
 
 impl Ports {
-    /// Makes the ports of rank `own` and waits until each other rank has its own, or until `go_on` fails.
+    /// Makes the ports of rank `own` and waits until each other rank has its own, or until `go_on`, which is told for whom it
+    /// waits, fails.
     pub(super) fn open<E: From<String>>(
         folder: &RunFolder,
         own: Rank,
         size: usize,
-        go_on: impl Fn() -> Result<(), E>,
+        go_on: impl Fn(Option<Rank>) -> Result<(), E>,
     ) -> Result<Ports, E> {
         let failed = |what: &str, error: &dyn std::fmt::Display| format!("it could not make its {what}: {error}");
         // What it has to say is in its results; the rest is noise on the program's standard error.
         set_log_level(LogLevel::Fatal);
         let config = config(folder, size).ok_or_else(|| {
-            format!(
-                "it cannot use the folder {}, whose name is too long or not UTF-8; set TMPDIR",
-                folder.path().display()
-            )
+            format!("it cannot use the folder {}, whose name is too long or not UTF-8", folder.path().display())
         })?;
         let node = NodeBuilder::new()
             .config(&config)
@@ -114,7 +112,7 @@ impl Ports {
         let mut ports = Ports { publishers: Rank::all(size).map(|_| None).collect(), subscriber: None, node };
         // Every rank begins with another service, its own, so that they do not all make the same one.
         for to in (0..size).filter(|_| size > 1).map(|offset| Rank::from_index((own.index() + offset) % size)) {
-            go_on()?;
+            go_on(None)?;
             let service = ports.service(to, size).map_err(|error| failed("service", &error))?;
             if to == own {
                 let subscriber = service.subscriber_builder().create().map_err(|error| failed("subscriber", &error))?;
@@ -132,9 +130,10 @@ impl Ports {
                 ports.publishers[to.index()] = Some(port);
             }
         }
-        for port in ports.publishers.iter().flatten() {
+        for (to, port) in Rank::all(size).zip(&ports.publishers) {
+            let Some(port) = port else { continue };
             while port.service.dynamic_config().number_of_subscribers() == 0 {
-                go_on()?;
+                go_on(Some(to))?;
                 sleep(POLL);
             }
             port.publisher.update_connections().map_err(|error| failed("connections", &error))?;

@@ -1,9 +1,10 @@
 //! The folder of one run, and what dead runs have left.
 //!
-//! All runs of a user have folders in `<temporary folder>/atoll-<user>`, which nobody else may enter. Every process
-//! of a run holds a shared lock on a file in that run's folder: where the lock can be had alone, all of them are gone.
-//! Runs are made and dead ones removed under a lock on the common folder, so a run that is just starting is not
-//! mistaken for a dead one.
+//! All runs of a user have folders in one common folder, which nobody else may enter: `/dev/shm/atoll-<user>`, beside the
+//! shared memory that they have, so that no run misses what another one left. Every process of a run holds a shared lock
+//! on a file in that run's folder: where the lock can be had alone, all of them are gone. Runs are made and dead ones
+//! removed under a lock on the common folder, so a run that is just starting is not mistaken for a dead one. Whoever
+//! removes the last run removes the common folder as well.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io;
@@ -72,8 +73,7 @@ impl RunFolder {
     /// failure is told.
     pub(super) fn remove(&self) -> io::Result<()> {
         let mut result = Ok(());
-        for entry in fs::read_dir(SHARED_MEMORY)? {
-            let entry = entry?;
+        for entry in fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten() {
             if entry.file_name().to_string_lossy().starts_with(&self.prefix) {
                 result = result.and(unless_absent(fs::remove_file(entry.path())));
             }
@@ -109,16 +109,49 @@ impl Drop for OwnedRunFolder {
     fn drop(&mut self) {
         // What resists is tried again by the next launch.
         let _ = self.folder.remove();
+        if let Some(common) = self.folder.path.parent() {
+            remove_if_empty(common);
+        }
     }
 }
 
+/// Removes the common folder if it holds no run.
+fn remove_if_empty(common: &Path) {
+    let Ok(_alone) = enter(common) else { return };
+    let is_run = |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|entry| entry.file_name() != LOCK);
+    if fs::read_dir(common).is_ok_and(|mut entries| !entries.any(is_run)) {
+        // Whoever waits for the lock that goes with it finds that out, and makes another.
+        let _ = fs::remove_file(common.join(LOCK));
+        let _ = fs::remove_dir(common);
+    }
+}
+
+/// Names another common folder.
+const COMMON_FOLDER: &str = "ATOLL_RUN_FOLDERS";
+
 /// The folder of all runs of this user.
 pub(super) fn common_folder() -> PathBuf {
-    std::env::temp_dir().join(format!("atoll-{}", geteuid().as_raw()))
+    let usual = || Path::new(SHARED_MEMORY).join(format!("atoll-{}", geteuid().as_raw()));
+    std::env::var_os(COMMON_FOLDER).map_or_else(usual, PathBuf::from)
 }
 
 /// Makes the common folder if need be, checks that it is this user's alone, and locks it.
 fn enter(common: &Path) -> io::Result<File> {
+    let started = Instant::now();
+    loop {
+        match try_enter(common) {
+            Ok(Some(lock)) => return Ok(lock),
+            Ok(None) if started.elapsed() < LOCK_TIMEOUT => sleep(LOCK_POLL),
+            Ok(None) => return Err(io::Error::other("another process keeps it locked")),
+            // It was removed meanwhile, with the last run in it.
+            Err(error) if error.kind() == io::ErrorKind::NotFound && started.elapsed() < LOCK_TIMEOUT => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// As [`enter`], if nobody else has it locked.
+fn try_enter(common: &Path) -> io::Result<Option<File>> {
     match DirBuilder::new().mode(0o700).create(common) {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
         _ => {}
@@ -128,15 +161,13 @@ fn enter(common: &Path) -> io::Result<File> {
     if !metadata.is_dir() || metadata.uid() != geteuid().as_raw() || metadata.mode() & 0o077 != 0 {
         return Err(io::Error::other("it is not a folder that belongs to this user alone (mode 0700)"));
     }
-    let lock = OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(common.join(LOCK))?;
-    let started = Instant::now();
-    loop {
-        match lock.try_lock() {
-            Ok(()) => return Ok(lock),
-            Err(TryLockError::WouldBlock) if started.elapsed() < LOCK_TIMEOUT => sleep(LOCK_POLL),
-            Err(TryLockError::WouldBlock) => return Err(io::Error::other("another process keeps it locked")),
-            Err(TryLockError::Error(error)) => return Err(error),
-        }
+    let path = common.join(LOCK);
+    let lock = OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(&path)?;
+    match lock.try_lock() {
+        // One that was removed while it was waited for locks nothing.
+        Ok(()) if fs::metadata(&path)?.ino() == lock.metadata()?.ino() => Ok(Some(lock)),
+        Ok(()) | Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(error)) => Err(error),
     }
 }
 
@@ -193,7 +224,7 @@ mod tests {
         fs::write(folder.board(), "x").unwrap();
         assert_eq!(RunFolder::at(folder.path().to_owned()), folder, "ranks find what the launcher made");
         drop(run);
-        assert!(!folder.path().exists());
+        assert!(!common.exists());
         assert_eq!(in_shared_memory(folder.prefix()), 0);
     }
 
@@ -242,8 +273,7 @@ mod tests {
                 });
             }
         });
-        let left: Vec<_> = fs::read_dir(&common).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-        assert_eq!(left, [LOCK]);
+        assert!(!common.exists(), "the last run takes the common folder with it");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::notice::Notice;
 use super::pause::{awake, pause};
 use super::raw::{Communicator, Pending};
+use crate::origin::left_early;
 use crate::{Rank, TransportError};
 
 /// The only tag of notices.
@@ -17,6 +18,9 @@ const LOOK: Duration = Duration::from_millis(1);
 
 /// How long ranks have to answer before one of them is blamed.
 const ANSWER: Duration = Duration::from_secs(1);
+
+/// How much longer a rank waits for the verdict of a lower one that lives, so that one of them speaks for all.
+const DEFERENCE: Duration = Duration::from_secs(1);
 
 /// Ranks that end within so short a time do not tell each other.
 const TELL_AFTER: Duration = Duration::from_millis(20);
@@ -75,6 +79,11 @@ impl Watch {
     /// The rounds that this rank has completed.
     pub(super) fn rounds(&self) -> u64 {
         self.rounds
+    }
+
+    /// Whether it was another rank that told this one why the run is over.
+    pub(super) fn told_by_other(&self) -> bool {
+        self.told_by_other
     }
 
     /// A round is over.
@@ -189,10 +198,7 @@ impl Watch {
     fn check_left(&self) -> Result<(), TransportError> {
         let gone = Rank::all(self.left.len()).zip(&self.left).filter_map(|(rank, left)| Some(((*left)?, rank)));
         match gone.min() {
-            Some((rounds, rank)) if rounds <= self.rounds => {
-                let reason = "it left while other ranks still needed it".to_owned();
-                Err(TransportError::PeerLost { rank, reason })
-            }
+            Some((rounds, rank)) if rounds <= self.rounds => Err(left_early(rank)),
             _ => Ok(()),
         }
     }
@@ -204,14 +210,16 @@ impl Watch {
         self.answers.fill(None);
         self.answers[self.communicator.rank().index()] = Some(self.rounds);
         self.tell_all(&Notice::Ping { number: self.inquiry });
-        while asked.elapsed() < ANSWER {
+        let own = self.communicator.rank();
+        let lower_lives = |answers: &[Option<u64>]| answers[..own.index()].iter().any(Option::is_some);
+        while asked.elapsed() < ANSWER || lower_lives(&self.answers) && asked.elapsed() < ANSWER + DEFERENCE {
             if done() {
                 return Ok(());
             }
             self.look()?;
             thread::sleep(LOOK);
         }
-        Err(blame(self.communicator.rank(), &self.answers, self.rounds, started.elapsed()))
+        Err(blame(own, &self.answers, self.rounds, started.elapsed()))
     }
 
     fn tell(&mut self, rank: Rank, notice: &Notice) {

@@ -27,7 +27,9 @@
 //! a rank that waits asks the library again and again, and now and then looks for notices of other ranks: that one left
 //! before this round, or gave up, and why. At the peer timeout it asks all others for a sign of life, which each gives
 //! that waits itself, and a second later blames the lowest one that gave none: it computes for too long, hangs, or is
-//! cut off. These notices go from every rank to every other, but only where something is wrong, or at the end.
+//! cut off. Of several that find it out, the lowest speaks. These notices go from every rank to every other, but only where
+//! something is wrong, or at the end. Starting and finalizing the library itself have no deadline: if a rank dies just
+//! then, it is up to the launcher to end the others.
 //!
 //! Where a host is cut off, the ranks on both sides end; the launcher may still wait for that host, Open MPI's for many
 //! minutes. Start it under a time limit where that matters.
@@ -125,8 +127,12 @@ pub struct Mpi {
     rank: Rank,
     size: usize,
     method: Method,
+    /// Of the round that is prepared.
+    prepared: Method,
     outgoing: Outgoing,
     state: State,
+    /// Whether another rank has told all others why the run is over.
+    told_by_other: bool,
     /// The library is to be called by one thread.
     stays_on_thread: PhantomData<*const ()>,
 }
@@ -163,8 +169,10 @@ impl Mpi {
             rank,
             size,
             method: options.method,
+            prepared: options.method,
             outgoing: Outgoing::flat(size),
             state: State::Open(Box::new(session)),
+            told_by_other: false,
             stays_on_thread: PhantomData,
         })
     }
@@ -199,6 +207,12 @@ impl Mpi {
         Ok(())
     }
 
+    /// Whether it was another rank that told this one why the run is over. That one has found it out, and can best tell
+    /// the user.
+    pub fn told_by_other(&self) -> bool {
+        self.told_by_other
+    }
+
     /// Waits until every rank has closed its endpoint or dropped it, and finalizes the library. After that the endpoint
     /// is of no more use.
     ///
@@ -214,6 +228,11 @@ impl Mpi {
                 Err(error)
             }
         }
+    }
+
+    /// Ends this process with this exit code, without any cleaning up, which might wait for other ranks.
+    pub fn exit_at_once(code: i32) -> ! {
+        raw::exit_at_once(code)
     }
 
     /// Ends all processes of the job at once, with this exit code, and says nothing. Once the endpoint is closed, this
@@ -256,8 +275,9 @@ impl Mpi {
                 "rank {rank}: the messages of one round are longer than any memory; send less in a round"
             )));
         }
-        match lengths.iter().position(|&length| self.method == Method::Sparse && length > sparse::LONGEST) {
-            Some(to) if to != rank.index() => Err(TransportError::usage(format!(
+        let too_long = |(to, &length): (usize, &usize)| to != rank.index() && length > sparse::LONGEST;
+        match lengths.iter().enumerate().position(too_long) {
+            Some(to) if self.method == Method::Sparse => Err(TransportError::usage(format!(
                 "rank {rank}: {} bytes to rank {to} in one message, and the sparse exchange sends at most {}; send less \
                  in a round, or use the exchange by alltoallv",
                 lengths[to],
@@ -288,6 +308,7 @@ impl Transport for Mpi {
         self.session()?;
         self.outgoing.begin_prepare(self.rank, lengths)?;
         self.check_lengths(lengths)?;
+        self.prepared = self.method;
         self.outgoing.as_flat().arrange(lengths, longest_in_collective(self.size));
         self.outgoing.end_prepare();
         Ok(&mut self.outgoing)
@@ -299,7 +320,7 @@ impl Transport for Mpi {
         let State::Open(session) = &mut self.state else { unreachable!("there is a session") };
         let started = Instant::now();
         incoming.begin(self.size);
-        let result = match self.method {
+        let result = match self.prepared {
             Method::Alltoallv => session.alltoallv(&mut self.outgoing, incoming, started),
             Method::Sparse => session.sparse(&mut self.outgoing, incoming, started),
         };
@@ -311,6 +332,7 @@ impl Transport for Mpi {
             }
             Err(error) => {
                 session.watch.give_up(&error);
+                self.told_by_other = session.watch.told_by_other();
                 self.state = State::Failed(error.clone());
                 incoming.clear();
                 Err(error)

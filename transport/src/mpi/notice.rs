@@ -51,7 +51,7 @@ impl Notice {
             1 => Notice::Pong { number: first, rounds: second },
             2 => Notice::Left { rounds: first },
             3 => {
-                let waited = Duration::from_secs(first) + Duration::from_nanos(second);
+                let waited = Duration::from_secs(first).checked_add(Duration::from_nanos(second))?;
                 Notice::Failed(TransportError::Timeout { rank, waited })
             }
             4 => Notice::Failed(TransportError::PeerLost { rank, reason: text() }),
