@@ -43,9 +43,9 @@
 //!
 //! # What is left
 //!
-//! Nothing. All files of a run are in a folder of its own below `/dev/shm/atoll-<user>`, all its shared
-//! memory bears the run's name, and the launcher removes both when its ranks have ended. If it cannot, because it was killed,
-//! the next launch by the same user does.
+//! Nothing. All files of a run are in a folder of its own below `/dev/shm/atoll-<user>` (`ATOLL_RUN_FOLDERS` names another
+//! place), all its shared memory bears the run's name, and the launcher removes both when its ranks have ended. If it
+//! cannot, because it was killed, the next launch by the same user does.
 //!
 //! # Memory
 //!
