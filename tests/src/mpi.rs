@@ -14,7 +14,17 @@ pub const LAUNCHER: &str = "ATOLL_MPIRUN";
 /// # Panics
 /// If there is no such launcher.
 pub fn mpirun(size: usize) -> Command {
-    let mut command = Command::new(env::var_os(LAUNCHER).unwrap_or_else(launcher));
+    launch_with(env::var_os(LAUNCHER).unwrap_or_else(launcher), size)
+}
+
+/// The launcher of another MPI than that, if there is one, told to start so many ranks.
+pub fn foreign_mpirun(size: usize) -> Option<Command> {
+    let name = if Mpi::library().contains("Open MPI") { "mpirun.mpich" } else { "mpirun.openmpi" };
+    on_path(name).then(|| launch_with(name.into(), size))
+}
+
+fn launch_with(launcher: OsString, size: usize) -> Command {
+    let mut command = Command::new(launcher);
     command.stdin(Stdio::null()).arg("-n").arg(size.to_string());
     let open_mpi = [
         ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
@@ -42,8 +52,11 @@ fn launcher() -> OsString {
     } else {
         &["mpirun"]
     };
-    let path = env::var_os("PATH").unwrap_or_default();
-    let exists = |name: &&&str| env::split_paths(&path).any(|folder| folder.join(name).is_file());
-    let found = names.iter().find(exists);
+    let found = names.iter().find(|name| on_path(name));
     found.unwrap_or_else(|| panic!("none of {names:?} of {library} is on the path; name one in {LAUNCHER}")).into()
+}
+
+fn on_path(name: &str) -> bool {
+    let path = env::var_os("PATH").unwrap_or_default();
+    env::split_paths(&path).any(|folder| folder.join(name).is_file())
 }

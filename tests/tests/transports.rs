@@ -149,7 +149,7 @@ mod iceoryx2 {
 #[cfg(feature = "mpi")]
 mod mpi {
     use super::*;
-    use atoll_tests::mpi::mpirun;
+    use atoll_tests::mpi::{foreign_mpirun, mpirun};
 
     #[test]
     fn ranks_asked_for_are_checked_against_those_started() {
@@ -161,13 +161,19 @@ mod mpi {
 
     #[test]
     fn a_launcher_of_another_mpi_is_caught() {
+        let expected = "atoll: the launcher started 4 processes, but each finds itself alone: ";
+        let options = ["run", "configs/quickstart.toml", "--transport", "mpi", "--quiet"];
+        if let Some(mut command) = foreign_mpirun(4) {
+            command.arg(program::atoll(program::Profile::CURRENT)).args(options);
+            let ended = program::run(program::at_home(&mut command));
+            assert_eq!(ended.code, Some(2), "{ended}");
+            assert_eq!(ended.complaints().iter().filter(|line| line.starts_with(expected)).count(), 1, "{ended}");
+        }
         // What such a launcher amounts to: processes that are told of each other in a language they do not speak.
         for (size, rank) in [("PMI_SIZE", "PMI_RANK"), ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK")] {
             let mut command = program::command();
-            command.args(["run", "configs/quickstart.toml", "--transport", "mpi", "--quiet"]);
-            let ended = program::run(command.env(size, "4").env(rank, "0"));
+            let ended = program::run(command.args(options).env(size, "4").env(rank, "0"));
             assert_eq!(ended.code, Some(2), "{ended}");
-            let expected = "atoll: the launcher started 4 processes, but each finds itself alone: ";
             assert_eq!(ended.complaints().iter().filter(|line| line.starts_with(expected)).count(), 1, "{ended}");
         }
     }

@@ -13,10 +13,14 @@ use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
 use atoll_transport::{Rank, RankFailure, Transport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
+use std::thread;
 use std::time::Duration;
 
 /// How long ranks wait for each other until they have agreed on a configuration, which says how long.
 const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// What a process that finds itself alone leaves to the one that says so.
+const TIME_TO_SPEAK: Duration = Duration::from_secs(2);
 
 /// This process as a rank of an MPI job.
 ///
@@ -37,8 +41,10 @@ impl Job {
         let endpoint = Mpi::init(options).map_err(|error| RunError::Ranks(error.to_string()))?;
         match mpi::launched() {
             Some(launched) if launched.size > 1 && endpoint.size() == 1 => {
-                // Each of them is alone and believes itself the first; one is enough to say so.
+                // Each of them is alone and believes itself the first; one is enough to say so. It is given time, as a
+                // launcher ends all others when one has ended.
                 if launched.rank != Rank(0) {
+                    thread::sleep(TIME_TO_SPEAK);
                     return Err(RunError::ToldElsewhere { exit: Exit::Usage });
                 }
                 Err(RunError::Ranks(format!(
@@ -159,8 +165,8 @@ impl Job {
         Mpi::exit_at_once(Exit::Interrupted as i32)
     }
 
-    /// Whether a launcher started this process among others.
+    /// Whether a launcher started this process to join others.
     pub fn is_launched() -> bool {
-        mpi::launched().is_some_and(|launched| launched.size > 1)
+        mpi::can_join_others() && mpi::launched().is_some_and(|launched| launched.size > 1)
     }
 }

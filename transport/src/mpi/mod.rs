@@ -110,6 +110,12 @@ pub fn launched() -> Option<Launched> {
     launched_in(|name| std::env::var(name).ok())
 }
 
+/// Whether a launcher of MPI started this process, or another one in a way that MPI understands, so that it can join
+/// others.
+pub fn can_join_others() -> bool {
+    ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"].iter().any(|name| std::env::var_os(name).is_some())
+}
+
 fn launched_in(variable: impl Fn(&str) -> Option<String>) -> Option<Launched> {
     let number = |name| variable(name)?.parse().ok();
     let names = [
