@@ -1,6 +1,6 @@
 //! Stopping a run early, so that all ranks end after the same step.
 
-use crate::cmd::complain;
+use crate::telemetry::complain;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing::warn;

@@ -1,8 +1,10 @@
-//! Log lines on stderr, as `RUST_LOG` asks for.
+//! What goes to stderr: complaints, and log lines as `RUST_LOG` asks for.
 
+use crate::config::OneLine;
 use crate::error::RunError;
 use std::env::{self, VarError};
-use std::io::IsTerminal;
+use std::fmt::Display;
+use std::io::{IsTerminal, Write};
 use tracing_subscriber::EnvFilter;
 
 /// Starts logging: warnings and errors, or what `RUST_LOG` says.
@@ -25,4 +27,11 @@ pub fn init() -> Result<(), RunError> {
     // Fails only where a subscriber is already in place, which then serves as well.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colored).with_writer(stderr).try_init();
     Ok(())
+}
+
+/// Tells the user something on one line, whatever names and values the user has given.
+pub fn complain(error: &dyn Display) {
+    // In one piece, so that nothing that others say comes between, and whether or not anybody listens.
+    let line = format!("atoll: {}\n", OneLine(&error.to_string()));
+    let _ = std::io::stderr().write_all(line.as_bytes());
 }

@@ -1,13 +1,13 @@
 //! Ranks as processes that an MPI launcher started, this one among them.
 
 use super::outcome::told;
-use crate::cmd::complain;
 use crate::config::{Config, MpiExchange};
 use crate::drive::{self, Observer, RankError};
 use crate::error::{Exit, RunError};
 use crate::handshake::{self, Refusal};
 use crate::plan::Plan;
 use crate::summary::Summary;
+use crate::telemetry::complain;
 use atoll_core::StepError;
 use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
 use atoll_transport::{Rank, RankFailure, Transport};

@@ -3,13 +3,10 @@
 pub mod run;
 
 use crate::args::{self, Cli, Command};
-use crate::config::OneLine;
 use crate::error::{Exit, RunError};
 use crate::telemetry;
 use clap::Parser;
 use clap::error::ErrorKind;
-use std::fmt::Display;
-use std::io::{self, Write};
 use std::process::ExitCode;
 
 /// Reads the command line and does what it says.
@@ -23,18 +20,11 @@ pub fn main() -> ExitCode {
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {
-            complain(&error);
+            telemetry::complain(&error);
         }
         error.exit()
     });
     ExitCode::from(exit as u8)
-}
-
-/// On one line, whatever names and values the user has given.
-pub(crate) fn complain(error: &dyn Display) {
-    // In one piece, so that nothing that others say comes between, and whether or not anybody listens.
-    let line = format!("atoll: {}\n", OneLine(&error.to_string()));
-    let _ = io::stderr().write_all(line.as_bytes());
 }
 
 /// Help and version as they are; complaints on one line.
@@ -46,7 +36,7 @@ fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Done } as u8)
         }
         _ => {
-            eprintln!("atoll: {}", args::one_line(error));
+            telemetry::complain(&args::one_line(error));
             ExitCode::from(Exit::Usage as u8)
         }
     }

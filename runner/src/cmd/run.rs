@@ -1,6 +1,5 @@
 //! `atoll run`: a scene from start to end.
 
-use super::complain;
 use crate::args::RunArgs;
 use crate::backend;
 use crate::config::Config;
@@ -13,6 +12,7 @@ use crate::output::WholeFile;
 use crate::plan::Plan;
 use crate::progress::Show;
 use crate::summary::Summary;
+use crate::telemetry::complain;
 use crate::timings;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};

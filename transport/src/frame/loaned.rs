@@ -1,11 +1,25 @@
 //! Slices of memory shared with other processes, loaned for one message each.
 
+use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::ipc_threadsafe::Service;
 
 use crate::Rank;
-use crate::iceoryx2::Header;
+
+/// What a message says about itself. Its length is that of its slice.
+#[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
+#[repr(C)]
+pub(crate) struct Header {
+    /// The round it belongs to, counted from 0.
+    pub(crate) round: u64,
+    /// The sender's flag word, upper half first.
+    pub(crate) flag_word: [u64; 2],
+    /// The sending rank.
+    pub(crate) source: u32,
+    /// Fills the header up, so that every byte of it has a value.
+    pub(crate) unused: u32,
+}
 
 /// A buffer to fill: a slice that one other process will read.
 pub(crate) type Loan = SampleMut<Service, [u8], Header>;

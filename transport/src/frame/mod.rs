@@ -16,7 +16,7 @@ use crate::{Rank, TransportError};
 #[cfg(feature = "mpi")]
 pub(crate) use flat::Flat;
 #[cfg(feature = "iceoryx2")]
-pub(crate) use loaned::{Loan, LoanedFrame, LoanedIncoming, LoanedOutgoing, Message};
+pub(crate) use loaned::{Header, Loan, LoanedFrame, LoanedIncoming, LoanedOutgoing, Message};
 pub(crate) use owned::{OwnedIncoming, OwnedOutgoing};
 use std::time::Duration;
 

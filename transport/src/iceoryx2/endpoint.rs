@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use super::board::Board;
 use super::environment::Environment;
 use super::notices::{Heard, listen};
-use super::ports::{Header, Ports, SendFailure};
+use super::ports::{Ports, SendFailure};
 use super::record::Record;
 use crate::error::Aborted;
-use crate::frame::{LoanedFrame, Message};
+use crate::frame::{Header, LoanedFrame, Message};
 use crate::origin::{LEFT_EARLY, Origin};
 use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
 

@@ -10,8 +10,7 @@ use iceoryx2::service::ipc_threadsafe::Service;
 use rustix::io::Errno;
 use rustix::mm::{Advice, madvise};
 
-use super::Header;
-use crate::frame::Loan;
+use crate::frame::{Header, Loan};
 
 /// A slice as iceoryx2 loans it.
 type Raw = SampleMutUninit<Service, [MaybeUninit<u8>], Header>;

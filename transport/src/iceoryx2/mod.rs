@@ -77,7 +77,6 @@ pub use self::environment::{is_rank_process, process_rank};
 pub use self::launch::{Control, LaunchError, LaunchOptions, RankExit, launch};
 pub use self::limits::MAX_RANKS;
 pub use self::notices::stop_requested;
-pub(crate) use self::ports::Header;
 
 use self::environment::Environment;
 use crate::TransportError;

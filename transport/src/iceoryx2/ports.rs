@@ -14,7 +14,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{LoanError, ReceiveError};
 use iceoryx2::prelude::{
     Alignment, AllocationStrategy, BackpressureStrategy, FileName, LogLevel, Path as NodePath, PortFactory as _,
-    SemanticString as _, ServiceName, SignalHandlingMode, ZeroCopySend, set_log_level,
+    SemanticString as _, ServiceName, SignalHandlingMode, set_log_level,
 };
 use iceoryx2::service::ipc_threadsafe::Service;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
@@ -24,21 +24,7 @@ use super::limits;
 use super::memory::{Backed, with_old_bytes};
 use super::run_folder::RunFolder;
 use crate::Rank;
-use crate::frame::{LoanedFrame, LoanedOutgoing, Message};
-
-/// What a message says about itself. Its length is that of its slice.
-#[derive(Clone, Copy, Debug, Default, ZeroCopySend)]
-#[repr(C)]
-pub(crate) struct Header {
-    /// The round it belongs to, counted from 0.
-    pub(super) round: u64,
-    /// The sender's flag word, upper half first.
-    pub(super) flag_word: [u64; 2],
-    /// The sending rank.
-    pub(super) source: u32,
-    /// Fills the header up, so that every byte of it has a value.
-    pub(super) unused: u32,
-}
+use crate::frame::{Header, LoanedFrame, LoanedOutgoing, Message};
 
 /// Messages that a queue holds. Lockstep leaves at most two unread.
 const QUEUE: usize = 2;
