@@ -3,6 +3,7 @@
 use std::ffi::c_int;
 use std::time::{Duration, Instant};
 
+use super::control::Found;
 use super::raw::{from_halves, to_halves};
 use super::session::Session;
 use crate::{Incoming, Outgoing, Rank, TransportError};
@@ -44,7 +45,7 @@ impl Session {
         announced.extend(Rank::all(size).flat_map(|to| [sent.place_of(to).len() as u64, high, low]));
         heard.resize(announced.len(), 0);
         let mut counts = data.all_to_all(announced, heard);
-        let mut waited = watch.wait(started, 0, || counts.test())?;
+        let mut waited = watch.wait(started, 0, || Found::all_if(counts.test()))?;
         *records = counts.finish();
 
         lengths.clear();
@@ -67,7 +68,7 @@ impl Session {
             transfers.send(data, other, TAG, sent.place_of(other));
         }
         let bytes = Rank::all(size).map(|to| sent.place_of(to).len()).chain(lengths.iter().copied()).sum();
-        waited += watch.wait(started, bytes, || transfers.test())?;
+        waited += watch.wait(started, bytes, || Found::all_if(transfers.test()))?;
         let ended = transfers.end();
         sent.put(ended.outgoing);
         received.put(ended.incoming);

@@ -37,6 +37,23 @@ enum Stage {
     Leaving { since: Instant, told: bool },
 }
 
+/// What one look at the operations under way brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Everything is complete.
+    All,
+    /// Something has begun to move.
+    Something,
+    /// Nothing that would be known.
+    Nothing,
+}
+
+impl Found {
+    pub(super) fn all_if(complete: bool) -> Found {
+        if complete { Found::All } else { Found::Nothing }
+    }
+}
+
 /// One rank's watch over the others.
 ///
 /// An operation of the library cannot fail because one peer is gone; it just never ends. So a rank that waits looks at
@@ -91,8 +108,8 @@ impl Watch {
         self.rounds += 1;
     }
 
-    /// Asks `done` again and again, and returns how long it took until it said yes. Meanwhile so many `bytes` may be on
-    /// their way.
+    /// Looks again and again, and returns how long it took until everything was found. Meanwhile so many `bytes` may be on
+    /// their way, from the start or from when something is found.
     ///
     /// # Errors
     /// If a rank that is needed has left, if another one has given up, or if the peer timeout has passed since
@@ -101,22 +118,28 @@ impl Watch {
         &mut self,
         started: Instant,
         bytes: usize,
-        mut done: impl FnMut() -> bool,
+        mut find: impl FnMut() -> Found,
     ) -> Result<Duration, TransportError> {
         let awake = awake(bytes);
         let began = Instant::now();
-        let mut looked = began;
-        while !done() {
+        let (mut looked, mut quiet_since) = (began, began);
+        loop {
+            let found = find();
             let now = Instant::now();
+            match found {
+                Found::All => break,
+                Found::Something => quiet_since = now,
+                Found::Nothing => {}
+            }
             if now - looked >= LOOK {
                 looked = now;
                 self.look()?;
                 if now - started >= self.peer_timeout {
-                    self.inquire(started, &mut done)?;
+                    self.inquire(started, &mut find)?;
                     break;
                 }
             }
-            pause((now - began).saturating_sub(awake));
+            pause((now - quiet_since).saturating_sub(awake));
         }
         Ok(began.elapsed())
     }
@@ -126,7 +149,7 @@ impl Watch {
         let since = Instant::now();
         self.stage = Stage::Leaving { since, told: false };
         let mut barrier = self.communicator.barrier();
-        self.wait(since, 0, || barrier.test())?;
+        self.wait(since, 0, || Found::all_if(barrier.test()))?;
         barrier.finish();
         self.flush();
         // Those that came early may have said so to some that never had to look.
@@ -203,8 +226,8 @@ impl Watch {
         }
     }
 
-    /// Asks all others for a sign of life and blames one, unless `done` says yes after all.
-    fn inquire(&mut self, started: Instant, done: &mut impl FnMut() -> bool) -> Result<(), TransportError> {
+    /// Asks all others for a sign of life and blames one, unless everything is found after all.
+    fn inquire(&mut self, started: Instant, find: &mut impl FnMut() -> Found) -> Result<(), TransportError> {
         let asked = Instant::now();
         self.inquiry += 1;
         self.answers.fill(None);
@@ -213,7 +236,7 @@ impl Watch {
         let own = self.communicator.rank();
         let lower_lives = |answers: &[Option<u64>]| answers[..own.index()].iter().any(Option::is_some);
         while asked.elapsed() < ANSWER || lower_lives(&self.answers) && asked.elapsed() < ANSWER + DEFERENCE {
-            if done() {
+            if find() == Found::All {
                 return Ok(());
             }
             self.look()?;

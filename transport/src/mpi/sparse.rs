@@ -10,6 +10,7 @@
 use std::ffi::c_int;
 use std::time::{Duration, Instant};
 
+use super::control::Found;
 use super::raw::{Pending, Place, from_halves};
 use super::session::Session;
 use crate::{Incoming, Outgoing, Rank, TransportError};
@@ -46,20 +47,22 @@ impl Session {
         // What comes is not known; it is about as much as what goes.
         let bytes = 2 * Rank::all(size).map(|to| sent.place_of(to).len()).sum::<usize>();
         let waited = watch.wait(started, bytes, || {
+            let mut found = Found::Nothing;
             while let Some(message) = data.arrived(tag) {
                 places.push((message.from, transfers.receive_arrived(message)));
+                found = Found::Something;
             }
             // All that this rank sends is being received, and all it has seen is here.
             let idle = transfers.test();
             match &mut reduction {
-                Some(reduction) => reduction.test() && idle,
-                None => {
-                    if idle {
-                        reduction = Some(least.of_all(data, word));
-                    }
-                    false
+                Some(reduction) => found = if reduction.test() && idle { Found::All } else { found },
+                None if idle => {
+                    reduction = Some(least.of_all(data, word));
+                    found = Found::Something;
                 }
+                None => {}
             }
+            found
         })?;
         let mut ended = transfers.end();
         let starts = append(&mut ended.incoming, ended.taken, &ended.extra);
