@@ -25,14 +25,23 @@ impl RankProcess {
     /// # Panics
     /// If that cannot be done.
     pub fn signal(&self, signal: &str) {
-        let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {}", self.pid)]).status();
-        assert!(sent.expect("a shell starts").success(), "SIG{signal} could not be sent to {self:?}");
+        send_signal(self.pid, signal);
     }
 
     /// Whether it is there and no mere entry in the table of processes.
     pub fn lives(&self) -> bool {
         is_alive(self.pid)
     }
+}
+
+/// Sends a signal, `INT` for one, to a process.
+///
+/// # Panics
+/// If that cannot be done.
+pub fn send_signal(pid: u32, signal: &str) {
+    // Every shell knows how; a `kill` of its own is not on every system.
+    let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {pid}")]).status();
+    assert!(sent.expect("a shell starts").success(), "SIG{signal} could not be sent to process {pid}");
 }
 
 /// Whether there is such a process that is no mere entry in the table of processes, left because nobody asks for its end.

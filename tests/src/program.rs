@@ -3,6 +3,7 @@
 //! A watched program that does not end is killed and the test fails with what it had said until then. Time limits are
 //! there to turn a hang into a failure and never to measure: they are many times what a slow machine needs.
 
+use crate::processes::send_signal;
 use serde_json::Value;
 use std::fmt;
 use std::io::{BufRead, BufReader, Read};
@@ -216,9 +217,7 @@ impl Running {
     /// If that cannot be done.
     #[cfg(unix)]
     pub fn signal(&self, signal: &str) {
-        // Every shell knows how; a `kill` of its own is not on every system.
-        let sent = Command::new("sh").args(["-c", &format!("kill -{signal} {}", self.child.id())]).status();
-        assert!(sent.expect("a shell starts").success(), "SIG{signal} could not be sent to {}", self.name);
+        send_signal(self.id(), signal);
     }
 
     /// Waits for the program to end.

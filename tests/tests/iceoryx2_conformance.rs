@@ -1,6 +1,6 @@
 //! Ranks as processes that share memory: the conformance suite, and what happens when processes are killed.
 
-use atoll_tests::processes::is_alive;
+use atoll_tests::processes::{is_alive, send_signal};
 use atoll_tests::program::{self, LIMIT};
 use atoll_transport::Rank;
 use atoll_transport::conformance::process::recorded;
@@ -115,7 +115,7 @@ fn eight_processes_conform() {
 /// What ranks in `rounds` have told about themselves.
 struct Told {
     run_folder: PathBuf,
-    processes: Vec<i32>,
+    processes: Vec<u32>,
 }
 
 impl Told {
@@ -145,7 +145,7 @@ impl Told {
     }
 
     fn alive(&self) -> usize {
-        self.processes.iter().filter(|&&process| is_alive(process as u32)).count()
+        self.processes.iter().filter(|&&process| is_alive(process)).count()
     }
 }
 
@@ -161,11 +161,6 @@ fn start_rounds(size: usize, count: u64) -> (TempDir, thread::JoinHandle<Vec<Ran
     (folder, thread)
 }
 
-fn kill(process: i32) {
-    let killed = Command::new("kill").args(["-9", &process.to_string()]).status().expect("kill starts");
-    assert!(killed.success(), "process {process} was there to be killed");
-}
-
 #[test]
 fn a_killed_rank_is_blamed_by_all_and_nothing_is_left() {
     const SIZE: usize = 4;
@@ -177,7 +172,7 @@ fn a_killed_rank_is_blamed_by_all_and_nothing_is_left() {
             let told = Told::by(folder.path(), SIZE);
             assert!(!told.shared_memory().is_empty(), "this test looks for the wrong names");
             sleep(Duration::from_millis(delay));
-            kill(told.processes[victim]);
+            send_signal(told.processes[victim], "KILL");
             let exits = running.join().expect("the launcher does not panic");
             for (rank, exit) in exits.iter().enumerate() {
                 assert!(!exit.killed, "rank {rank} had to be killed, after {delay} ms");

@@ -5,6 +5,7 @@ use atoll_tests::processes::{self, RankProcess, left_in_shared_memory};
 use atoll_tests::program::{Ended, LIMIT, Running};
 use atoll_tests::ways::Way;
 use atoll_tests::world::noise;
+use std::collections::BTreeSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -50,8 +51,7 @@ fn a_rank_that_panics_ends_all_others() {
             let complaint = format!("rank {rank} panicked: as --panic-at asks");
             assert!(ended.stderr.contains(&complaint), "{way}, rank {rank} at step {step}: {ended}");
             assert_eq!(named(&ended, rank), Some(step), "{way}: {ended}");
-            let left = left_in_shared_memory(&before);
-            assert!(left.is_empty(), "{way}: left behind {left:?}");
+            assert_nothing_left(way, &before);
         }
     }
 }
@@ -78,8 +78,7 @@ fn a_rank_that_is_killed_ends_all_others() {
                 assert!(ended.code != Some(0), "{way}: {ended}");
                 assert!(processes::launcher_names(&ended, victim), "{way}: rank {rank} is not named: {ended}");
             }
-            let left = left_in_shared_memory(&before);
-            assert!(left.is_empty(), "{way}: left behind {left:?}");
+            assert_nothing_left(way, &before);
         }
     }
 }
@@ -99,9 +98,13 @@ fn a_rank_that_hangs_is_given_up() {
         let lines = ended.complaints().into_iter().filter(|line| line.contains(" was lost after ")).count();
         assert_eq!(lines, 1, "{way}: one for all, of whoever found it out: {ended}");
         wait_for_end(&ranks);
-        let left = left_in_shared_memory(&before);
-        assert!(left.is_empty(), "{way}: left behind {left:?}");
+        assert_nothing_left(way, &before);
     }
+}
+
+fn assert_nothing_left(way: Way, before: &BTreeSet<String>) {
+    let left = left_in_shared_memory(before);
+    assert!(left.is_empty(), "{way}: left behind {left:?}");
 }
 
 fn wait_for_end(ranks: &[RankProcess]) {

@@ -59,6 +59,16 @@ impl Method {
         }
     }
 
+    /// What the program calls the transport; the comparisons are none of its.
+    fn transport(self) -> Option<&'static str> {
+        match self {
+            Self::Memcpy | Self::PingPong => None,
+            Self::Channel => Some("channel"),
+            Self::Iceoryx2 => Some("iceoryx2"),
+            Self::Alltoallv | Self::Sparse => Some("mpi"),
+        }
+    }
+
     /// The one of that name.
     pub fn of_name(name: &str) -> Option<Self> {
         let all = [Self::Memcpy, Self::PingPong, Self::Channel, Self::Iceoryx2, Self::Alltoallv, Self::Sparse];

@@ -22,15 +22,8 @@ struct Run {
 /// # Errors
 /// If a run fails or results differ.
 pub fn compare(repeats: u64, steps: u64) -> Result<(), String> {
-    let mut ways = vec![(ALONE, Method::Channel), ("channel", Method::Channel)];
-    ways.extend(
-        [("iceoryx2", Method::Iceoryx2), ("mpi", Method::Alltoallv)]
-            .iter()
-            .filter(|way| Method::all().contains(&way.1)),
-    );
-    if Method::all().contains(&Method::Sparse) {
-        ways.push(("mpi", Method::Sparse));
-    }
+    let mut ways = vec![(ALONE, Method::Channel)];
+    ways.extend(Method::all().into_iter().filter_map(|method| Some((method.transport()?, method))));
     let mut runs: Vec<Vec<Run>> = ways.iter().map(|_| Vec::new()).collect();
     for _ in 0..repeats {
         for (runs, &(transport, method)) in runs.iter_mut().zip(&ways) {
