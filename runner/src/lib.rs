@@ -34,6 +34,7 @@ pub mod summary;
 pub mod telemetry;
 pub mod tiles;
 pub mod timings;
+pub mod trajectory;
 
 pub use config::Config;
 pub use error::RunError;

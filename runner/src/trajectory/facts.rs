@@ -1,0 +1,111 @@
+//! What every file of a recording says about the run it is of.
+
+use crate::plan::Plan;
+use glam::DVec2;
+use std::str::FromStr;
+
+/// Grows when older programs could no longer read a recording.
+const FORMAT: &str = "1";
+
+/// The run a recording is of. In a file's metadata each is a text under its name, with `atoll.` in front.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Facts {
+    /// Version of the program that recorded.
+    pub version: String,
+    /// Kind of scene.
+    pub scene: String,
+    /// Its seed.
+    pub seed: u64,
+    /// Steps from one record to the next.
+    pub record_every: u64,
+    /// Low and high corner of the domain, in m.
+    pub domain: [DVec2; 2],
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// The configuration, as TOML.
+    pub config: String,
+    /// What the result depends on, as lines of `key = value`.
+    pub canonical: String,
+}
+
+impl Facts {
+    /// Those of a run. `config` is its configuration as TOML.
+    pub fn new(plan: &Plan, record_every: u64, config: String) -> Self {
+        let (low, high) = plan.scene.domain();
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: plan.config.scene.kind.name().to_owned(),
+            seed: plan.config.scene.seed,
+            record_every,
+            domain: [low, high],
+            tiles: plan.tiles,
+            config,
+            canonical: plan.config.canonical(plan.tiles),
+        }
+    }
+
+    /// As names and texts.
+    pub(super) fn to_pairs(&self) -> Vec<(String, String)> {
+        let [low, high] = self.domain;
+        let [columns, rows] = self.tiles;
+        let pairs = [
+            ("format", FORMAT.to_owned()),
+            ("version", self.version.clone()),
+            ("scene", self.scene.clone()),
+            ("seed", self.seed.to_string()),
+            ("record_every", self.record_every.to_string()),
+            // The shortest decimals that lead back to the same bits.
+            ("domain", format!("{} {} {} {}", low.x, low.y, high.x, high.y)),
+            ("tiles", format!("{columns}x{rows}")),
+            ("config", self.config.clone()),
+            ("canonical", self.canonical.clone()),
+        ];
+        pairs.map(|(name, text)| (format!("atoll.{name}"), text)).into()
+    }
+
+    /// From what a file says, by name. The error is what is wrong with it.
+    pub(super) fn from_texts<'a>(text: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
+        let format: String = parse(&text, "format")?;
+        if format != FORMAT {
+            return Err(format!("its format is {format}, and this program reads {FORMAT}"));
+        }
+        let numbers: String = parse(&text, "domain")?;
+        let numbers: Option<Vec<f64>> = numbers.split(' ').map(|number| number.parse().ok()).collect();
+        let Some(&[x0, y0, x1, y1]) = numbers.as_deref() else { return Err("atoll.domain is unreadable".to_owned()) };
+        let tiles: String = parse(&text, "tiles")?;
+        let tiles = tiles.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
+        let facts = Self {
+            version: parse(&text, "version")?,
+            scene: parse(&text, "scene")?,
+            seed: parse(&text, "seed")?,
+            record_every: parse::<u32>(&text, "record_every")?.into(),
+            domain: [DVec2::new(x0, y0), DVec2::new(x1, y1)],
+            tiles: tiles.ok_or("atoll.tiles is unreadable")?,
+            config: parse(&text, "config")?,
+            canonical: parse(&text, "canonical")?,
+        };
+        if facts.record_every == 0 { Err("atoll.record_every is 0".to_owned()) } else { Ok(facts) }
+    }
+
+    /// In what two segments differ that cannot be of one run. A run that was taken up again may have been given more
+    /// steps, and a newer program.
+    pub(super) fn other_run(&self, other: &Self) -> Option<&'static str> {
+        let lasting = |facts: &Self| {
+            let lines = facts.canonical.lines().filter(|line| !line.starts_with("steps = "));
+            lines.map(str::to_owned).collect::<Vec<_>>()
+        };
+        if self.record_every != other.record_every {
+            Some("record_every")
+        } else if self.domain != other.domain || self.tiles != other.tiles || lasting(self) != lasting(other) {
+            Some("the configuration")
+        } else {
+            None
+        }
+    }
+}
+
+/// The fact of that name, read from its text.
+pub(super) fn parse<'a, T: FromStr>(text: impl Fn(&str) -> Option<&'a str>, name: &str) -> Result<T, String> {
+    let text = text(name).ok_or_else(|| format!("it has no atoll.{name}, which Atoll writes to every segment"))?;
+    text.parse().map_err(|_| format!("atoll.{name} is unreadable"))
+}

@@ -1,0 +1,220 @@
+//! Reads one segment, and trusts nothing in it.
+//!
+//! The Parquet library takes a page's word for its length, and panics on some pages that no writer makes. So what the footer
+//! says is checked against itself and the file, and the bytes of a record against their checksum, before any page is looked
+//! at.
+
+use super::error::reason;
+use super::facts::{Facts, parse};
+use super::record::Row;
+use super::{TrajectoryError, layout, steps_of_segment};
+use parquet::column::reader::ColumnReaderImpl;
+use parquet::data_type::{DataType, DoubleType, FloatType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::serialized_reader::SerializedPageReader;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use xxhash_rust::xxh3::Xxh3Default;
+
+/// Values decoded at a time.
+const CHUNK: usize = 4096;
+
+/// Where the first record starts: behind the letters that every Parquet file starts with.
+const START: u64 = 4;
+
+/// A complete segment.
+pub(super) struct Segment {
+    pub(super) path: PathBuf,
+    pub(super) facts: Facts,
+    pub(super) rank: u32,
+    pub(super) ranks: u32,
+    pub(super) records: Vec<RecordEntry>,
+    file: Arc<File>,
+    metadata: ParquetMetaData,
+}
+
+/// A record, as the metadata tells of it.
+pub(super) struct RecordEntry {
+    pub(super) step: u64,
+    pub(super) rows: u64,
+    /// Its row group, if it has any rows.
+    group: usize,
+    /// Of the bytes of its row group.
+    checksum: u64,
+}
+
+impl Segment {
+    /// Reads what a file says about itself, and none of its rows.
+    pub(super) fn open(path: &Path) -> Result<Self, TrajectoryError> {
+        let bad = |reason| TrajectoryError::BadSegment { path: path.to_owned(), reason };
+        let failed = |error: io::Error| TrajectoryError::Read { path: path.to_owned(), reason: error.to_string() };
+        let file = File::open(path).map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len();
+        let metadata = ParquetMetaDataReader::new().parse_and_finish(&file).map_err(|error| bad(reason(&error)))?;
+        if metadata.file_metadata().schema() != layout::schema().as_ref() {
+            return Err(bad("it has other columns".to_owned()));
+        }
+        let pairs = metadata.file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
+        let text = |name: &str| {
+            let pair = pairs.iter().find(|pair| pair.key.strip_prefix("atoll.") == Some(name));
+            pair.and_then(|pair| pair.value.as_deref())
+        };
+        let facts = Facts::from_texts(text).map_err(bad)?;
+        let (rank, ranks) = (parse(text, "rank").map_err(bad)?, parse(text, "ranks").map_err(bad)?);
+        let steps: String = parse(text, "steps").map_err(bad)?;
+        let records = entries(&steps).ok_or("atoll.steps is unreadable").map_err(|text| bad(text.to_owned()))?;
+        let segment = Self { path: path.to_owned(), facts, rank, ranks, records, file: Arc::new(file), metadata };
+        segment.check(length).map_err(|reason| bad(reason.to_owned()))?;
+        Ok(segment)
+    }
+
+    /// Whether all that the metadata says can be.
+    fn check(&self, length: u64) -> Result<(), &'static str> {
+        let (first, last) = self.records.first().zip(self.records.last()).ok_or("it holds no record")?;
+        let name = self.path.file_name().and_then(|name| name.to_str());
+        if name.and_then(steps_of_segment) != Some((first.step, last.step)) {
+            return Err("it holds other steps than its name says");
+        }
+        if self.rank >= self.ranks {
+            return Err("its rank is none of the run's");
+        }
+        if !self.records.is_sorted_by(|a, b| a.step < b.step) {
+            return Err("its steps do not ascend");
+        }
+        if self.records.iter().any(|record| record.step % self.facts.record_every != 0) {
+            return Err("it holds a step that was not to be recorded");
+        }
+        let rows = self.records.iter().map(|record| record.rows).filter(|rows| *rows > 0);
+        let groups = self.metadata.row_groups();
+        if !rows.eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
+            return Err("it holds other row groups than it says");
+        }
+        let mut at = START;
+        for group in groups {
+            at = range(group, at).filter(|range| range.end <= length).ok_or("its columns do not lie as written")?.end;
+        }
+        Ok(())
+    }
+
+    /// Appends the rows of a record to `rows`.
+    pub(super) fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), TrajectoryError> {
+        let bad = |reason| TrajectoryError::BadSegment { path: self.path.clone(), reason };
+        let record = self.records.iter().find(|record| record.step == step);
+        let record = record.ok_or_else(|| bad(format!("it no longer holds step {step}")))?;
+        if record.rows == 0 {
+            return Ok(());
+        }
+        let checksum = self.checksum(record.group);
+        let checksum =
+            checksum.map_err(|error| TrajectoryError::Read { path: self.path.clone(), reason: error.to_string() })?;
+        if checksum != record.checksum {
+            return Err(bad(format!("the bytes of step {step} are not those that were written")));
+        }
+        self.decode(record, rows).map_err(|error| bad(format!("step {step}: {}", reason(&error))))
+    }
+
+    /// Of the bytes of a row group.
+    fn checksum(&self, group: usize) -> io::Result<u64> {
+        let groups = self.metadata.row_groups();
+        let end = |at, group| range(group, at).map_or(at, |range| range.end);
+        let start = groups[..group].iter().fold(START, end);
+        let mut file = self.file.as_ref();
+        file.seek(SeekFrom::Start(start))?;
+        let mut bytes = file.take(end(start, &groups[group]) - start);
+        let mut hash = Xxh3Default::new();
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            match bytes.read(&mut buffer)? {
+                0 => return Ok(hash.digest()),
+                read => hash.update(&buffer[..read]),
+            }
+        }
+    }
+
+    fn decode(&self, record: &RecordEntry, rows: &mut Vec<Row>) -> Result<(), ParquetError> {
+        let first = rows.len();
+        // Made one by one as ids are read, so that no count is trusted further than there are ids.
+        self.column::<Int64Type>(record, 1, |_, ids| {
+            rows.extend(ids.iter().map(|&id| Row { id: id.cast_unsigned(), ..Row::default() }));
+        })?;
+        let rows = &mut rows[first..];
+        self.fill::<DoubleType>(record, 2, rows, |row, x| row.x = x)?;
+        self.fill::<DoubleType>(record, 3, rows, |row, y| row.y = y)?;
+        self.fill::<FloatType>(record, 4, rows, |row, angle| row.angle = angle)?;
+        self.fill::<FloatType>(record, 5, rows, |row, vx| row.vx = vx)?;
+        self.fill::<FloatType>(record, 6, rows, |row, vy| row.vy = vy)?;
+        self.fill::<FloatType>(record, 7, rows, |row, omega| row.omega = omega)
+    }
+
+    /// Gives each row its value of a column.
+    fn fill<T: DataType<T: Copy>>(
+        &self,
+        record: &RecordEntry,
+        column: usize,
+        rows: &mut [Row],
+        set: impl Fn(&mut Row, T::T),
+    ) -> Result<(), ParquetError> {
+        self.column::<T>(record, column, |first, values| {
+            rows[first..].iter_mut().zip(values).for_each(|(row, &value)| set(row, value));
+        })
+    }
+
+    /// Hands out all values of a column, a part at a time, with the number of the first.
+    fn column<T: DataType>(
+        &self,
+        record: &RecordEntry,
+        column: usize,
+        mut take: impl FnMut(usize, &[T::T]),
+    ) -> Result<(), ParquetError> {
+        let (column, rows) = (self.metadata.row_group(record.group).column(column), record.rows as usize);
+        let pages = SerializedPageReader::new(self.file.clone(), column, rows, None)?;
+        let mut reader = ColumnReaderImpl::<T>::new(column.column_descr_ptr(), Box::new(pages));
+        let mut values = Vec::with_capacity(CHUNK);
+        let mut first = 0;
+        while first < rows {
+            values.clear();
+            reader.read_records(CHUNK.min(rows - first), None, None, &mut values)?;
+            if values.is_empty() {
+                let name = column.column_path();
+                return Err(ParquetError::General(format!("column {name} ends after {first} of {rows} rows")));
+            }
+            take(first, &values);
+            first += values.len();
+        }
+        Ok(())
+    }
+}
+
+/// The records, as a text: step, rows and checksum of each.
+fn entries(text: &str) -> Option<Vec<RecordEntry>> {
+    let mut group = 0;
+    let entries = text.split(' ').map(|entry| {
+        let mut parts = entry.split(':');
+        let step: u32 = parts.next()?.parse().ok()?;
+        let rows = parts.next()?.parse().ok()?;
+        let checksum = u64::from_str_radix(parts.next()?, 16).ok()?;
+        let entry = RecordEntry { step: step.into(), rows, group, checksum };
+        group += usize::from(rows > 0);
+        parts.next().is_none().then_some(entry)
+    });
+    entries.collect()
+}
+
+/// The bytes of a row group that starts at `start`, if its columns lie there as the writer puts them.
+fn range(group: &RowGroupMetaData, start: u64) -> Option<Range<u64>> {
+    let mut at = start;
+    for column in group.columns() {
+        let first = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
+        let alike = column.num_values() == group.num_rows()
+            && column.compression() == layout::compression(column.column_path());
+        if u64::try_from(first).ok()? != at || !alike {
+            return None;
+        }
+        at = at.checked_add(u64::try_from(column.compressed_size()).ok()?)?;
+    }
+    Some(start..at)
+}
