@@ -106,6 +106,16 @@ impl Header {
         Ok(header)
     }
 
+    fn saved(&self, tile: TileId) -> SavedTile {
+        SavedTile {
+            tile,
+            length: self.length() as usize,
+            bodies: u64::from(self.bodies),
+            contacts: u64::from(self.contacts),
+            hashes: self.hashes(),
+        }
+    }
+
     fn hashes(&self) -> Hashes {
         Hashes { state: self.state, contact: self.contact }
     }
@@ -119,6 +129,16 @@ impl Header {
             (self.contacts, size_of::<PairKey>() + size_of::<Contact>()),
         ];
         arrays.iter().fold(HEADER as u64, |sum, &(count, size)| sum + u64::from(count) * size as u64)
+    }
+}
+
+impl SavedTile {
+    /// What a block tells of itself, once it is seen to be what was saved of a tile, whole and unchanged.
+    ///
+    /// # Errors
+    /// If it is not.
+    pub fn read(tile: TileId, block: &[u8]) -> Result<Self, RestoreError> {
+        Ok(Header::read(tile, block)?.saved(tile))
     }
 }
 
@@ -190,13 +210,6 @@ fn length(tile: &Tile) -> usize {
 
 fn save(tile: &Tile, block: &mut [u8]) -> SavedTile {
     let mut header = Header::of(tile);
-    let saved = SavedTile {
-        tile: tile.id,
-        length: block.len(),
-        bodies: u64::from(header.bodies),
-        contacts: u64::from(header.contacts),
-        hashes: header.hashes(),
-    };
     let mut at = HEADER;
     for column in columns(tile) {
         block[at..at + column.len()].copy_from_slice(column);
@@ -205,7 +218,7 @@ fn save(tile: &Tile, block: &mut [u8]) -> SavedTile {
     block[..HEADER].copy_from_slice(bytemuck::bytes_of(&header));
     header.checksum = checksum(block);
     block[..HEADER].copy_from_slice(bytemuck::bytes_of(&header));
-    saved
+    header.saved(tile.id)
 }
 
 fn checksum(block: &[u8]) -> u64 {

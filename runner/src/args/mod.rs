@@ -26,6 +26,8 @@ pub struct Cli {
 pub enum Command {
     /// Run a scene and report what became of it.
     Run(RunArgs),
+    /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
+    Info(InfoArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

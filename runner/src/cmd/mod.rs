@@ -1,5 +1,6 @@
 //! The verbs of the program, one file each.
 
+pub mod info;
 pub mod run;
 
 use crate::args::{self, Cli, Command};
@@ -18,6 +19,7 @@ pub fn main() -> ExitCode {
     };
     let result = telemetry::init().and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
+        Command::Info(args) => info::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

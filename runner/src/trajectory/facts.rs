@@ -91,7 +91,7 @@ impl Facts {
     /// steps, and a newer program.
     pub(super) fn other_run(&self, other: &Self) -> Option<&'static str> {
         let lasting = |facts: &Self| {
-            let lines = facts.canonical.lines().filter(|line| !line.starts_with("steps = "));
+            let lines = facts.canonical.lines().filter(|line| !line.starts_with("run.steps = "));
             lines.map(str::to_owned).collect::<Vec<_>>()
         };
         if self.record_every != other.record_every {
