@@ -25,7 +25,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a scene and report what became of it.
-    Run(RunArgs),
+    Run(Box<RunArgs>),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
 }
