@@ -9,7 +9,7 @@ const FORMAT: &str = "1";
 
 /// The run a recording is of. In a file's metadata each is a text under its name, with `atoll.` in front.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Facts {
+pub struct RunFacts {
     /// Version of the program that recorded.
     pub version: String,
     /// Kind of scene.
@@ -28,7 +28,7 @@ pub struct Facts {
     pub canonical: String,
 }
 
-impl Facts {
+impl RunFacts {
     /// Those of a run. `config` is its configuration as TOML.
     pub fn new(plan: &Plan, record_every: u64, config: String) -> Self {
         let (low, high) = plan.scene.domain();

@@ -1,13 +1,13 @@
 //! Small recordings for tests.
 
-use super::{Facts, Record, TrajectoryWriter, rank_folder};
+use super::{Record, RunFacts, TrajectoryWriter, rank_folder};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use std::path::Path;
 
 /// The facts of a run on 4 x 2 tiles of 10 m.
-pub(crate) fn facts(record_every: u64) -> Facts {
-    Facts {
+pub(crate) fn facts(record_every: u64) -> RunFacts {
+    RunFacts {
         version: "1.2.3".to_owned(),
         scene: "rooms".to_owned(),
         seed: 7,
@@ -40,7 +40,7 @@ pub(crate) fn bodies(step: u64) -> Vec<Body> {
 /// Records these steps of a run of so many ranks: `bodies` gives the bodies after a step, which are dealt out to the ranks.
 pub(crate) fn record(
     folder: &Path,
-    facts: &Facts,
+    facts: &RunFacts,
     ranks: u32,
     steps: impl Iterator<Item = u64> + Clone,
     bodies: impl Fn(u64) -> Vec<Body>,
