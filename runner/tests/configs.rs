@@ -1,6 +1,7 @@
 //! The configurations that come with the program can all be run.
 
 use atoll::Config;
+use atoll::config::OutputConfig;
 use std::path::{Path, PathBuf};
 
 fn files() -> Vec<PathBuf> {
@@ -37,5 +38,9 @@ fn what_the_full_example_comments_out_are_the_defaults() {
     assert!(uncommented.iter().filter(|line| line.starts_with("margin_cap")).count() == 1);
     // Spelt out, it says what the default would have chosen.
     implicit.run.transport = Some(implicit.transport());
+    // By default there are none, and that no number can say.
+    assert!(explicit.output.record_every.is_some() && explicit.output.checkpoint_every.is_some());
+    assert_eq!(implicit.output, OutputConfig::default());
+    implicit.output = explicit.output;
     assert_eq!(explicit, implicit);
 }

@@ -211,13 +211,18 @@ fn configurations_that_cannot_be_read_are_named() {
     file_refused("", ": scene.kind is missing");
 }
 
-/// What a later version brings is told apart from what nobody ever heard of, and something that works is named.
 #[test]
-fn what_is_not_built_yet_says_what_to_use() {
-    for (options, named, instead) in
-        [("--out records", "--out records", "--json FILE"), ("--record-every 5", "--record-every 5", "--json FILE")]
-    {
-        refused(options, &format!("{named}: not built into this version yet; use {instead}"));
+fn options_for_a_folder_need_one() {
+    let folder = "the following required arguments were not provided: <--out <DIR>|--resume <DIR>>";
+    for option in ["--record-every 5", "--checkpoint-every 5", "--restarts 1"] {
+        refused(option, folder);
+    }
+    refused("--overwrite", "the following required arguments were not provided: --out <DIR>");
+    refused("--out a --resume a", "the argument '--out <DIR>' cannot be used with '--resume <DIR>'");
+    let must = "must be a whole number within 1 to 4294967295";
+    for (key, option) in [("record_every", "--record-every"), ("checkpoint_every", "--checkpoint-every")] {
+        refused(&format!("--out a {option} 0"), &format!("{option} 0: {must}"));
+        refused(&format!("--set {key}=1.5"), &format!("--set output.{key}=1.5: {must}"));
     }
 }
 
@@ -511,6 +516,10 @@ fn help_and_version() {
         "--set",
         "--out",
         "--record-every",
+        "--checkpoint-every",
+        "--overwrite",
+        "--resume",
+        "--restarts",
         "--json",
         "--timings",
     ] {

@@ -7,6 +7,7 @@ use crate::error::{Exit, RunError};
 use crate::telemetry;
 use clap::Parser;
 use clap::error::ErrorKind;
+use std::env;
 use std::process::ExitCode;
 
 /// Reads the command line and does what it says.
@@ -36,7 +37,7 @@ fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Done } as u8)
         }
         _ => {
-            telemetry::complain(&args::one_line(error));
+            telemetry::complain(&args::one_line(error, env::args_os().nth(1).as_deref()));
             ExitCode::from(Exit::Usage as u8)
         }
     }

@@ -37,7 +37,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     tell(&plan);
     #[cfg(feature = "iceoryx2")]
     if plan.transport == TransportKind::Iceoryx2 {
-        return conclude(&backend::iceoryx2::run(&plan, &args.config)?, &outputs);
+        return conclude(&backend::iceoryx2::run(&plan, config_path(args))?, &outputs);
     }
     let stop = StopFlag::on_signals(true, || std::process::exit(Exit::Interrupted as i32));
     let summary = backend::run(&plan, &Observer { stop, ..observer(args) })?;
@@ -45,7 +45,11 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
 }
 
 fn load(args: &RunArgs) -> Result<Config, RunError> {
-    Ok(Config::load(&args.config, &args.overrides()?)?)
+    Ok(Config::load(config_path(args), &args.overrides()?)?)
+}
+
+fn config_path(args: &RunArgs) -> &Path {
+    args.config.as_deref().or(args.resume.as_deref()).unwrap_or(Path::new(""))
 }
 
 fn observer(args: &RunArgs) -> Observer {

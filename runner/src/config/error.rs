@@ -130,14 +130,6 @@ pub enum ConfigError {
         /// The nearest allowed word, if any is near.
         suggestion: Option<String>,
     },
-    /// A value that a later version brings.
-    #[error("{place}: not built into this version yet; use {instead}")]
-    NotYet {
-        /// The value.
-        place: Place,
-        /// What works today.
-        instead: String,
-    },
     /// A transport that this program was built without.
     #[error(
         "{place}: this program was built without it; build it again with `cargo build --release --features {feature}`, \

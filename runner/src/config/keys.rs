@@ -47,10 +47,12 @@ pub(super) const KEYS: &[&str] = &[
     "physics.sleep",
     "physics.sleep_speed",
     "physics.sleep_time",
+    "output.record_every",
+    "output.checkpoint_every",
 ];
 
 /// The sections of a file.
-pub(super) const SECTIONS: &[&str] = &["scene", "run", "physics"];
+pub(super) const SECTIONS: &[&str] = &["scene", "run", "physics", "output"];
 
 /// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
 const SIMILAR: f64 = 0.6;

@@ -1,21 +1,25 @@
 //! What to run: the scene, the physics, and how to spread it. Read from TOML, with the command line winning over it.
 //!
-//! To add a key, name it in `keys.rs` and read it in `Config::read`; anything not named there is refused.
+//! To add a key, name it in `keys.rs`, read it in `Config::read`, and give it out again in `Config::entries`; anything
+//! not named there is refused.
 
+mod difference;
 mod error;
 mod keys;
+mod resolved;
 mod scene;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod words;
 
+pub use difference::{Difference, differences};
 pub use error::{ConfigError, OneLine, Origin, Place};
 pub use scene::{SceneConfig, SceneKind};
 pub use settings::Override;
 
-use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, SetupError, Solver};
+use atoll_core::{Params, SetupError};
 use settings::Settings;
-use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
@@ -31,6 +35,8 @@ pub struct Config {
     pub run: RunConfig,
     /// The numbers of a step.
     pub params: Params,
+    /// What is written while it runs.
+    pub output: OutputConfig,
 }
 
 /// `[run]`
@@ -52,6 +58,15 @@ pub struct RunConfig {
     pub peer_timeout: Duration,
     /// How ranks exchange messages with transport mpi.
     pub mpi_exchange: MpiExchange,
+}
+
+/// `[output]`: of runs that were given a folder for it.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct OutputConfig {
+    /// The bodies are recorded every so many steps; `None` records nothing.
+    pub record_every: Option<u64>,
+    /// A snapshot to go on from is written every so many steps; `None` writes none.
+    pub checkpoint_every: Option<u64>,
 }
 
 /// How ranks exchange messages over MPI. Both ways give the same bits.
@@ -87,14 +102,6 @@ impl TransportKind {
             Self::Mpi => "mpi",
         }
     }
-
-    /// All of them by name.
-    const WORDS: [(&'static str, Self); 4] = [
-        (Self::Local.name(), Self::Local),
-        (Self::Channel.name(), Self::Channel),
-        (Self::Iceoryx2.name(), Self::Iceoryx2),
-        (Self::Mpi.name(), Self::Mpi),
-    ];
 
     /// Whether this program was built with it.
     pub fn is_built_in(self) -> bool {
@@ -135,8 +142,9 @@ impl Config {
         let scene = SceneConfig::read(&mut settings)?;
         let run = read_run(&mut settings)?;
         let params = read_params(&mut settings, scene.kind)?;
+        let output = read_output(&mut settings)?;
         settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
-        Ok(Self { scene, run, params })
+        Ok(Self { scene, run, params, output })
     }
 
     /// The transport that was chosen, or the one that suits the number of ranks.
@@ -144,74 +152,13 @@ impl Config {
         let suitable = if self.run.ranks == 1 { TransportKind::Local } else { TransportKind::Channel };
         self.run.transport.unwrap_or(suitable)
     }
-
-    /// Everything that the result depends on, in a fixed order: not ranks, threads or transport, nor the ways of
-    /// computing that change no bit. `tiles` is the grid that is really used.
-    pub fn canonical(&self, tiles: [u32; 2]) -> String {
-        let SceneConfig { kind, bodies, seed } = self.scene;
-        // By name, so that a parameter added later cannot be forgotten here.
-        let Params {
-            dt,
-            substeps,
-            gravity,
-            linear_damping,
-            angular_damping,
-            max_linear_speed,
-            max_angular_speed,
-            contact_hertz,
-            contact_damping_ratio,
-            push_out_speed,
-            speculative_distance,
-            recycle_distance,
-            restitution_threshold,
-            margin_floor,
-            margin_cap,
-            sort_interval,
-            exchange,
-            broad_phase: _,
-            solver,
-            iterations,
-            baumgarte,
-            linear_slop,
-            island_search: _,
-            parallel: _,
-            ghosts,
-            sleep,
-            sleep_speed,
-            sleep_time,
-        } = &self.params;
-        let mut text = String::new();
-        macro_rules! line {
-            ($($name:ident = $value:expr),* $(,)?) => {
-                $(writeln!(text, "{} = {:?}", stringify!($name), $value).expect("a string takes any text");)*
-            };
-        }
-        line!(kind = kind, bodies = bodies, seed = seed, steps = self.run.steps, tiles = tiles);
-        line!(dt = dt, substeps = substeps, gravity = gravity.to_array());
-        line!(linear_damping = linear_damping, angular_damping = angular_damping);
-        line!(max_linear_speed = max_linear_speed, max_angular_speed = max_angular_speed);
-        line!(contact_hertz = contact_hertz, contact_damping_ratio = contact_damping_ratio);
-        line!(push_out_speed = push_out_speed);
-        line!(speculative_distance = speculative_distance, recycle_distance = recycle_distance);
-        line!(restitution_threshold = restitution_threshold);
-        line!(margin_floor = margin_floor, margin_cap = margin_cap, sort_interval = sort_interval);
-        line!(exchange = exchange, ghosts = ghosts, solver = solver);
-        line!(iterations = iterations, baumgarte = baumgarte, linear_slop = linear_slop);
-        line!(sleep = sleep, sleep_speed = sleep_speed, sleep_time = sleep_time);
-        text
-    }
-
-    /// A fingerprint of [`canonical`](Self::canonical): 32 hexadecimal digits, the same for runs that must agree.
-    pub fn hash(&self, tiles: [u32; 2]) -> String {
-        format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
-    }
 }
 
 fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
     let ranks_asked_for = settings.place("run.ranks").is_some_and(|place| !matches!(place.origin, Origin::File(_)));
-    let transport = settings.choice("run.transport", &TransportKind::WORDS)?;
+    let transport = settings.choice("run.transport", words::TRANSPORT)?;
     if let Some(kind) = transport.filter(|kind| !kind.is_built_in()) {
         let place = settings.place("run.transport").expect("it was given").clone();
         return Err(ConfigError::NotBuiltIn { place, feature: kind.name() });
@@ -226,8 +173,7 @@ fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
     }
     let tiles = settings.tiles("run.tiles", MOST_TILES)?;
     let peer_timeout = Duration::from_secs_f64(settings.number("run.peer_timeout", 0.001..=1e6, 30.0)?);
-    let exchanges = [("alltoallv", MpiExchange::Alltoallv), ("sparse", MpiExchange::Sparse)];
-    let mpi_exchange = settings.choice("run.mpi_exchange", &exchanges)?.unwrap_or_default();
+    let mpi_exchange = settings.choice("run.mpi_exchange", words::MPI_EXCHANGE)?.unwrap_or_default();
     Ok(RunConfig { steps, ranks, ranks_asked_for, threads, transport, tiles, peer_timeout, mpi_exchange })
 }
 
@@ -251,48 +197,29 @@ fn read_params(settings: &mut Settings, scene: SceneKind) -> Result<Params, Conf
         margin_floor: settings.float("physics.margin_floor", usual.margin_floor)?,
         margin_cap: settings.float("physics.margin_cap", usual.margin_cap)?,
         sort_interval: settings.integer("physics.sort_interval", whole.clone(), usual.sort_interval.into())? as u32,
-        exchange: settings
-            .choice("physics.exchange", &[("step", Exchange::Step), ("substep", Exchange::Substep)])?
-            .unwrap_or(usual.exchange),
-        broad_phase: settings
-            .choice("physics.broad_phase", &[("grid", BroadPhase::Grid), ("quadtree", BroadPhase::Quadtree)])?
-            .unwrap_or(usual.broad_phase),
-        solver: settings
-            .choice("physics.solver", &[("soft-step", Solver::SoftStep), ("pgs", Solver::Pgs)])?
-            .unwrap_or(usual.solver),
+        exchange: settings.choice("physics.exchange", words::EXCHANGE)?.unwrap_or(usual.exchange),
+        broad_phase: settings.choice("physics.broad_phase", words::BROAD_PHASE)?.unwrap_or(usual.broad_phase),
+        solver: settings.choice("physics.solver", words::SOLVER)?.unwrap_or(usual.solver),
         iterations: settings.integer("physics.iterations", whole, usual.iterations.into())? as u32,
         baumgarte: settings.float("physics.baumgarte", usual.baumgarte)?,
         linear_slop: settings.float("physics.linear_slop", usual.linear_slop)?,
-        island_search: settings
-            .choice(
-                "physics.islands",
-                &[
-                    ("union-find", IslandSearch::UnionFind),
-                    ("dfs", IslandSearch::Dfs),
-                    ("parallel-union-find", IslandSearch::ParallelUnionFind),
-                ],
-            )?
-            .unwrap_or(usual.island_search),
-        parallel: settings
-            .choice(
-                "physics.parallel",
-                &[
-                    ("serial", Parallel::Serial),
-                    ("islands", Parallel::Islands),
-                    ("coloring", Parallel::Coloring),
-                    ("auto", Parallel::Auto),
-                ],
-            )?
-            .unwrap_or(usual.parallel),
-        ghosts: settings
-            .choice("physics.ghosts", &[("dynamic", Ghosts::Dynamic), ("frozen", Ghosts::Frozen)])?
-            .unwrap_or(usual.ghosts),
+        island_search: settings.choice("physics.islands", words::ISLANDS)?.unwrap_or(usual.island_search),
+        parallel: settings.choice("physics.parallel", words::PARALLEL)?.unwrap_or(usual.parallel),
+        ghosts: settings.choice("physics.ghosts", words::GHOSTS)?.unwrap_or(usual.ghosts),
         sleep: settings.flag("physics.sleep", usual.sleep)?,
         sleep_speed: settings.float("physics.sleep_speed", usual.sleep_speed)?,
         sleep_time: settings.float("physics.sleep_time", usual.sleep_time)?,
     };
     params.check().map_err(|error| refused_param(settings, error))?;
     Ok(params)
+}
+
+fn read_output(settings: &mut Settings) -> Result<OutputConfig, ConfigError> {
+    let mut every = |key| settings.optional_integer(key, 1..=u64::from(u32::MAX));
+    Ok(OutputConfig {
+        record_every: every("output.record_every")?,
+        checkpoint_every: every("output.checkpoint_every")?,
+    })
 }
 
 /// The core's refusal of a parameter, in terms of the key that gave it.

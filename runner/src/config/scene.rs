@@ -1,10 +1,12 @@
 //! The section `[scene]`: which scene, how large, and what only it has.
 
 use super::error::ConfigError;
+use super::resolved::whole;
 use super::settings::{Settings, one_of};
 use crate::scene::{rooms, sparse};
 use atoll_core::{Exchange, Params};
 use glam::Vec2;
+use toml::Value;
 
 /// More bodies than this are taken for a slip of the finger.
 const MOST_BODIES: u64 = 10_000_000_000;
@@ -98,6 +100,26 @@ impl SceneConfig {
         let bodies = settings.integer("scene.bodies", least..=MOST_BODIES, usual)?;
         let seed = settings.integer("scene.seed", 0..=i64::MAX as u64, 1)?;
         Ok(Self { kind, bodies, seed })
+    }
+
+    /// Every key of this scene, with its value.
+    pub(super) fn entries(&self) -> Vec<(&'static str, Value)> {
+        let Self { kind, bodies, seed } = *self;
+        let mut entries = vec![
+            ("scene.kind", Value::from(kind.name())),
+            ("scene.bodies", whole(bodies)),
+            ("scene.seed", whole(seed)),
+        ];
+        match kind {
+            SceneKind::Rooms { power } => entries.push(("scene.power", power.into())),
+            SceneKind::Pile { jitter } => entries.push(("scene.jitter", jitter.into())),
+            SceneKind::Pyramids { base } => entries.push(("scene.base", whole(base))),
+            SceneKind::Sparse | SceneKind::SingleIsland | SceneKind::Stack => {}
+            SceneKind::Slope { angle, friction } => {
+                entries.extend([("scene.angle", angle.into()), ("scene.friction", friction.into())]);
+            }
+        }
+        entries
     }
 }
 

@@ -136,9 +136,18 @@ impl Settings {
         range: RangeInclusive<u64>,
         default: u64,
     ) -> Result<u64, ConfigError> {
+        Ok(self.optional_integer(key, range)?.unwrap_or(default))
+    }
+
+    /// A whole number that need not be there; `1e6` counts as one.
+    pub(super) fn optional_integer(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<u64>,
+    ) -> Result<Option<u64>, ConfigError> {
         let must = format!("a whole number within {} to {}", range.start(), range.end());
         let whole = |value: &Value| value_as_u64(value).filter(|number| range.contains(number));
-        Ok(self.get(key, must, whole)?.unwrap_or(default))
+        self.get(key, must, whole)
     }
 
     /// A number within bounds.

@@ -1,6 +1,7 @@
 //! What is accepted, and what is said about everything else.
 
 use super::*;
+use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
 use glam::Vec2;
 
 /// What a scene may be called.
@@ -124,6 +125,9 @@ fn every_key_can_be_given() {
         sleep = true
         sleep_speed = 0.1
         sleep_time = 1
+        [output]
+        record_every = 10
+        checkpoint_every = 100
     "#;
     let config = read(text, &[]).unwrap();
     assert_eq!(config.scene, SceneConfig { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
@@ -138,6 +142,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.params.iterations, config.params.baumgarte, config.params.linear_slop), (20, 0.3, 0.01));
     assert_eq!((config.params.island_search, config.params.ghosts), (IslandSearch::Dfs, Ghosts::Frozen));
     assert_eq!((config.params.sleep, config.params.sleep_speed, config.params.sleep_time), (true, 0.1, 1.0));
+    assert_eq!(config.output, OutputConfig { record_every: Some(10), checkpoint_every: Some(100) });
 
     let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
     // The scene's four stand on one line; jitter, base, angle and friction belong to other kinds.
@@ -172,6 +177,12 @@ fn out_of_range_and_of_the_wrong_type() {
         ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", or columns and rows"),
         ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
         ("run", "tiles = \"3by2\"", "test.toml: run.tiles = \"3by2\": must be"),
+        (
+            "output",
+            "record_every = 0",
+            "test.toml: output.record_every = 0: must be a whole number within 1 to 4294967295",
+        ),
+        ("output", "checkpoint_every = 1e10", "test.toml: output.checkpoint_every = 10000000000.0: must be a whole"),
         ("run", "peer_timeout = 0", "test.toml: run.peer_timeout = 0: must be a number within 0.001 to"),
         ("physics", "hertz = 0", "test.toml: physics.hertz = 0: must be positive and finite"),
         ("physics", "hertz = -60", "test.toml: physics.hertz = -60: must be positive and finite"),

@@ -27,11 +27,11 @@ fn argument(bytes: &[u8]) -> OsString {
 /// Arguments, the name of the program left out, with a zero byte between any two. They are refused in one line, they
 /// ask for help, or they make a configuration.
 pub fn arguments(bytes: &[u8]) -> bool {
-    let given = bytes.split(|&byte| byte == 0).map(argument);
-    let cli = match Cli::try_parse_from(once(OsString::from("atoll")).chain(given)) {
+    let given: Vec<OsString> = bytes.split(|&byte| byte == 0).map(argument).collect();
+    let cli = match Cli::try_parse_from(once(OsString::from("atoll")).chain(given.iter().cloned())) {
         Ok(cli) => cli,
         Err(error) => {
-            let text = one_line(&error);
+            let text = one_line(&error, given.first().map(OsString::as_os_str));
             match error.kind() {
                 ErrorKind::DisplayHelp
                 | ErrorKind::DisplayVersion

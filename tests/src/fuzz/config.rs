@@ -9,8 +9,13 @@ use atoll::plan::Plan;
 const SMALL: (u64, usize, u32) = (2000, 64, 128);
 
 /// What may be said about how a run is computed, and must not show in what is computed.
-const HOW: [(&str, &str); 4] =
-    [("run.ranks", "3"), ("run.threads", "2"), ("run.transport", "channel"), ("run.peer_timeout", "5")];
+const HOW: [(&str, &str); 5] = [
+    ("run.ranks", "3"),
+    ("run.threads", "2"),
+    ("run.transport", "channel"),
+    ("run.peer_timeout", "5"),
+    ("output.record_every", "7"),
+];
 
 /// The text of a file, and after it any number of `key=value` as for `--set`, with a zero byte before each. It is
 /// refused in one line, or it is a configuration that means something.
@@ -37,7 +42,7 @@ pub fn config(bytes: &[u8]) -> bool {
 
 /// Every number is one that can be computed with.
 fn check(config: &Config) {
-    let Config { scene, run, params } = config;
+    let Config { scene, run, params, output: _ } = config;
     params.check().expect("what the core refuses is refused as a configuration");
     assert!(scene.bodies >= 1 && run.steps >= 1 && run.ranks >= 1 && run.threads >= 1);
     assert!(!run.peer_timeout.is_zero());
@@ -55,6 +60,9 @@ fn check(config: &Config) {
     let named = |line: &str| line.split_once(" = ").is_some_and(|(name, value)| !name.is_empty() && !value.is_empty());
     assert!(canonical.ends_with('\n') && canonical.lines().all(named), "{canonical}");
     assert!(!canonical.contains("NaN"), "{canonical}");
+    let mut expected = config.clone();
+    (expected.run.tiles, expected.run.ranks_asked_for) = (Some(tiles), false);
+    assert_eq!(Config::from_toml_str("again.toml", &config.to_toml(tiles), &[]), Ok(expected), "written and read");
     let hash = config.hash(tiles);
     assert!(hash.len() == 32 && hash.bytes().all(|digit| digit.is_ascii_hexdigit()), "{hash}");
 

@@ -1,0 +1,62 @@
+//! Options of the verbs that look at what runs have written.
+
+use clap::Args;
+use std::path::PathBuf;
+
+/// Options of `atoll diff`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct DiffArgs {
+    /// The folder of a run.
+    pub a: PathBuf,
+    /// The folder of the run to compare it with.
+    pub b: PathBuf,
+    /// Distances up to this, in meters, count as none.
+    #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = tolerance)]
+    pub tolerance: f64,
+    /// Write the differences to this file, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Write a picture of how the differences grow to this file.
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+}
+
+/// Options of `atoll info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// The folder of a run, or a file in it.
+    pub path: PathBuf,
+}
+
+fn tolerance(text: &str) -> Result<f64, &'static str> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or("must be a finite number, at least 0")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn parse<T: Args>(line: &str) -> Result<T, String> {
+        let command = T::augment_args(clap::Command::new("atoll"));
+        let matches = command.try_get_matches_from(["atoll"].into_iter().chain(line.split_whitespace()));
+        let args = matches.and_then(|matches| T::from_arg_matches(&matches));
+        args.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn runs_are_compared_within_a_tolerance() {
+        let args = parse::<DiffArgs>("runs/a runs/b --tolerance 1e-3 --json d.json").unwrap();
+        assert_eq!((args.a.as_path(), args.b.as_path()), (Path::new("runs/a"), Path::new("runs/b")));
+        assert_eq!((args.tolerance, args.json.is_some(), args.plot.is_some()), (0.001, true, false));
+        assert_eq!(parse::<DiffArgs>("a b").unwrap().tolerance, 0.0);
+        for value in ["-1", "nan", "inf", "1e999", "much"] {
+            let error = parse::<DiffArgs>(&format!("a b --tolerance {value}")).unwrap_err();
+            assert!(error.contains("'--tolerance <T>': must be a finite number, at least 0"), "{error}");
+        }
+        assert!(parse::<DiffArgs>("a").unwrap_err().contains("<B>"));
+        assert_eq!(parse::<InfoArgs>("runs/a").unwrap().path, Path::new("runs/a"));
+    }
+}

@@ -1,0 +1,59 @@
+//! In what two configurations differ.
+
+/// A key that two configurations give different values.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Difference {
+    /// Its full path.
+    pub key: String,
+    /// The value in the first, as TOML, or `nothing`.
+    pub ours: String,
+    /// The value in the second, as TOML, or `nothing`.
+    pub theirs: String,
+}
+
+/// All keys in which two texts as of [`Config::canonical`](super::Config::canonical) differ: those of the first in its
+/// order, then those that are in the second alone. The texts may come from anywhere.
+pub fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
+    let (ours, theirs) = (pairs(ours), pairs(theirs));
+    let value_in =
+        |pairs: &[(&str, &str)], key: &str| pairs.iter().find(|pair| pair.0 == key).map(|pair| pair.1.to_owned());
+    let only_theirs = theirs.iter().filter(|(key, _)| value_in(&ours, key).is_none());
+    let keys = ours.iter().chain(only_theirs).map(|(key, _)| *key);
+    let value = |pairs, key| value_in(pairs, key).unwrap_or_else(|| "nothing".to_owned());
+    let all = keys.map(|key| Difference { key: key.to_owned(), ours: value(&ours, key), theirs: value(&theirs, key) });
+    all.filter(|one| one.ours != one.theirs).collect()
+}
+
+fn pairs(text: &str) -> Vec<(&str, &str)> {
+    text.lines().map(|line| line.split_once(" = ").unwrap_or((line, ""))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    #[test]
+    fn all_keys_that_differ_are_found_and_no_others() {
+        let canonical = |kind: &str, overrides: &[(&str, &str)]| {
+            let text = format!("[scene]\nkind = \"{kind}\"\nbodies = 500\n");
+            Config::from_toml_str("test", &text, overrides).unwrap().canonical([2, 2])
+        };
+        let found = |ours: &str, theirs: &str| {
+            let all = differences(ours, theirs).into_iter();
+            all.map(|one| format!("{}: {}, {}", one.key, one.ours, one.theirs)).collect::<Vec<_>>()
+        };
+        let usual = canonical("rooms", &[]);
+        assert!(differences(&usual, &usual).is_empty());
+        assert_eq!(
+            found(&usual, &canonical("rooms", &[("hertz", "90"), ("steps", "7"), ("ranks", "2")])),
+            ["run.steps: 600, 7", "physics.hertz: 60.0, 90.0"]
+        );
+        assert_eq!(
+            found(&usual, &canonical("sparse", &[])),
+            ["scene.kind: \"rooms\", \"sparse\"", "scene.power: 1.0, nothing"]
+        );
+        assert_eq!(found(&usual, &format!("{usual}physics.new = 1\n")), ["physics.new: nothing, 1"]);
+        assert_eq!(found("a = 1\nnonsense\n", "a = 1\n"), ["nonsense: , nothing"]);
+    }
+}

@@ -1,0 +1,302 @@
+//! What a configuration comes to once every default is filled in: as a file that repeats the run, and as the text and
+//! the hash of what its result depends on.
+
+use super::words::{self, word_for};
+use super::{Config, OutputConfig, RunConfig};
+use atoll_core::Params;
+use std::fmt::Write as _;
+use toml::Value;
+
+/// Keys that say how a result is computed and change no bit of it. All of `[output]` is of that kind too.
+const HOW: &[&str] = &[
+    "run.ranks",
+    "run.threads",
+    "run.transport",
+    "run.peer_timeout",
+    "run.mpi_exchange",
+    "physics.broad_phase",
+    "physics.islands",
+    "physics.parallel",
+];
+
+/// Stands at the beginning of the file.
+const HEADING: &str = "# The configuration of this run, every key with the value that was used. `atoll run` this file \
+                       to repeat it.\n";
+
+impl Config {
+    /// Every key with the value that is used, in the order of the documentation; keys that nobody chose and that have
+    /// no default are left out. `tiles` is the grid that is really used.
+    ///
+    /// A file of these entries gives the same configuration, bit for bit, as long as `dt` is the inverse of some
+    /// `hertz`, as it is after reading.
+    pub fn entries(&self, tiles: [u32; 2]) -> Vec<(&'static str, Value)> {
+        // All by name, so that what is added later cannot be forgotten here.
+        let Self { scene, run, params, output } = self;
+        let RunConfig { steps, ranks, ranks_asked_for: _, threads, transport, tiles: _, peer_timeout, mpi_exchange } =
+            *run;
+        let Params {
+            dt,
+            substeps,
+            gravity,
+            linear_damping,
+            angular_damping,
+            max_linear_speed,
+            max_angular_speed,
+            contact_hertz,
+            contact_damping_ratio,
+            push_out_speed,
+            speculative_distance,
+            recycle_distance,
+            restitution_threshold,
+            margin_floor,
+            margin_cap,
+            sort_interval,
+            exchange,
+            broad_phase,
+            solver,
+            iterations,
+            baumgarte,
+            linear_slop,
+            island_search,
+            parallel,
+            ghosts,
+            sleep,
+            sleep_speed,
+            sleep_time,
+        } = *params;
+        let OutputConfig { record_every, checkpoint_every } = *output;
+
+        let mut entries = scene.entries();
+        entries.extend([
+            ("run.steps", whole(steps)),
+            ("run.ranks", whole(ranks as u64)),
+            ("run.threads", whole(threads as u64)),
+        ]);
+        entries.extend(transport.map(|kind| ("run.transport", word_for(words::TRANSPORT, kind).into())));
+        entries.extend([
+            ("run.tiles", tiles.map(Value::from).to_vec().into()),
+            ("run.peer_timeout", peer_timeout.as_secs_f64().into()),
+            ("run.mpi_exchange", word_for(words::MPI_EXCHANGE, mpi_exchange).into()),
+            ("physics.hertz", float(hertz(dt))),
+            ("physics.substeps", substeps.into()),
+            ("physics.gravity", gravity.to_array().map(float).to_vec().into()),
+            ("physics.linear_damping", float(linear_damping)),
+            ("physics.angular_damping", float(angular_damping)),
+            ("physics.max_linear_speed", float(max_linear_speed)),
+            ("physics.max_angular_speed", float(max_angular_speed)),
+            ("physics.contact_hertz", float(contact_hertz)),
+            ("physics.contact_damping_ratio", float(contact_damping_ratio)),
+            ("physics.push_out_speed", float(push_out_speed)),
+            ("physics.speculative_distance", float(speculative_distance)),
+            ("physics.recycle_distance", float(recycle_distance)),
+            ("physics.restitution_threshold", float(restitution_threshold)),
+            ("physics.margin_floor", float(margin_floor)),
+            ("physics.margin_cap", float(margin_cap)),
+            ("physics.sort_interval", sort_interval.into()),
+            ("physics.broad_phase", word_for(words::BROAD_PHASE, broad_phase).into()),
+            ("physics.solver", word_for(words::SOLVER, solver).into()),
+            ("physics.iterations", iterations.into()),
+            ("physics.baumgarte", float(baumgarte)),
+            ("physics.linear_slop", float(linear_slop)),
+            ("physics.islands", word_for(words::ISLANDS, island_search).into()),
+            ("physics.parallel", word_for(words::PARALLEL, parallel).into()),
+            ("physics.exchange", word_for(words::EXCHANGE, exchange).into()),
+            ("physics.ghosts", word_for(words::GHOSTS, ghosts).into()),
+            ("physics.sleep", sleep.into()),
+            ("physics.sleep_speed", float(sleep_speed)),
+            ("physics.sleep_time", float(sleep_time)),
+        ]);
+        entries.extend(record_every.map(|steps| ("output.record_every", whole(steps))));
+        entries.extend(checkpoint_every.map(|steps| ("output.checkpoint_every", whole(steps))));
+        entries
+    }
+
+    /// [`entries`](Self::entries) as a file that repeats the run.
+    pub fn to_toml(&self, tiles: [u32; 2]) -> String {
+        let mut text = HEADING.to_owned();
+        let mut begun = "";
+        for (path, value) in self.entries(tiles) {
+            let (section, key) = path.split_once('.').expect("every key is in a section");
+            if section != begun {
+                write!(text, "\n[{section}]\n").expect("a string takes any text");
+                begun = section;
+            }
+            writeln!(text, "{key} = {value}").expect("a string takes any text");
+        }
+        text
+    }
+
+    /// Everything that the result depends on, a line `key = value` each: not ranks, threads or transport, nor the ways
+    /// of computing that change no bit. `tiles` is the grid that is really used.
+    pub fn canonical(&self, tiles: [u32; 2]) -> String {
+        let matters = |key: &str| !HOW.contains(&key) && !key.starts_with("output.");
+        let entries = self.entries(tiles).into_iter().filter(|(key, _)| matters(key));
+        entries.map(|(key, value)| format!("{key} = {value}\n")).collect()
+    }
+
+    /// A fingerprint of [`canonical`](Self::canonical): 32 hexadecimal digits, the same for runs that must agree.
+    pub fn hash(&self, tiles: [u32; 2]) -> String {
+        format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
+    }
+}
+
+/// A number of things as TOML has it. No key takes more than TOML can say.
+pub(super) fn whole(number: u64) -> Value {
+    Value::Integer(number.try_into().unwrap_or(i64::MAX))
+}
+
+/// The shortest decimal that is read as this number.
+fn float(number: f32) -> Value {
+    let shortest: f64 = number.to_string().parse().expect("a number is written as one");
+    // A file's numbers are rounded twice, to 64 bits and then to 32. Of all numbers, 7.038531e-26 alone ends elsewhere.
+    let same = (shortest as f32).to_bits() == number.to_bits();
+    Value::Float(if same { shortest } else { number.into() })
+}
+
+/// The steps per second that a step of this length came from. Of several, the one that is shortest to write.
+fn hertz(dt: f32) -> f32 {
+    let nearest = 1.0 / dt;
+    // Each of two divisions rounds by at most half a unit. For every number there is, that makes one unit at most.
+    let near = [nearest, nearest.next_down(), nearest.next_up()];
+    let exact = near.into_iter().filter(|hertz| hertz.is_finite() && 1.0 / hertz == dt);
+    exact.min_by_key(|hertz| hertz.to_string().len()).unwrap_or(nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::keys::KEYS;
+    use super::*;
+    use crate::scene::SplitMix64;
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::PathBuf;
+    use std::time::Duration;
+
+    const TILES: [u32; 2] = [3, 2];
+    const KINDS: [&str; 7] = ["rooms", "pile", "pyramids", "sparse", "single-island", "stack", "slope"];
+
+    fn scene(kind: &str, overrides: &[(&str, &str)]) -> Config {
+        Config::from_toml_str("test", &format!("[scene]\nkind = \"{kind}\"\n"), overrides).unwrap()
+    }
+
+    /// What it comes to, written and read again, is the same but for what the file cannot tell: that nobody chose the
+    /// tiles, and that somebody asked for the ranks.
+    fn assert_comes_back(config: &Config) {
+        let text = config.to_toml(TILES);
+        let again = Config::from_toml_str("again", &text, &[]).unwrap_or_else(|error| panic!("{error} in\n{text}"));
+        let mut expected = config.clone();
+        (expected.run.tiles, expected.run.ranks_asked_for) = (Some(TILES), false);
+        assert_eq!(again, expected, "{text}");
+        // This tells zeros of either sign apart.
+        assert_eq!(again.entries(TILES), config.entries(TILES));
+        assert_eq!(format!("{:?}", again.params), format!("{:?}", config.params));
+        assert_eq!(again.to_toml(TILES), text);
+    }
+
+    #[test]
+    fn every_file_comes_back_under_any_overrides() {
+        let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs"));
+        let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let mut read = 0;
+        for file in files.filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
+            let text = fs::read_to_string(&file).unwrap();
+            for overrides in [
+                &[][..],
+                &[
+                    ("ranks", "3"),
+                    ("threads", "2"),
+                    ("transport", "channel"),
+                    ("tiles", "7x1"),
+                    ("peer_timeout", "0.1"),
+                ],
+                &[("hertz", "144"), ("gravity", "[-0.0, 1e-30]"), ("linear_damping", "-0.0"), ("sleep", "true")],
+                &[("max_linear_speed", "inf"), ("max_angular_speed", "inf"), ("push_out_speed", "3.4028235e38")],
+                &[("exchange", "step"), ("ghosts", "frozen"), ("solver", "pgs"), ("islands", "dfs")],
+                &[("parallel", "coloring"), ("mpi_exchange", "sparse"), ("broad_phase", "quadtree")],
+                &[("record_every", "10"), ("checkpoint_every", "4294967295"), ("seed", "9223372036854775807")],
+                &[
+                    ("baumgarte", "7.038530691851209e-26"),
+                    ("sleep_time", "1e-45"),
+                    ("peer_timeout", "123456.789012345"),
+                ],
+            ] {
+                match Config::from_toml_str("test", &text, overrides) {
+                    Ok(config) => assert_comes_back(&config),
+                    Err(error) => panic!("{}: {error}", file.display()),
+                }
+            }
+            read += 1;
+        }
+        assert!(read >= 10, "only {read} files");
+        for (kind, key, value) in [
+            ("rooms", "power", "1.2"),
+            ("pile", "jitter", "0.1"),
+            ("pyramids", "base", "7"),
+            ("slope", "angle", "22.7"),
+            ("slope", "friction", "0.3"),
+        ] {
+            assert_comes_back(&scene(kind, &[(key, value)]));
+        }
+        for kind in KINDS {
+            assert_comes_back(&scene(kind, &[]));
+        }
+    }
+
+    #[test]
+    fn any_number_comes_back() {
+        let mut random = SplitMix64::after(1, 0);
+        let mut config = scene("rooms", &[]);
+        let mut tried = 0;
+        while tried < 1000 {
+            let mut any = || f32::from_bits(random.bits() as u32 & 0x7fff_ffff);
+            (config.params.dt, config.params.push_out_speed, config.params.margin_cap) = (1.0 / any(), any(), any());
+            config.run.peer_timeout = Duration::from_nanos(1_000_000 + random.bits() % 999_999_000_000_000);
+            if config.params.check().is_ok() {
+                assert_comes_back(&config);
+                tried += 1;
+            }
+        }
+        // The greatest there is: the inverse of its inverse is infinity.
+        assert_comes_back(&scene("rooms", &[("hertz", "3.4028235e38")]));
+    }
+
+    #[test]
+    fn numbers_are_written_as_a_person_would() {
+        let text = scene("pile", &[("hertz", "60")]).to_toml(TILES);
+        for line in
+            ["hertz = 60.0", "gravity = [0.0, -10.0]", "max_linear_speed = inf", "baumgarte = 0.1", "tiles = [3, 2]"]
+        {
+            assert!(text.lines().any(|written| written == line), "{line} is not in\n{text}");
+        }
+        for hertz in ["30.0", "90.0", "144.0", "59.94", "1000.0", "0.1"] {
+            let text = scene("rooms", &[("hertz", hertz)]).to_toml(TILES);
+            assert!(text.contains(&format!("\nhertz = {hertz}\n")), "{hertz} became another in\n{text}");
+        }
+    }
+
+    #[test]
+    fn every_key_is_given_in_its_order() {
+        let position = |key: &str| KEYS.iter().position(|&known| known == key).unwrap();
+        let overrides = [("transport", "channel"), ("record_every", "1"), ("checkpoint_every", "1")];
+        let mut seen = BTreeSet::new();
+        for kind in KINDS {
+            let keys: Vec<usize> =
+                scene(kind, &overrides).entries(TILES).iter().map(|(key, _)| position(key)).collect();
+            assert!(keys.is_sorted_by(|a, b| a < b), "{kind}: {keys:?}");
+            seen.extend(keys);
+        }
+        assert_eq!(seen.len(), KEYS.len(), "a key is never given");
+        assert!(HOW.iter().all(|key| KEYS.contains(key)), "{HOW:?}");
+    }
+
+    #[test]
+    fn the_canonical_text_leaves_out_how() {
+        let text = scene("stack", &[("transport", "channel"), ("record_every", "1"), ("checkpoint_every", "1")]);
+        let text = text.canonical(TILES);
+        let expected = "scene.kind = \"stack\"\nscene.bodies = 10\nscene.seed = 1\nrun.steps = 600\nrun.tiles = [3, 2]\n\
+                        physics.hertz = 60.0\n";
+        assert!(text.starts_with(expected), "{text}");
+        // Five keys of other scenes, and two of [output].
+        assert_eq!(text.lines().count(), KEYS.len() - 5 - HOW.len() - 2, "{text}");
+    }
+}
