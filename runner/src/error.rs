@@ -1,6 +1,7 @@
 //! Why a run ended early, and with which exit code.
 
 use crate::config::ConfigError;
+use crate::trajectory::TrajectoryError;
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
 use std::path::PathBuf;
@@ -12,6 +13,8 @@ use thiserror::Error;
 pub enum Exit {
     /// All steps were made and every check passed.
     Done = 0,
+    /// What was compared is not the same.
+    Differs = 1,
     /// Bad input or usage.
     Usage = 2,
     /// A rank was lost.
@@ -27,7 +30,8 @@ pub enum Exit {
 impl Exit {
     /// The exit code of that number; a number that is none of them stands for a lost rank.
     pub fn from_code(code: u8) -> Self {
-        let all = [Self::Done, Self::Usage, Self::PeerLost, Self::Physics, Self::Output, Self::Interrupted];
+        let all =
+            [Self::Done, Self::Differs, Self::Usage, Self::PeerLost, Self::Physics, Self::Output, Self::Interrupted];
         all.into_iter().find(|exit| *exit as u8 == code).unwrap_or(Self::PeerLost)
     }
 }
@@ -180,6 +184,9 @@ pub enum RunError {
         /// At the end.
         found: u64,
     },
+    /// A recording.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
     /// A result could not be written after the run.
     #[error("cannot write {}: {reason}", .path.display())]
     Output {
@@ -208,7 +215,8 @@ impl RunError {
             Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {
                 Exit::Physics
             }
-            Self::Output { .. } => Exit::Output,
+            Self::Output { .. } | Self::Trajectory(TrajectoryError::Write { .. }) => Exit::Output,
+            Self::Trajectory(_) => Exit::Usage,
         }
     }
 }

@@ -25,7 +25,9 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a scene and report what became of it.
-    Run(RunArgs),
+    Run(Box<RunArgs>),
+    /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
+    Diff(DiffArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

@@ -123,7 +123,8 @@ mod tests {
 
     fn parse(line: &str) -> Result<RunArgs, String> {
         match Cli::try_parse_from(["atoll", "run"].into_iter().chain(line.split_whitespace())) {
-            Ok(Cli { command: Command::Run(args) }) => Ok(args),
+            Ok(Cli { command: Command::Run(args) }) => Ok(*args),
+            Ok(cli) => panic!("{line} is {cli:?}"),
             Err(error) => Err(one_line(&error, Some("run".as_ref()))),
         }
     }

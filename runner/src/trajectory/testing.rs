@@ -15,7 +15,7 @@ pub(crate) fn facts(record_every: u64) -> RunFacts {
         domain: [DVec2::new(-20.0, 0.0), DVec2::new(20.0, 20.0)],
         tiles: [4, 2],
         config: "[scene]\nkind = \"rooms\"\n".to_owned(),
-        canonical: "kind = Rooms\nsteps = 100\ndt = 0.1\n".to_owned(),
+        canonical: "scene.kind = \"rooms\"\nscene.seed = 7\nrun.steps = 100\n".to_owned(),
     }
 }
 

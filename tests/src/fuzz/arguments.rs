@@ -41,7 +41,7 @@ pub fn arguments(bytes: &[u8]) -> bool {
             return false;
         }
     };
-    let Command::Run(args) = cli.command;
+    let Command::Run(args) = cli.command else { return false };
     let config = args.overrides().and_then(|overrides| Config::load(&CONFIG, &overrides));
     config.as_ref().err().into_iter().for_each(assert_one_line);
     config.is_ok()
