@@ -14,6 +14,8 @@ use thiserror::Error;
 pub enum Exit {
     /// All steps were made and every check passed.
     Done = 0,
+    /// What was compared is not the same.
+    Differs = 1,
     /// Bad input or usage.
     Usage = 2,
     /// A rank was lost.
@@ -29,7 +31,8 @@ pub enum Exit {
 impl Exit {
     /// The exit code of that number; a number that is none of them stands for a lost rank.
     pub fn from_code(code: u8) -> Self {
-        let all = [Self::Done, Self::Usage, Self::PeerLost, Self::Physics, Self::Output, Self::Interrupted];
+        let all =
+            [Self::Done, Self::Differs, Self::Usage, Self::PeerLost, Self::Physics, Self::Output, Self::Interrupted];
         all.into_iter().find(|exit| *exit as u8 == code).unwrap_or(Self::PeerLost)
     }
 }

@@ -19,6 +19,7 @@ pub mod assignment;
 pub mod backend;
 pub mod cmd;
 pub mod config;
+pub mod diff;
 pub mod drive;
 pub mod error;
 pub mod exchange;

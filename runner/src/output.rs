@@ -1,10 +1,24 @@
-//! Files that are written in one go: each whole or not at all.
+//! What is written when all is done: to standard output, and to files, each whole or not at all.
 
 use crate::error::RunError;
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// Writes this to standard output. That a reader has seen enough, as in `atoll run ... | head`, is not a failure.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn show(text: &dyn Display) -> Result<(), RunError> {
+    match write!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() })
+        }
+        _ => Ok(()),
+    }
+}
 
 /// A path that is to be written to when the run is over.
 #[derive(Debug)]

@@ -26,6 +26,8 @@ pub struct Cli {
 pub enum Command {
     /// Run a scene and report what became of it.
     Run(Box<RunArgs>),
+    /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
+    Diff(DiffArgs),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
 }

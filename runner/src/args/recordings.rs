@@ -11,13 +11,13 @@ pub struct DiffArgs {
     pub a: PathBuf,
     /// The folder of the run to compare it with.
     pub b: PathBuf,
-    /// Distances up to this, in meters, count as none.
-    #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = tolerance)]
-    pub tolerance: f64,
+    /// Deviations up to this count as none, in m, rad, m/s and rad/s [default: every bit counts].
+    #[arg(long, value_name = "T", value_parser = tolerance)]
+    pub tolerance: Option<f64>,
     /// Write the differences to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Write a picture of how the differences grow to this file.
+    /// Write a picture of how the deviations grow to this file, as SVG.
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
 }
@@ -50,8 +50,8 @@ mod tests {
     fn runs_are_compared_within_a_tolerance() {
         let args = parse::<DiffArgs>("runs/a runs/b --tolerance 1e-3 --json d.json").unwrap();
         assert_eq!((args.a.as_path(), args.b.as_path()), (Path::new("runs/a"), Path::new("runs/b")));
-        assert_eq!((args.tolerance, args.json.is_some(), args.plot.is_some()), (0.001, true, false));
-        assert_eq!(parse::<DiffArgs>("a b").unwrap().tolerance, 0.0);
+        assert_eq!((args.tolerance, args.json.is_some(), args.plot.is_some()), (Some(0.001), true, false));
+        assert_eq!(parse::<DiffArgs>("a b").unwrap().tolerance, None);
         for value in ["-1", "nan", "inf", "1e999", "much"] {
             let error = parse::<DiffArgs>(&format!("a b --tolerance {value}")).unwrap_err();
             assert!(error.contains("'--tolerance <T>': must be a finite number, at least 0"), "{error}");

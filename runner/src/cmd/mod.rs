@@ -1,5 +1,6 @@
 //! The verbs of the program, one file each.
 
+pub mod diff;
 pub mod info;
 pub mod run;
 
@@ -19,13 +20,15 @@ pub fn main() -> ExitCode {
     };
     let result = telemetry::init().and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
+        Command::Diff(args) => diff::run(args),
         Command::Info(args) => info::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {
             telemetry::complain(&error);
         }
-        error.exit()
+        // One code tells of all that keeps a comparison from its answer.
+        if matches!(cli.command, Command::Diff(_)) { Exit::Usage } else { error.exit() }
     });
     ExitCode::from(exit as u8)
 }

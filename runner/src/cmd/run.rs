@@ -8,14 +8,13 @@ use crate::config::TransportKind;
 use crate::drive::Observer;
 use crate::error::{Exit, RunError};
 use crate::interrupt::StopFlag;
-use crate::output::WholeFile;
+use crate::output::{self, WholeFile};
 use crate::plan::Plan;
 use crate::progress::Show;
 use crate::run_folder::{Claim, RunFolder};
 use crate::summary::Summary;
 use crate::telemetry::complain;
 use crate::timings;
-use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Does it, with everything that can be refused refused before anything heavy starts.
@@ -170,13 +169,7 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     let (folder, json) = (json(&outputs.folder), json(&outputs.json));
     let timings =
         outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
-    let shown = match write!(io::stdout(), "{summary}") {
-        // A reader that has seen enough, as in `atoll run ... | head`, is not a failure.
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() })
-        }
-        _ => Ok(()),
-    };
+    let shown = output::show(summary);
     folder.and(json).and(timings).and(shown)?;
 
     if summary.bodies_lost != 0 {

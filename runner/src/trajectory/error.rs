@@ -71,12 +71,12 @@ pub enum TrajectoryError {
         step: u64,
     },
     /// Two files are of different runs.
-    #[error("{} and {} are of different runs: {what} differs; keep each run in a folder of its own", .paths[0].display(), .paths[1].display())]
+    #[error("{} and {} are of different runs: {what}; keep each run in a folder of its own", .paths[0].display(), .paths[1].display())]
     OtherRun {
         /// The files.
         paths: [PathBuf; 2],
         /// What they say differently.
-        what: &'static str,
+        what: String,
     },
     /// A file must have been there once.
     #[error("{}: the segment that holds step {step} is missing; bring it back", .folder.display())]

@@ -1,7 +1,9 @@
 //! What every file of a recording says about the run it is of.
 
+use crate::config;
 use crate::plan::Plan;
 use glam::DVec2;
+use std::num::NonZeroU16;
 use std::str::FromStr;
 
 /// Grows when older programs could no longer read a recording.
@@ -9,7 +11,7 @@ const FORMAT: &str = "1";
 
 /// The run a recording is of. In a file's metadata each is a text under its name, with `atoll.` in front.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Facts {
+pub struct RunFacts {
     /// Version of the program that recorded.
     pub version: String,
     /// Kind of scene.
@@ -28,9 +30,9 @@ pub struct Facts {
     pub canonical: String,
 }
 
-impl Facts {
-    /// Those of a run. `config` is its configuration as TOML.
-    pub fn new(plan: &Plan, record_every: u64, config: String) -> Self {
+impl RunFacts {
+    /// Those of a run that records every so many steps.
+    pub fn new(plan: &Plan, record_every: u64) -> Self {
         let (low, high) = plan.scene.domain();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -39,7 +41,7 @@ impl Facts {
             record_every,
             domain: [low, high],
             tiles: plan.tiles,
-            config,
+            config: plan.config.to_toml(plan.tiles),
             canonical: plan.config.canonical(plan.tiles),
         }
     }
@@ -73,7 +75,9 @@ impl Facts {
         let numbers: Option<Vec<f64>> = numbers.split(' ').map(|number| number.parse().ok()).collect();
         let Some(&[x0, y0, x1, y1]) = numbers.as_deref() else { return Err("atoll.domain is unreadable".to_owned()) };
         let tiles: String = parse(&text, "tiles")?;
-        let tiles = tiles.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
+        // No configuration allows more than 16 bits can say.
+        let count = |text: &str| text.parse::<NonZeroU16>().ok().map(|count| u32::from(count.get()));
+        let tiles = tiles.split_once('x').and_then(|(columns, rows)| Some([count(columns)?, count(rows)?]));
         let facts = Self {
             version: parse(&text, "version")?,
             scene: parse(&text, "scene")?,
@@ -87,20 +91,13 @@ impl Facts {
         if facts.record_every == 0 { Err("atoll.record_every is 0".to_owned()) } else { Ok(facts) }
     }
 
-    /// In what two segments differ that cannot be of one run. A run that was taken up again may have been given more
-    /// steps, and a newer program.
-    pub(super) fn other_run(&self, other: &Self) -> Option<&'static str> {
-        let lasting = |facts: &Self| {
-            let lines = facts.canonical.lines().filter(|line| !line.starts_with("run.steps = "));
-            lines.map(str::to_owned).collect::<Vec<_>>()
-        };
-        if self.record_every != other.record_every {
-            Some("record_every")
-        } else if self.domain != other.domain || self.tiles != other.tiles || lasting(self) != lasting(other) {
-            Some("the configuration")
-        } else {
-            None
-        }
+    /// In what this differs from the facts of another file, if both cannot be of one run. A run that was taken up again may
+    /// have been given more steps, and a newer program.
+    pub(super) fn other_run(&self, other: &Self) -> Option<String> {
+        let lines = |facts: &Self| format!("output.record_every = {}\n{}", facts.record_every, facts.canonical);
+        let all = config::differences(&lines(self), &lines(other));
+        let one = all.into_iter().find(|one| one.key != "run.steps")?;
+        Some(format!("{} is {} in the one and {} in the other", one.key, one.ours, one.theirs))
     }
 }
 

@@ -8,7 +8,7 @@
 //!
 //! A Parquet file without its footer cannot be read, so a segment gets its name when it is complete, and a run that is
 //! killed loses no more than the segments under way. A record is one row group, and its rows are the bodies of one rank in the
-//! order of its tiles. Each file says in its metadata which run it is of ([`Facts`]), which rank of how many wrote it, and
+//! order of its tiles. Each file says in its metadata which run it is of ([`RunFacts`]), which rank of how many wrote it, and
 //! for each of its records the step, the number of rows and a checksum of their bytes in the file.
 //!
 //! | column | type | |
@@ -34,7 +34,7 @@ mod tests;
 mod writer;
 
 pub use error::TrajectoryError;
-pub use facts::Facts;
+pub use facts::RunFacts;
 pub use reader::Trajectory;
 pub use record::{Record, Row};
 pub use remove::remove_after;

@@ -1,6 +1,6 @@
 //! Reads the segments of all ranks as one sequence of records.
 
-use super::facts::Facts;
+use super::facts::RunFacts;
 use super::record::Row;
 use super::segment::Segment;
 use super::{TrajectoryError, rank_folder, rank_of_folder, steps_of_segment};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     folder: PathBuf,
-    facts: Facts,
+    facts: RunFacts,
     files: Vec<PathBuf>,
     /// By step and rank.
     parts: Vec<Part>,
@@ -77,7 +77,7 @@ impl Trajectory {
     }
 
     /// The run it is of; of one that was taken up again, as it was in the end.
-    pub fn facts(&self) -> &Facts {
+    pub fn facts(&self) -> &RunFacts {
         &self.facts
     }
 

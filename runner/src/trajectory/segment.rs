@@ -2,10 +2,10 @@
 //!
 //! The Parquet library takes a page's word for its length, and panics on some pages that no writer makes. So what the footer
 //! says is checked against itself and the file, and the bytes of a record against their checksum, before any page is looked
-//! at.
+//! at; and should a page be forged together with its checksum, the panic is caught.
 
 use super::error::reason;
-use super::facts::{Facts, parse};
+use super::facts::{RunFacts, parse};
 use super::record::Row;
 use super::{TrajectoryError, layout, steps_of_segment};
 use parquet::column::reader::ColumnReaderImpl;
@@ -16,6 +16,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3Default;
@@ -31,7 +32,7 @@ const START: u64 = 4;
 pub struct Segment {
     path: PathBuf,
     /// The run it is of.
-    pub facts: Facts,
+    pub facts: RunFacts,
     /// Who wrote it.
     pub rank: u32,
     /// Of so many.
@@ -74,7 +75,7 @@ impl Segment {
             let pair = pairs.iter().find(|pair| pair.key.strip_prefix("atoll.") == Some(name));
             pair.and_then(|pair| pair.value.as_deref())
         };
-        let facts = Facts::from_texts(text).map_err(bad)?;
+        let facts = RunFacts::from_texts(text).map_err(bad)?;
         let (rank, ranks) = (parse(text, "rank").map_err(bad)?, parse(text, "ranks").map_err(bad)?);
         let steps: String = parse(text, "steps").map_err(bad)?;
         let records = entries(&steps).ok_or("atoll.steps is unreadable").map_err(|text| bad(text.to_owned()))?;
@@ -125,7 +126,11 @@ impl Segment {
         if checksum != record.checksum {
             return Err(bad(format!("the bytes of step {step} are not those that were written")));
         }
-        self.decode(record, rows).map_err(|error| bad(format!("step {step}: {}", reason(&error))))
+        // Rows that are half filled are of no use to anybody, nor are they looked at.
+        match panic::catch_unwind(AssertUnwindSafe(|| self.decode(record, rows))) {
+            Ok(decoded) => decoded.map_err(|error| bad(format!("step {step}: {}", reason(&error)))),
+            Err(_) => Err(bad(format!("step {step} cannot be decoded"))),
+        }
     }
 
     /// Of the bytes of a row group.

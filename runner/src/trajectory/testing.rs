@@ -1,13 +1,13 @@
 //! Small recordings for tests.
 
-use super::{Facts, Record, TrajectoryWriter, rank_folder};
+use super::{Record, RunFacts, TrajectoryWriter, rank_folder};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use std::path::Path;
 
 /// The facts of a run on 4 x 2 tiles of 10 m.
-pub(crate) fn facts(record_every: u64) -> Facts {
-    Facts {
+pub(crate) fn facts(record_every: u64) -> RunFacts {
+    RunFacts {
         version: "1.2.3".to_owned(),
         scene: "rooms".to_owned(),
         seed: 7,
@@ -15,7 +15,7 @@ pub(crate) fn facts(record_every: u64) -> Facts {
         domain: [DVec2::new(-20.0, 0.0), DVec2::new(20.0, 20.0)],
         tiles: [4, 2],
         config: "[scene]\nkind = \"rooms\"\n".to_owned(),
-        canonical: "kind = Rooms\nrun.steps = 100\ndt = 0.1\n".to_owned(),
+        canonical: "scene.kind = \"rooms\"\nscene.seed = 7\nrun.steps = 100\n".to_owned(),
     }
 }
 
@@ -40,7 +40,7 @@ pub(crate) fn bodies(step: u64) -> Vec<Body> {
 /// Records these steps of a run of so many ranks: `bodies` gives the bodies after a step, which are dealt out to the ranks.
 pub(crate) fn record(
     folder: &Path,
-    facts: &Facts,
+    facts: &RunFacts,
     ranks: u32,
     steps: impl Iterator<Item = u64> + Clone,
     bodies: impl Fn(u64) -> Vec<Body>,

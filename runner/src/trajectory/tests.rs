@@ -190,7 +190,7 @@ fn a_full_disk_is_an_error_and_no_segment() {
 fn a_run_may_go_on_with_other_ranks_and_more_steps() {
     let folder = folder();
     record(folder.path(), &facts(2), 2, (0..=8).step_by(2), bodies);
-    let more = Facts { canonical: facts(2).canonical.replace("steps = 100", "steps = 200"), ..facts(2) };
+    let more = RunFacts { canonical: facts(2).canonical.replace("steps = 100", "steps = 200"), ..facts(2) };
     record(folder.path(), &more, 3, (10..=14).step_by(2), bodies);
     record(folder.path(), &facts(2), 1, (16..=18).step_by(2), bodies);
     let trajectory = Trajectory::open(folder.path()).unwrap();
@@ -219,10 +219,10 @@ fn a_step_belongs_to_one_segment_of_each_rank_of_one_run() {
     assert!(told.contains("and by 3 in DIR/rank-00000/steps-0000000060"), "{told}");
 
     let runs = recorded();
-    let other = Facts { canonical: "kind = Pile\n".to_owned(), ..facts(5) };
+    let other = RunFacts { canonical: facts(5).canonical.replace("seed = 7", "seed = 8"), ..facts(5) };
     record(runs.path(), &other, 2, (65..=70).step_by(5), bodies);
     let told = complaint(runs.path());
-    assert!(told.contains("are of different runs: the configuration differs"), "{told}");
+    assert!(told.contains("are of different runs: scene.seed is 7 in the one and 8 in the other"), "{told}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Writes the records of one rank.
 
 use super::error::reason;
-use super::facts::Facts;
+use super::facts::RunFacts;
 use super::record::Record;
 use super::{RECORDS_PER_SEGMENT, TrajectoryError, is_open_segment, layout, open_segment_name, segment_name};
 use parquet::column::writer::ColumnWriterImpl;
@@ -38,7 +38,7 @@ impl TrajectoryWriter {
     ///
     /// # Errors
     /// If the folder cannot be had.
-    pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &Facts) -> Result<Self, TrajectoryError> {
+    pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &RunFacts) -> Result<Self, TrajectoryError> {
         fs::create_dir_all(&folder)
             .and_then(|()| remove_open_segments(&folder))
             .map_err(|error| failed(&folder, &error))?;

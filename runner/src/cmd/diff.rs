@@ -1,0 +1,40 @@
+//! `atoll diff`: whether two runs recorded the same.
+
+use crate::args::DiffArgs;
+use crate::diff;
+use crate::error::{Exit, RunError};
+use crate::output::{self, WholeFile};
+use crate::progress::{Progress, Show};
+use std::io::{self, IsTerminal};
+use std::path::Path;
+
+/// Does it.
+///
+/// # Errors
+/// Whatever keeps it from an answer, or the answer from being written.
+pub fn run(args: &DiffArgs) -> Result<Exit, RunError> {
+    let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
+    let (json, plot) = (check("--json", args.json.as_deref())?, check("--plot", args.plot.as_deref())?);
+    if let Some(path) = args.plot.as_ref().filter(|_| args.json == args.plot) {
+        let reason = "--json writes to the same file".to_owned();
+        return Err(RunError::BadOutput { option: "--plot", path: path.clone(), reason });
+    }
+
+    // On a terminal only: it takes seconds, and a log has no use for that.
+    let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
+    let mut progress = None;
+    let compared = diff::compare(&args.a, &args.b, args.tolerance, |done, of| {
+        progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
+    });
+    if let Some(progress) = progress {
+        progress.finish();
+    }
+    let comparison = compared?;
+
+    // All are tried before any is complained about.
+    let json = json.map_or(Ok(()), |file| file.write(&comparison.to_json()));
+    let plot = plot.map_or(Ok(()), |file| file.write(diff::svg(&comparison).as_bytes()));
+    let shown = output::show(&comparison);
+    json.and(plot).and(shown)?;
+    Ok(if comparison.same { Exit::Done } else { Exit::Differs })
+}

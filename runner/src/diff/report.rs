@@ -1,0 +1,147 @@
+//! A comparison as people read it.
+
+use super::{Bodies, Comparison, Difference, Side, State, StepDeviation};
+use std::fmt::{self, Display, Formatter};
+
+/// Rows of the table, at most.
+const ROWS: usize = 12;
+
+impl Display for Comparison {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (a, b) = (self.a.folder.display(), self.b.folder.display());
+        for key in &self.configuration {
+            writeln!(f, "the configurations differ: {} is {} in {a} and {} in {b}", key.key, key.a, key.b)?;
+        }
+        for side in [&self.a, &self.b] {
+            if side.incomplete > 0 {
+                let (folder, steps) = (side.folder.display(), plural(side.incomplete, "step"));
+                writeln!(f, "{folder}: {steps} at the end were not written by all ranks and are left out")?;
+            }
+        }
+        self.write_verdict(f)?;
+        for (side, only) in [(&self.a, &self.only_in_a), (&self.b, &self.only_in_b)] {
+            if let (Some(first), Some(last)) = (only.first(), only.last()) {
+                let (folder, records) = (side.folder.display(), plural(only.len(), "record"));
+                writeln!(f, "only {folder} has {records} of steps {first} to {last}")?;
+            }
+        }
+        self.write_bodies(f)?;
+        if let Some(first) = &self.first_difference {
+            self.write_first(f, first)?;
+        }
+        if self.steps.iter().any(|step| step.differing > 0) { self.write_table(f) } else { Ok(()) }
+    }
+}
+
+impl Comparison {
+    fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let verdict = match (self.identical, self.same, self.tolerance) {
+            (true, ..) => "identical".to_owned(),
+            (_, true, Some(most)) => format!("the same within {most}"),
+            (_, _, Some(most)) if self.steps.iter().any(|step| step.greatest() > most) => {
+                format!("differ by more than {most}")
+            }
+            _ => "differ".to_owned(),
+        };
+        let Some((first, last)) = self.steps.first().zip(self.steps.last()) else {
+            return writeln!(f, "{verdict}: no step was recorded by both");
+        };
+        let most = self.steps.iter().map(|step| step.bodies).max().unwrap_or(0);
+        let (records, bodies) = (plural(self.steps.len(), "record"), plural(most as usize, "body"));
+        write!(f, "{verdict}: {records} of {bodies}, steps {} to {}", first.step, last.step)?;
+        match self.steps.iter().filter(|step| !step.is_none()).count() {
+            0 => writeln!(f),
+            all if all == self.steps.len() => writeln!(f, ", none of them alike in every bit"),
+            some => writeln!(f, ", {some} of them not alike in every bit"),
+        }
+    }
+
+    /// Which bodies cannot be compared.
+    fn write_bodies(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        type Kind = fn(&StepDeviation) -> Bodies;
+        let missing: [Kind; 2] = [|step| step.missing_in_a, |step| step.missing_in_b];
+        let doubled: [Kind; 2] = [|step| step.doubled_in_a, |step| step.doubled_in_b];
+        let sides = || [&self.a, &self.b].into_iter();
+        let missing = sides().zip(missing).map(|(side, bodies)| (side, "lacks", bodies));
+        let doubled = sides().zip(doubled).map(|(side, bodies)| (side, "has more than once", bodies));
+        for (side, does, bodies) in missing.chain(doubled) {
+            let mut steps = self.steps.iter().filter(|step| bodies(step).count > 0);
+            if let Some(step) = steps.next() {
+                let (some, more) = (bodies(step), steps.count());
+                let (count, id) = (plural(some.count as usize, "body"), some.first.unwrap_or(0));
+                let more =
+                    if more > 0 { format!(", and some at {}", plural(more, "later step")) } else { String::new() };
+                writeln!(
+                    f,
+                    "{} {does} {count} at step {}, the lowest is {id}{more}",
+                    side.folder.display(),
+                    step.step
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_first(&self, f: &mut Formatter<'_>, first: &Difference) -> fmt::Result {
+        let columns =
+            if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
+        writeln!(f, "first difference: step {}, body {}{columns}", first.step, first.id)?;
+        let width =
+            [&self.a, &self.b].map(|side| side.folder.display().to_string().len()).into_iter().max().unwrap_or(0);
+        let mut line = |side: &Side, state: &Option<State>| {
+            let folder = side.folder.display().to_string();
+            match state {
+                Some(state) => writeln!(f, "  {folder:<width$}  {state}"),
+                None => writeln!(f, "  {folder:<width$}  lacks it"),
+            }
+        };
+        line(&self.a, &first.a)?;
+        line(&self.b, &first.b)
+    }
+
+    /// How the greatest deviations grow.
+    fn write_table(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        writeln!(f)?;
+        let heads = ["step", "differing", "position, m", "rms, m", "angle, rad", "velocity, m/s", "omega, rad/s"];
+        let row = |f: &mut Formatter<'_>, cells: [String; 7]| {
+            let [step, differing, rest @ ..] = cells;
+            write!(f, "{step:>10} {differing:>10}")?;
+            rest.iter().try_for_each(|cell| write!(f, " {cell:>13}"))?;
+            writeln!(f)
+        };
+        row(f, heads.map(str::to_owned))?;
+        for step in evenly(&self.steps) {
+            let figure = |value: f64| if value == 0.0 { "0".to_owned() } else { format!("{value:.3e}") };
+            let StepDeviation { position, angle, velocity, angular_velocity, .. } = step;
+            let figures = [position.max, position.rms, angle.max, velocity.max, angular_velocity.max].map(figure);
+            let [a, b, c, d, e] = figures;
+            row(f, [step.step.to_string(), step.differing.to_string(), a, b, c, d, e])?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for State {
+    /// In full: every number is read back as the same bits.
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(tile) = self.tile {
+            write!(f, "tile {tile}: ")?;
+        }
+        let Self { tile: _, x, y, angle, vx, vy, omega } = self;
+        write!(f, "x {x}, y {y}, angle {angle}, vx {vx}, vy {vy}, omega {omega}")
+    }
+}
+
+/// Some of many, as far apart as can be, the last among them.
+fn evenly<T>(all: &[T]) -> impl Iterator<Item = &T> {
+    let count = all.len().min(ROWS);
+    (1..=count).map(move |i| &all[i * all.len() / count - 1])
+}
+
+fn plural(count: usize, word: &str) -> String {
+    match (count, word.strip_suffix('y')) {
+        (1, _) => format!("1 {word}"),
+        (_, Some(stem)) => format!("{count} {stem}ies"),
+        _ => format!("{count} {word}s"),
+    }
+}
