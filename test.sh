@@ -3,8 +3,8 @@
 # transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces. Stops at the
 # first failure. Takes about a quarter of an hour on two cores.
 #
-# Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu; elsewhere it leaves out what it cannot
-# check, and the end says so.
+# Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu, and packages of Python in target/python;
+# elsewhere it leaves out what it cannot check, and the end says so.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -52,6 +52,7 @@ provide() {
     has mpicc.openmpi || missing+=(libopenmpi-dev openmpi-bin)
     has mpicc.mpich || missing+=(libmpich-dev mpich)
     has ip || missing+=(iproute2)
+    python3 -c 'import ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
     ((${#missing[@]})) && [[ $(id -u) == 0 ]] && has apt-get || return 0
     export DEBIAN_FRONTEND=noninteractive
     step apt-get update -qq &&
@@ -59,7 +60,20 @@ provide() {
         printf '==> %s cannot be installed\n' "${missing[*]}"
 }
 
+# A Python with what the examples in docs/recordings.md need, in an environment of its own, which is kept.
+provide_python() {
+    local folder="${CARGO_TARGET_DIR:-target}/python" requirements=tests/python-requirements.txt
+    if ! cmp -s "$requirements" "$folder/python-requirements.txt" || ! "$folder/bin/python" -c 'import duckdb'; then
+        python3 -m venv --clear "$folder" &&
+            "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$requirements" &&
+            cp "$requirements" "$folder" || return
+    fi
+    ATOLL_PYTHON=$(realpath "$folder")/bin/python
+    export ATOLL_PYTHON
+}
+
 provide
+[[ -n ${ATOLL_PYTHON:-} ]] || step provide_python || leave_out 'the examples in Python: their packages cannot be had'
 features=()
 if has_libclang; then
     features+=(--features atoll-tests/iceoryx2)
