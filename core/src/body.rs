@@ -27,8 +27,7 @@ pub struct Body {
 impl Body {
     pub(crate) fn is_finite(&self) -> bool {
         self.position.is_finite()
-            && self.rotation.c.is_finite()
-            && self.rotation.s.is_finite()
+            && self.rotation.is_finite()
             && self.velocity.is_finite()
             && self.angular_velocity.is_finite()
     }

@@ -55,6 +55,20 @@ impl Contact {
         1 + usize::from(self.points[1].feature != ContactPoint::ABSENT)
     }
 
+    pub(crate) fn is_finite(&self) -> bool {
+        let point = |point: &ContactPoint| {
+            point.anchor.is_finite()
+                && point.separation.is_finite()
+                && point.normal_impulse.is_finite()
+                && point.tangent_impulse.is_finite()
+        };
+        self.normal.is_finite()
+            && self.offset.is_finite()
+            && self.rotation_a.is_finite()
+            && self.rotation_b.is_finite()
+            && self.points.iter().all(point)
+    }
+
     /// The stored impulses' sum upon body B, and its moments about the centers of A (upon A) and of B (upon B). Body A
     /// feels the opposite impulse.
     pub(crate) fn impulse(&self) -> (Vec2, f32, f32) {
@@ -120,7 +134,8 @@ impl Slot {
 }
 
 /// Two slots, the lower first. The lower is always an owned body: a tile solves no other contacts.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Pod, Zeroable)]
+#[repr(transparent)]
 pub(crate) struct PairKey(u64);
 
 impl PairKey {

@@ -51,6 +51,13 @@
 //! ranks as bytes ([`Frames`], [`Inbox::decode`]) and the [`Verdict`] of each to all. At the end of a run [`finish`]
 //! makes the closing exchange.
 //!
+//! # Saving
+//!
+//! [`World::save`] turns each tile into a block of bytes; [`World::restore`] turns it back, in any world that holds the
+//! tile and has the same [`Blueprint`]; [`World::resume_at`] sets the number of the next step. What follows is the same,
+//! bit for bit, as if the run had never stopped, whichever rank holds which tile. Where the bytes are kept is for the
+//! caller to see to.
+//!
 //! # What determinism promises
 //!
 //! For one tile grid and one set of parameters: the same bits in debug and release builds, on every x86-64 processor,
@@ -79,6 +86,7 @@ mod phase;
 mod setup;
 mod shape;
 mod sleep;
+mod snapshot;
 mod solver;
 mod step;
 mod team;
@@ -91,7 +99,7 @@ mod world;
 pub use body::{Bodies, Body, StaticBody};
 pub use codec::{FORMAT, Frames};
 pub use contact::{Contact, ContactPoint};
-pub use error::{CodecError, SetupError, StepError};
+pub use error::{CodecError, RestoreError, SetupError, StepError};
 pub use facts::{Facts, TileFacts};
 pub use halo::{
     BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Halo, Inbox, Message, Outbox, Unseen, Verdict,
@@ -104,5 +112,6 @@ pub use partition::{Region, TileGrid};
 pub use phase::{Phase, Timings};
 pub use setup::Blueprint;
 pub use shape::{Kind, Material, Shape};
+pub use snapshot::{SNAPSHOT_FORMAT, SavedTile};
 pub use step::{StepReport, finish, step};
 pub use world::World;

@@ -58,6 +58,10 @@ impl Rot {
         Self { c: self.c * other.c + self.s * other.s, s: self.c * other.s - self.s * other.c }
     }
 
+    pub(crate) fn is_finite(self) -> bool {
+        self.c.is_finite() && self.s.is_finite()
+    }
+
     /// The same direction at length one.
     #[inline(always)]
     pub fn normalized(self) -> Self {

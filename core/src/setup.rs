@@ -109,6 +109,11 @@ impl Setup {
         self.static_names.binary_search(&id).is_ok()
     }
 
+    /// Whether a dynamic body may be one of this world: its kind is in the table, its name no static's.
+    pub(crate) fn knows(&self, body: &Body) -> bool {
+        (body.kind.0 as usize) < self.dynamic_kinds && !self.is_static(body.id)
+    }
+
     #[inline(always)]
     pub(crate) fn kind(&self, kind: KindId) -> &KindRow {
         &self.kinds[kind.0 as usize]

@@ -27,6 +27,12 @@ pub(crate) struct Sleep {
 }
 
 impl Sleep {
+    /// Bodies that have rested for so many seconds. Who of them sleeps is decided in the next step, as in every step.
+    pub(crate) fn of(still: Vec<f32>) -> Self {
+        let asleep = vec![false; still.len()];
+        Self { still, asleep, ..Self::default() }
+    }
+
     /// For each owned body whether it sleeps; empty where nobody may.
     pub(crate) fn asleep(&self) -> &[bool] {
         &self.asleep

@@ -77,6 +77,11 @@ pub(crate) enum Fault {
 
 impl Tile {
     pub(crate) fn new(id: TileId, setup: &Setup) -> Self {
+        Self::with_statics(id, setup.statics_of(id), setup)
+    }
+
+    /// An empty tile whose statics are known already.
+    pub(crate) fn with_statics(id: TileId, statics: Vec<u32>, setup: &Setup) -> Self {
         let region = setup.grid.region(id);
         let quadtree = || Box::new(Quadtree::new(setup.grid.tile_size().as_vec2().to_array()));
         Self {
@@ -89,7 +94,7 @@ impl Tile {
             arrived: 0,
             unseen: Vec::new(),
             ghost_owners: Vec::new(),
-            statics: setup.statics_of(id),
+            statics,
             contacts: ContactCache::default(),
             strays: Strays::default(),
             sleep: Sleep::default(),

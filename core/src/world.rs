@@ -128,8 +128,7 @@ impl World {
     /// two bodies of the world share a name is for the caller to see to.
     pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
         let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
-        let known = (body.kind.0 as usize) < self.setup.dynamic_kinds && !self.setup.is_static(body.id);
-        if !(body.is_finite() && turned && known) {
+        if !(body.is_finite() && turned && self.setup.knows(&body)) {
             return Err(SetupError::BadBody { id: body.id });
         }
         let owner = self.setup.grid.locate(body.position);
@@ -179,6 +178,10 @@ impl World {
 
     pub(crate) fn tile_states(&self) -> &[Tile] {
         &self.tiles
+    }
+
+    pub(crate) fn tile_states_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
     }
 
     /// Starts a step: no sync point passed, nothing counted.

@@ -1,6 +1,7 @@
 //! Why a run ended early, and with which exit code.
 
 use crate::config::ConfigError;
+use crate::snapshot::SnapshotError;
 use crate::trajectory::TrajectoryError;
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
@@ -81,6 +82,30 @@ pub enum RunError {
         /// What the system said.
         reason: String,
     },
+    /// A folder for the run's output that cannot be used.
+    #[error("{option} {}: {reason}", .path.display())]
+    BadFolder {
+        /// What it was given with.
+        option: &'static str,
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        reason: String,
+    },
+    /// A run that is to go on and is at its end.
+    #[error("all {steps} steps of this run are made already, see {}; give more --steps to go on", .summary.display())]
+    Complete {
+        /// What it came to.
+        summary: PathBuf,
+        /// How many it was to make.
+        steps: u64,
+    },
+    /// A recording that cannot be written or read.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// A snapshot that cannot be used.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
     /// A rank whose threads cannot be had.
     #[error("rank {rank} cannot start {threads} threads: {reason}; use fewer threads or ranks")]
     Threads {
@@ -184,10 +209,7 @@ pub enum RunError {
         /// At the end.
         found: u64,
     },
-    /// A recording.
-    #[error(transparent)]
-    Trajectory(#[from] TrajectoryError),
-    /// A result could not be written after the run.
+    /// A result could not be written.
     #[error("cannot write {}: {reason}", .path.display())]
     Output {
         /// The path.
@@ -195,16 +217,37 @@ pub enum RunError {
         /// What the system said.
         reason: String,
     },
+    /// A run that could not write any more, and stopped.
+    #[error(
+        "{why}; stopped after {complete} of {steps} steps, and what was written before is whole: mend this and go on with \
+         `atoll run --resume {}`", .folder.display()
+    )]
+    StoppedWriting {
+        /// What could not be written.
+        why: String,
+        /// Steps completed.
+        complete: u64,
+        /// Steps asked for.
+        steps: u64,
+        /// The folder of the run.
+        folder: PathBuf,
+    },
 }
 
 impl RunError {
     /// The exit code that tells of this error.
     pub fn exit(&self) -> Exit {
         match self {
+            Self::Trajectory(TrajectoryError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
+                Exit::Output
+            }
             Self::Config(_)
             | Self::Setup(_)
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
+            | Self::BadFolder { .. }
+            | Self::Snapshot(_)
+            | Self::Trajectory(_)
             | Self::TooLarge { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }
@@ -215,8 +258,7 @@ impl RunError {
             Self::NonFinite { .. } | Self::Protocol { .. } | Self::FloatMode { .. } | Self::BodiesLost { .. } => {
                 Exit::Physics
             }
-            Self::Output { .. } | Self::Trajectory(TrajectoryError::Write { .. }) => Exit::Output,
-            Self::Trajectory(_) => Exit::Usage,
+            Self::Complete { .. } => Exit::Done,
         }
     }
 }

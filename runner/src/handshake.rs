@@ -3,6 +3,7 @@
 use crate::config::OneLine;
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
+use crate::snapshot::Snapshot;
 use atoll_transport::{Collective, Rank, Transport, TransportError};
 use std::collections::BTreeMap;
 
@@ -35,8 +36,9 @@ pub fn agree<T>(
         Ok(prepared) => hello(plan_of(prepared)),
         Err(error) => {
             // Output is the business of one rank.
-            let name = if matches!(error, RunError::BadOutput { .. }) { COMMON_ERROR } else { ERROR };
-            vec![(name.to_owned(), format!("{} {}", error.exit() as u8, OneLine(&error.to_string())))]
+            let of_one = matches!(error, RunError::BadOutput { .. } | RunError::BadFolder { .. });
+            let name = if of_one { COMMON_ERROR } else { ERROR };
+            vec![(name.to_owned(), in_words(error))]
         }
     };
     let hellos = transport.all_gather(encode(&hello).as_bytes()).map_err(Refusal::Transport)?;
@@ -59,6 +61,8 @@ fn hello(plan: &Plan) -> Hello {
         ("number of ranks", run.ranks.to_string()),
         ("configuration", plan.config.hash(plan.tiles)),
         ("mpi_exchange", format!("{:?}", run.mpi_exchange).to_lowercase()),
+        ("output", format!("{:?}", plan.output.as_ref().map(|output| (output.record_every, output.checkpoint_every)))),
+        ("snapshots of steps", format!("{:?}", plan.found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>())),
     ];
     lines.map(|(name, value)| (name.to_owned(), value)).into()
 }
@@ -102,7 +106,26 @@ fn refusal(hellos: &[Hello]) -> Option<RunError> {
     None
 }
 
-/// Exit code and words of an error, which is that of one rank or of all.
+/// Lets all ranks hear whether any of them is in trouble, and which: that of the lowest. Every rank gets the same, and none
+/// before all were asked.
+///
+/// # Errors
+/// The trouble, or that they cannot talk.
+pub fn all_well(transport: &mut impl Transport, trouble: Option<&RunError>) -> Result<(), Refusal> {
+    let own = trouble.map(in_words).unwrap_or_default();
+    let words = transport.all_gather(own.as_bytes()).map_err(Refusal::Transport)?;
+    match words.into_iter().find(|words| !words.is_empty()) {
+        Some(words) => Err(Refusal::Known(relayed(&String::from_utf8_lossy(&words), None))),
+        None => Ok(()),
+    }
+}
+
+/// Exit code and words of an error, on one line.
+fn in_words(error: &RunError) -> String {
+    format!("{} {}", error.exit() as u8, OneLine(&error.to_string()))
+}
+
+/// The error that was put in words, which is that of one rank or of all.
 fn relayed(error: &str, rank: Option<usize>) -> RunError {
     let (code, text) = error.split_once(' ').unwrap_or(("", error));
     let text = rank.map_or(text.to_owned(), |rank| format!("rank {rank}: {text}"));

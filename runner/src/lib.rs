@@ -28,9 +28,12 @@ pub mod interrupt;
 pub mod output;
 pub mod plan;
 pub mod progress;
+pub mod recorder;
 #[cfg(feature = "iceoryx2")]
 pub mod report;
+pub mod run_folder;
 pub mod scene;
+pub mod snapshot;
 pub mod summary;
 pub mod telemetry;
 pub mod tiles;

@@ -1,4 +1,4 @@
-//! What is written when all is done: to standard output, and to files, each whole or not at all.
+//! What is written in one go: to standard output, and to files, each whole or not at all.
 
 use crate::error::RunError;
 use std::ffi::OsString;
@@ -40,6 +40,11 @@ impl WholeFile {
         }
     }
 
+    /// A path that is sure to be writable when it is needed, or else to fail then.
+    pub fn unchecked(path: &Path) -> Self {
+        Self { path: path.to_owned() }
+    }
+
     /// Writes this and nothing else.
     ///
     /// # Errors
@@ -49,13 +54,7 @@ impl WholeFile {
             if self.is_special() {
                 return File::create(&self.path)?.write_all(content);
             }
-            let temporary = self.temporary();
-            let written = File::create(&temporary).and_then(|mut file| {
-                file.write_all(content)?;
-                file.sync_all()
-            });
-            let renamed = written.and_then(|()| fs::rename(&temporary, &self.path));
-            renamed.inspect_err(|_| drop(fs::remove_file(&temporary)))
+            write_durably(&self.path, |file| file.write_all(content))
         };
         write().map_err(|error| RunError::Output { path: self.path.clone(), reason: error.to_string() })
     }
@@ -71,8 +70,9 @@ impl WholeFile {
             File::options().append(true).open(&self.path)?;
         }
         if !self.is_special() {
-            File::create(self.temporary())?;
-            fs::remove_file(self.temporary())?;
+            let temporary = temporary(&self.path);
+            File::create(&temporary)?;
+            fs::remove_file(temporary)?;
         }
         Ok(())
     }
@@ -81,12 +81,35 @@ impl WholeFile {
     fn is_special(&self) -> bool {
         fs::metadata(&self.path).is_ok_and(|data| !data.is_file())
     }
+}
 
-    /// Beside the file, so that renaming never crosses file systems.
-    fn temporary(&self) -> PathBuf {
-        let mut name = OsString::from(".");
-        name.push(self.path.file_name().expect("checked to have a name"));
-        name.push(format!(".{}.tmp", std::process::id()));
-        self.path.with_file_name(name)
+/// Writes a file whole and durably, or not at all: under another name first.
+///
+/// # Errors
+/// What the system says; nothing is left then.
+pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    let temporary = temporary(path);
+    let written = File::create(&temporary).and_then(|mut file| {
+        write(&mut file)?;
+        file.sync_all()
+    });
+    let renamed = written.and_then(|()| fs::rename(&temporary, path)).and_then(|()| sync_folder(path));
+    renamed.inspect_err(|_| drop(fs::remove_file(&temporary)))
+}
+
+/// Makes it durable that there is a file of that name, where folders can be made durable.
+fn sync_folder(path: &Path) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match File::open(folder).map(|folder| folder.sync_all()) {
+        Ok(Err(error)) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
+        _ => Ok(()),
     }
+}
+
+/// Beside the file, so that renaming never crosses file systems.
+fn temporary(path: &Path) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.tmp", std::process::id()));
+    path.with_file_name(name)
 }

@@ -3,7 +3,9 @@
 use crate::assignment::Assignment;
 use crate::config::{Config, TransportKind};
 use crate::error::RunError;
+use crate::run_folder::{Claim, RunFolder};
 use crate::scene::Scene;
+use crate::snapshot::{self, Found, Snapshot};
 use crate::tiles;
 use atoll_core::{Blueprint, TileGrid, World};
 use std::thread;
@@ -23,6 +25,35 @@ pub struct Plan {
     pub assignment: Assignment,
     /// What carries the bytes.
     pub transport: TransportKind,
+    /// What is written while it runs, if anything is.
+    pub output: Option<Output>,
+    /// Where it can go on from; nothing if it begins.
+    pub found: Found,
+}
+
+/// What a run writes to its folder.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// Where to.
+    pub folder: RunFolder,
+    /// The folder's configuration, every value resolved.
+    pub configuration: String,
+    /// Steps between two records.
+    pub record_every: Option<u64>,
+    /// Steps between two snapshots.
+    pub checkpoint_every: Option<u64>,
+    /// Whether the run begins there, or goes on.
+    pub begins: bool,
+}
+
+impl Output {
+    /// Makes the folder that of this run.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run writes there.
+    pub fn claim(&self) -> Result<Claim, RunError> {
+        self.folder.claim(self.begins, &self.configuration)
+    }
 }
 
 /// Refuses a world that this machine cannot hold, before it tries to. `here` is how many of the ranks it surely holds.
@@ -41,11 +72,52 @@ fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64) -> Result<(), Ru
 }
 
 impl Plan {
-    /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks.
+    /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks. Nothing is written.
     ///
     /// # Errors
     /// If no world can be made of it.
     pub fn new(config: &Config) -> Result<Self, RunError> {
+        Self::from_found(config, Found::default())
+    }
+
+    /// A run that begins in a folder and writes there.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn beginning(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
+        Ok(Self::new(config)?.writing(folder, true))
+    }
+
+    /// A run that goes on in a folder, from the newest snapshot that is whole; from the start if none was complete when
+    /// the run ended.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and if what the folder holds is another run, or cannot be gone on with.
+    pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
+        let scene = Scene::new(&config.scene);
+        let tiles = tiles::tile_counts(config, &scene);
+        folder.check_same_run(config, tiles)?;
+        if folder.is_complete(config.run.steps) {
+            return Err(RunError::Complete { summary: folder.summary(), steps: config.run.steps });
+        }
+        let found = snapshot::find(&folder.snapshots(), &config.canonical(tiles))?;
+        if let Some(step) = found.snapshots.first().map(Snapshot::step).filter(|&step| step > config.run.steps) {
+            let steps = config.run.steps;
+            let reason =
+                format!("{step} steps are made there already, and {steps} asked for; give --steps as many or more");
+            return Err(folder.refusal(reason));
+        }
+        Ok(Self::from_found(config, found)?.writing(folder, false))
+    }
+
+    fn writing(mut self, folder: RunFolder, begins: bool) -> Self {
+        let (output, configuration) = (&self.config.output, self.config.to_toml(self.tiles));
+        let (record_every, checkpoint_every) = (output.record_every, output.checkpoint_every);
+        self.output = Some(Output { folder, configuration, record_every, checkpoint_every, begins });
+        self
+    }
+
+    fn from_found(config: &Config, found: Found) -> Result<Self, RunError> {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
         let transport = config.transport();
@@ -61,17 +133,20 @@ impl Plan {
         World::new(&blueprint, &[])?;
 
         let ranks = config.run.ranks;
-        let mut weights = vec![0; blueprint.grid.tiles()];
-        if ranks > 1 {
-            scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
-        }
+        let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
+            let mut weights = vec![0; blueprint.grid.tiles()];
+            if ranks > 1 {
+                scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
+            }
+            weights
+        });
         let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
-        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport })
+        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output: None, found })
     }
 
     /// What the user may want to know before it starts, a sentence each.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
+        let mut notes: Vec<String> = self.found.damaged.iter().map(|error| error.to_string()).collect();
         let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.grid.tiles());
         if idle > 0 {
             let ranks = self.assignment.ranks();
@@ -95,6 +170,13 @@ impl Plan {
                 "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
             ));
         }
+        notes.extend(self.output.as_ref().filter(|output| !output.begins).map(|output| {
+            let folder = output.folder.path().display();
+            match self.found.snapshots.first() {
+                Some(snapshot) => format!("going on with {folder} after step {}", snapshot.step()),
+                None => format!("{folder} holds no complete snapshot yet: beginning anew"),
+            }
+        }));
         notes
     }
 }

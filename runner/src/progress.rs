@@ -29,17 +29,19 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// Progress towards so many steps.
-    pub fn new(show: Show, steps: u64) -> Self {
+    /// Progress from a step towards so many.
+    pub fn new(show: Show, from: u64, steps: u64) -> Self {
         match show {
             Show::Nothing => Self::Hidden,
             Show::OnStderr if io::stderr().is_terminal() => {
                 let style = ProgressStyle::with_template("{bar:40} {pos} of {len} steps, {per_sec}, {eta} left")
                     .expect("the template is well formed");
-                let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
+                let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr()).with_position(from);
+                // So that what was made before does not count for the speed.
+                bar.reset_eta();
                 Self::Bar(bar.with_style(style))
             }
-            Show::OnStderr => Self::Lines(Lines::new(steps, Instant::now())),
+            Show::OnStderr => Self::Lines(Lines::new(from, steps, Instant::now())),
         }
     }
 
@@ -74,8 +76,8 @@ pub struct Lines {
 }
 
 impl Lines {
-    fn new(steps: u64, now: Instant) -> Self {
-        Self { steps, last: (now, 0) }
+    fn new(from: u64, steps: u64, now: Instant) -> Self {
+        Self { steps, last: (now, from) }
     }
 
     /// A line, if it is time for one.
@@ -99,7 +101,7 @@ mod tests {
     #[test]
     fn lines_come_every_two_seconds_with_rate_and_time_left() {
         let start = Instant::now();
-        let mut lines = Lines::new(100, start);
+        let mut lines = Lines::new(0, 100, start);
         assert_eq!(lines.made(10, start + Duration::from_secs(1)), None);
         let line = lines.made(20, start + Duration::from_secs(2));
         assert_eq!(line.as_deref(), Some("step 20 of 100, 10.0 steps/s, 8 s left"));

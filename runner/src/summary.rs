@@ -20,6 +20,8 @@ pub struct RankFacts {
     pub contact_hash: [u64; 2],
     /// Steps made.
     pub steps: u64,
+    /// Of those, the ones that were made before the run went on from a snapshot.
+    pub resumed_at: u64,
     /// Whether it was asked to stop early: 0 or 1.
     pub interrupted: u64,
     /// Bodies outside of the rectangle they must not leave.
@@ -48,6 +50,8 @@ pub struct RankFacts {
     pub wall_nanos: u64,
     /// Time in which the exchange waited for other ranks.
     pub wait_nanos: u64,
+    /// Time in which the state was copied to be written, or the disk was waited for.
+    pub output_nanos: u64,
     /// Time of each phase, in the order of [`Phase::ALL`].
     pub phase_nanos: [u64; PHASES],
 }
@@ -83,8 +87,8 @@ impl RankFacts {
     }
 
     fn timings(&self, rank: usize, threads: usize) -> RankTimings {
-        let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum());
-        let mut phases = Vec::with_capacity(PHASES + 2);
+        let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum::<u64>() + self.output_nanos);
+        let mut phases = Vec::with_capacity(PHASES + 3);
         for (phase, nanos) in Phase::ALL.into_iter().zip(self.phase_nanos) {
             if phase == Phase::Exchange {
                 // The part in which nothing was done but wait is told apart.
@@ -94,8 +98,9 @@ impl RankFacts {
                 phases.push((phase.name(), nanos));
             }
         }
-        phases.push(("other", rest));
-        RankTimings { rank, threads, steps: self.steps, wall_nanos: self.wall_nanos, phases }
+        phases.extend([("output", self.output_nanos), ("other", rest)]);
+        let steps = self.steps - self.resumed_at;
+        RankTimings { rank, threads, steps, wall_nanos: self.wall_nanos, phases }
     }
 
     fn hashes(&self) -> Hashes {
@@ -130,6 +135,9 @@ pub struct Summary {
     pub bodies: u64,
     /// Steps made.
     pub steps: u64,
+    /// Where the run last went on from a snapshot: times, migrations and what was sent are counted from that step. 0 where it
+    /// began at the start.
+    pub resumed_at: u64,
     /// Whether the run was stopped before all steps were made.
     pub interrupted: bool,
     /// Ranks.
@@ -210,7 +218,8 @@ impl Summary {
         let most = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).max().unwrap_or(0);
         let facts = Facts::total(tiles);
         let hashes = ranks.iter().map(RankFacts::hashes).fold(Hashes::default(), Hashes::merge);
-        let steps = most(|rank| rank.steps);
+        let (steps, resumed_at) = (most(|rank| rank.steps), most(|rank| rank.resumed_at));
+        let made = steps - resumed_at;
         let threads = plan.config.run.threads;
         let timings: Vec<_> = ranks.iter().enumerate().map(|(rank, facts)| facts.timings(rank, threads)).collect();
         let wall_s = most(|rank| rank.wall_nanos) as f64 * 1e-9;
@@ -222,6 +231,7 @@ impl Summary {
             config_hash: plan.config.hash(plan.tiles),
             bodies: plan.scene.bodies(),
             steps,
+            resumed_at,
             interrupted: most(|rank| rank.interrupted) > 0,
             ranks: ranks.len(),
             threads,
@@ -229,7 +239,7 @@ impl Summary {
             transport: plan.transport.name(),
             build_s: most(|rank| rank.build_nanos) as f64 * 1e-9,
             wall_s,
-            ms_per_step: wall_s * 1e3 / steps.max(1) as f64,
+            ms_per_step: wall_s * 1e3 / made.max(1) as f64,
             state_hash: format!("{:032x}", hashes.state),
             contact_hash: format!("{:032x}", hashes.contact),
             bodies_lost: plan.scene.bodies() as i64 - facts.bodies as i64,
@@ -293,10 +303,11 @@ impl fmt::Display for Summary {
         writeln!(f, "{}: {} bodies, seed {}, {columns} x {rows} tiles", self.scene, self.bodies, self.seed)?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
-        let rate = if self.wall_s > 0.0 { self.steps as f64 / self.wall_s } else { 0.0 };
+        let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };
         let each = self.ms_per_step;
-        let steps = plural(self.steps, "step");
-        writeln!(f, "{steps} in {:.2} s: {each:.3} ms per step, {rate:.1} steps/s{early}", self.wall_s)?;
+        let after = if self.resumed_at > 0 { format!(" after the first {}", self.resumed_at) } else { String::new() };
+        let steps = plural(self.steps - self.resumed_at, "step");
+        writeln!(f, "{steps}{after} in {:.2} s: {each:.3} ms per step, {rate:.1} steps/s{early}", self.wall_s)?;
         self.write_phases(f)?;
         self.write_facts(f)
     }

@@ -3,7 +3,7 @@
 use crate::program::{Ended, LIMIT, Running};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -47,6 +47,20 @@ pub fn send_signal(pid: u32, signal: &str) {
 /// Whether there is such a process that is no mere entry in the table of processes, left because nobody asks for its end.
 pub fn is_alive(pid: u32) -> bool {
     state(pid).is_some_and(|(state, _)| state != 'Z' && state != 'X')
+}
+
+/// Kills a program and all it has started, at once.
+pub fn kill_all(program: &Running) {
+    let mut pids = descendants(program.id());
+    pids.push(program.id());
+    // Those that have ended meanwhile are no trouble.
+    pids.iter()
+        .for_each(|pid| drop(Command::new("kill").args(["-KILL", &pid.to_string()]).stderr(Stdio::null()).status()));
+    let deadline = Instant::now() + LIMIT;
+    while pids.iter().any(|&pid| pid != program.id() && is_alive(pid)) {
+        assert!(Instant::now() < deadline, "killed processes live on");
+        sleep(Duration::from_millis(2));
+    }
 }
 
 /// The ranks that a program started, directly or through others, in rank order, once all are there.

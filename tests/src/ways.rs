@@ -2,6 +2,7 @@
 
 use crate::program;
 use std::fmt;
+use std::path::Path;
 use std::process::Command;
 
 /// What carries the bytes, and how.
@@ -52,18 +53,27 @@ impl Way {
 
     /// `atoll run CONFIG` on so many ranks, started as a user would start it. More options can be added.
     pub fn command(self, ranks: usize, config: &str) -> Command {
+        self.run(ranks, &[config])
+    }
+
+    /// `atoll run --resume FOLDER` on so many ranks. More options can be added.
+    pub fn resume(self, ranks: usize, folder: &Path) -> Command {
+        self.run(ranks, &["--resume", folder.to_str().expect("folders of tests have simple names")])
+    }
+
+    fn run(self, ranks: usize, what: &[&str]) -> Command {
         let mut command = match self {
             #[cfg(feature = "mpi")]
             Self::Mpi(exchange) => {
                 let mut command = crate::mpi::mpirun(ranks);
-                command.arg(program::atoll(program::Profile::CURRENT)).args(["run", config]);
+                command.arg(program::atoll(program::Profile::CURRENT)).arg("run").args(what);
                 command.args(["--set", &format!("mpi_exchange={exchange}")]);
                 program::at_home(&mut command);
                 command
             }
             _ => {
                 let mut command = program::command();
-                command.args(["run", config, "--ranks", &ranks.to_string()]);
+                command.arg("run").args(what).args(["--ranks", &ranks.to_string()]);
                 command
             }
         };

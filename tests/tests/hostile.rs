@@ -1,6 +1,6 @@
-//! Hostile input: a million frames, ten thousand configurations and a few thousand command lines that nobody would
-//! write, against the targets of [`atoll_tests::fuzz`]. No panic, no error of two lines, and no more memory than the
-//! bytes that came can justify.
+//! Hostile input: a million frames, fifty thousand saved tiles, ten thousand configurations and a few thousand command
+//! lines that nobody would write, against the targets of [`atoll_tests::fuzz`]. No panic, no error of two lines, and no
+//! more memory than the bytes that came can justify.
 
 use atoll::scene::SplitMix64;
 use atoll_core::{KindId, Message, TileId};
@@ -210,6 +210,53 @@ fn a_frame_costs_what_it_brings_and_not_what_it_announces() {
         assert!(asked <= allowed_at_most(bytes.len()), "{asked} bytes for {}, changed at {at}", bytes.len());
         assert!(!accepted || (at - 20) % COUNTS < 8, "believed what stands at {at}");
     }
+}
+
+/// A saved tile that was changed in one of many ways.
+fn saved_tile(random: &mut SplitMix64, genuine: &[u8]) -> Vec<u8> {
+    let mut bytes = genuine.to_vec();
+    let few = 1 + below(random, 600);
+    match below(random, 6) {
+        0 => bytes = noise(random, few),
+        1 => bytes.truncate(below(random, genuine.len())),
+        2 => bytes.extend(noise(random, few)),
+        // One of the counts.
+        3 => {
+            let at = fuzz::BLOCK_HEADER - 48 + 4 * below(random, 4);
+            bytes[at..at + 4].copy_from_slice(&GREED[below(random, GREED.len())].to_le_bytes());
+        }
+        4 => {
+            let at = below(random, bytes.len());
+            let length = bytes.len() - at;
+            bytes.splice(at.., noise(random, length));
+        }
+        _ => {
+            for _ in 0..=below(random, 8) {
+                let bit = below(random, 8 * bytes.len());
+                bytes[bit / 8] ^= 1 << (bit % 8);
+            }
+        }
+    }
+    bytes
+}
+
+#[test]
+fn saved_tiles_that_were_changed() {
+    let mut random = SplitMix64::after(5, 0);
+    let genuine = fuzz::block();
+    assert!(fuzz::snapshot(&genuine));
+    let (mut accepted, count) = (0, rounds(50_000));
+    for round in 0..count {
+        let mut bytes = saved_tile(&mut random, &genuine);
+        accepted += usize::from(fuzz::snapshot(&bytes));
+        fuzz::seal(&mut bytes);
+        let mut world = fuzz::fresh();
+        let before = ASKED.get();
+        let _ = world.restore(TileId(0), &bytes);
+        let asked = ASKED.get() - before;
+        assert!(asked <= allowed(bytes.len()), "round {round}: {asked} bytes for {}: {bytes:02x?}", bytes.len());
+    }
+    assert!(accepted > count / 50 && accepted < count / 2, "{accepted} of {count} accepted");
 }
 
 #[test]

@@ -28,6 +28,8 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
     Diff(DiffArgs),
+    /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
+    Info(InfoArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

@@ -1,7 +1,6 @@
 //! Ranks as processes of this machine that share memory: the launcher, and what each of them does.
 
 use super::outcome::{Ends, outcome, told};
-use crate::config::Config;
 use crate::drive::{self, Observer, RankEnd, RankError};
 use crate::error::{Exit, RunError};
 use crate::handshake::{self, Refusal};
@@ -22,11 +21,36 @@ use std::{env, io};
 /// Tells the ranks what they must find in the configuration that they read for themselves.
 const CONFIG_HASH: &str = "ATOLL_CONFIG_HASH";
 
-/// Starts this program once more for each rank, with the arguments it was started with, and waits for all.
+/// Tells the ranks to go on with what others, who were lost, began.
+const GOES_ON: &str = "ATOLL_GOES_ON";
+
+/// What a user's signals ask of a launcher.
+#[derive(Debug)]
+pub struct Signals {
+    stop: StopFlag,
+    quit: StopFlag,
+}
+
+impl Signals {
+    /// Ctrl-C, SIGTERM and SIGHUP: the first asks the ranks to stop, the second ends them.
+    pub fn handle() -> Self {
+        let quit = StopFlag::default();
+        let second = quit.clone();
+        Self { stop: StopFlag::on_signals(true, move || second.request()), quit }
+    }
+
+    /// Whether there was one.
+    pub fn ask_to_stop(&self) -> bool {
+        self.stop.is_requested()
+    }
+}
+
+/// Starts this program once more for each rank, with the arguments it was started with, and waits for all. `goes_on` says
+/// that they are not the first to do this.
 ///
 /// # Errors
 /// The one that ended the run, whichever and however many ranks it ended.
-pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
+pub fn run(plan: &Plan, config: &Path, signals: &Signals, goes_on: bool) -> Result<Summary, RunError> {
     if !config.is_file() {
         // What can be read but once would leave nothing for the ranks.
         let config = config.display();
@@ -36,10 +60,7 @@ pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
     }
     let program = env::current_exe()
         .map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))?;
-    let quit = StopFlag::default();
-    let second = quit.clone();
-    let stop = StopFlag::on_signals(true, move || second.request());
-    let control = || match (quit.is_requested(), stop.is_requested()) {
+    let control = || match (signals.quit.is_requested(), signals.stop.is_requested()) {
         (true, _) => Control::Quit,
         (false, true) => Control::Stop,
         (false, false) => Control::Run,
@@ -49,11 +70,14 @@ pub fn run(plan: &Plan, config: &Path) -> Result<Summary, RunError> {
     let command = |_: Rank| {
         let mut command = Command::new(&program);
         command.args(env::args_os().skip(1)).env(CONFIG_HASH, plan.config.hash(plan.tiles));
+        if goes_on {
+            command.env(GOES_ON, "1");
+        }
         command
     };
     let exits = iceoryx2::launch(run.ranks, options, &control, command)
         .map_err(|error: LaunchError| RunError::Ranks(error.to_string()))?;
-    if quit.is_requested() {
+    if signals.quit.is_requested() {
         return Err(RunError::ToldElsewhere { exit: Exit::Interrupted });
     }
     let (ends, before): (Ends, Vec<u64>) = exits.iter().map(end).unzip();
@@ -83,14 +107,20 @@ impl RankProcess {
         iceoryx2::is_rank_process().then_some(Self(()))
     }
 
-    /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end.
-    pub fn run(self, config: Result<Config, RunError>, observer: Observer) -> Exit {
+    /// Whether it goes on with what others, who were lost, began.
+    pub fn goes_on(&self) -> bool {
+        env::var_os(GOES_ON).is_some()
+    }
+
+    /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end. The plan
+    /// is given, as ranks wait for each other no longer than the peer timeout once they have joined.
+    pub fn run(self, plan: Result<Plan, RunError>, observer: Observer) -> Exit {
         let rank = iceoryx2::process_rank().unwrap_or_default();
         // Whoever signals all processes at once means what the launcher is about to say.
         let stop = StopFlag::on_signals(false, || {}).asking(iceoryx2::stop_requested);
         let observer = Observer { stop, ..observer };
         // The endpoint is dropped while a panic unwinds, which tells the other ranks.
-        let end = catch_unwind(AssertUnwindSafe(|| take_part(config, &observer)));
+        let end = catch_unwind(AssertUnwindSafe(|| take_part(plan, &observer)));
         let end = end.map_err(|payload| RankFailure::from_panic(rank, payload));
         let exit = match &end {
             Ok(RankEnd { result: Ok(_), .. }) => Exit::Done,
@@ -108,10 +138,8 @@ impl RankProcess {
 }
 
 /// One rank from start to end.
-fn take_part(config: Result<Config, RunError>, observer: &Observer) -> RankEnd {
+fn take_part(plan: Result<Plan, RunError>, observer: &Observer) -> RankEnd {
     let ended = |complete, error| RankEnd { complete, result: Err(error) };
-    // Before joining: from then on, ranks wait for each other no longer than the peer timeout.
-    let planned = config.and_then(|config| Plan::new(&config));
     let mut endpoint = match iceoryx2::join() {
         Ok(endpoint) => endpoint,
         Err(error) => return ended(0, RankError::Transport(error)),
@@ -120,7 +148,7 @@ fn take_part(config: Result<Config, RunError>, observer: &Observer) -> RankEnd {
         let hash = env::var(CONFIG_HASH);
         hash.is_ok_and(|hash| hash == plan.config.hash(plan.tiles)) && plan.config.run.ranks == endpoint.size()
     };
-    let prepared = planned.and_then(|plan| {
+    let prepared = plan.and_then(|plan| {
         let changed = || RunError::Ranks("the configuration was changed while the ranks were started".to_owned());
         if is_meant(&plan) { Ok(plan) } else { Err(changed()) }
     });

@@ -100,6 +100,18 @@ impl Job {
         }
     }
 
+    /// Goes on where all is well on every rank.
+    ///
+    /// # Errors
+    /// What is not, told by rank 0.
+    pub fn all_well<T>(&mut self, result: Result<T, RunError>) -> Result<T, RunError> {
+        match handshake::all_well(&mut self.endpoint, result.as_ref().err()) {
+            Ok(()) => result,
+            Err(Refusal::Known(error)) => Err(self.common(&error)),
+            Err(Refusal::Transport(error)) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
+        }
+    }
+
     /// Runs this rank's part of the plan that all agreed on. Rank 0 gets the summary.
     ///
     /// # Errors
@@ -122,7 +134,7 @@ impl Job {
         });
         match end.result {
             Ok(gathered) => Ok(gathered.map(|gathered| Summary::new(plan, gathered))),
-            Err(error @ RankError::Step(StepError::NonFinite { .. })) => {
+            Err(error @ (RankError::Step(StepError::NonFinite { .. }) | RankError::Agreed { .. })) => {
                 Err(self.common(&told(error, end.complete, run.steps)))
             }
             Err(error) => {

@@ -24,7 +24,7 @@ pub fn diff(args: &DiffArgs) -> Result<Exit, RunError> {
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;
     let compared = diff::compare(&args.a, &args.b, args.tolerance, |done, of| {
-        progress.get_or_insert_with(|| Progress::new(show, of as u64)).made(done as u64);
+        progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
     });
     if let Some(progress) = progress {
         progress.finish();

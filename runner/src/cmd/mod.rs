@@ -1,6 +1,7 @@
 //! The verbs of the program, one file each.
 
 pub mod diff;
+pub mod info;
 pub mod run;
 
 use crate::args::{self, Cli, Command};
@@ -20,6 +21,7 @@ pub fn main() -> ExitCode {
     let result = telemetry::init().and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::diff(args),
+        Command::Info(args) => info::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

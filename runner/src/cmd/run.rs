@@ -1,4 +1,4 @@
-//! `atoll run`: a scene from start to end.
+//! `atoll run`: a scene from start to end, or from where an earlier run came to.
 
 use crate::args::RunArgs;
 use crate::backend;
@@ -11,10 +11,11 @@ use crate::interrupt::StopFlag;
 use crate::output::{self, WholeFile};
 use crate::plan::Plan;
 use crate::progress::Show;
+use crate::run_folder::{Claim, RunFolder};
 use crate::summary::Summary;
 use crate::telemetry::complain;
 use crate::timings;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Does it, with everything that can be refused refused before anything heavy starts.
 ///
@@ -23,7 +24,9 @@ use std::path::Path;
 pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     #[cfg(feature = "iceoryx2")]
     if let Some(rank) = backend::iceoryx2::RankProcess::of_this() {
-        return Ok(rank.run(load(args), observer(args)));
+        let goes_on = rank.goes_on();
+        let plan = load(args).and_then(|config| plan(args, &config, goes_on));
+        return Ok(rank.run(plan, observer(args, goes_on)));
     }
     let config = load(args);
     #[cfg(feature = "mpi")]
@@ -32,28 +35,79 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     }
     let config = config?;
     let outputs = Outputs::check(args)?;
-    let plan = Plan::new(&config)?;
-    tell(&plan);
+    let first = plan(args, &config, false)?;
+    tell(&first);
+    let _claim = claim(&first)?;
     #[cfg(feature = "iceoryx2")]
-    if plan.transport == TransportKind::Iceoryx2 {
-        return conclude(&backend::iceoryx2::run(&plan, config_path(args))?, &outputs);
+    if first.transport == TransportKind::Iceoryx2 {
+        let signals = backend::iceoryx2::Signals::handle();
+        let path = configuration(args);
+        let run = |plan: &Plan, goes_on| backend::iceoryx2::run(plan, &path, &signals, goes_on);
+        return conclude(&supervise(args, &config, first, run, || signals.ask_to_stop())?, &outputs);
     }
     let stop = StopFlag::on_signals(true, || std::process::exit(Exit::Interrupted as i32));
-    let summary = backend::run(&plan, &Observer { stop, ..observer(args) })?;
-    conclude(&summary, &outputs)
+    let run = |plan: &Plan, goes_on| backend::run(plan, &Observer { stop: stop.clone(), ..observer(args, goes_on) });
+    conclude(&supervise(args, &config, first, run, || stop.is_requested())?, &outputs)
+}
+
+/// Runs a plan, and where a rank is lost goes on from the last snapshot, as often as the user allows. `run` is told whether
+/// it goes on with what was begun before.
+fn supervise(
+    args: &RunArgs,
+    config: &Config,
+    first: Plan,
+    run: impl Fn(&Plan, bool) -> Result<Summary, RunError>,
+    stop_asked: impl Fn() -> bool,
+) -> Result<Summary, RunError> {
+    let (mut current, mut restarts) = (first, 0);
+    loop {
+        match run(&current, restarts > 0) {
+            Err(error) if error.exit() == Exit::PeerLost && restarts < args.restarts && !stop_asked() => {
+                restarts += 1;
+                complain(&format!("{error}; starting again ({restarts} of {} times)", args.restarts));
+            }
+            ended => return ended,
+        }
+        current = plan(args, config, true)?;
+        tell(&current);
+    }
+}
+
+/// The folder that the run writes to, if there is one.
+fn folder(args: &RunArgs) -> Option<RunFolder> {
+    let out = args.out.as_ref().map(|path| RunFolder::new("--out", path));
+    out.or_else(|| args.resume.as_ref().map(|path| RunFolder::new("--resume", path)))
+}
+
+/// The file that says what to run: the user's, or the one in the folder of the run that is to go on.
+fn configuration(args: &RunArgs) -> PathBuf {
+    let file = args.config.clone().or_else(|| Some(folder(args)?.configuration()));
+    file.expect("either is required on the command line")
 }
 
 fn load(args: &RunArgs) -> Result<Config, RunError> {
-    Ok(Config::load(config_path(args), &args.overrides()?)?)
+    match folder(args) {
+        Some(folder) if args.config.is_none() && !folder.holds_run() => {
+            Err(folder.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"))
+        }
+        _ => Ok(Config::load(&configuration(args), &args.overrides()?)?),
+    }
 }
 
-fn config_path(args: &RunArgs) -> &Path {
-    args.config.as_deref().or(args.resume.as_deref()).unwrap_or(Path::new(""))
+/// Works out what the arguments ask for; `goes_on` says that the run was begun before, with these arguments.
+fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError> {
+    match folder(args) {
+        Some(folder) if goes_on || args.resume.is_some() && folder.holds_run() => Plan::going_on(config, folder),
+        Some(folder) => Plan::beginning(config, folder),
+        None => Plan::new(config),
+    }
 }
 
-fn observer(args: &RunArgs) -> Observer {
+fn observer(args: &RunArgs, goes_on: bool) -> Observer {
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
-    Observer { show, panic_at: args.panic_at, ..Observer::default() }
+    // What has been tried once is not tried again.
+    let panic_at = args.panic_at.filter(|_| !goes_on);
+    Observer { show, panic_at, ..Observer::default() }
 }
 
 /// What the user may want to know before the run starts.
@@ -61,6 +115,11 @@ fn tell(plan: &Plan) {
     for note in plan.notes() {
         complain(&note);
     }
+}
+
+/// Makes the folder of a run ready, if it has one.
+fn claim(plan: &Plan) -> Result<Option<Claim>, RunError> {
+    plan.output.as_ref().map(|output| output.claim()).transpose()
 }
 
 /// Whether ranks are to be joined by MPI. Where the configuration cannot be read, the command line says so, or that a
@@ -79,18 +138,23 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     let mut job = backend::mpi::Job::join()?;
     let speaks = job.speaks();
     let prepared = config.and_then(|config| {
-        let plan = Plan::new(&job.adapt(config)?)?;
-        // Only the rank that speaks writes.
+        if args.restarts > 0 {
+            let reason = "with transport mpi, start again with --resume, as configs/slurm/ does".to_owned();
+            return Err(RunError::Ranks(format!("--restarts {}: {reason}", args.restarts)));
+        }
+        let plan = plan(args, &job.adapt(config)?, false)?;
+        // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
         Ok((plan, outputs))
     });
     let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    let _claim = job.all_well(if speaks { claim(&plan) } else { Ok(None) })?;
     if speaks {
         tell(&plan);
     }
     // Silently: the launcher sends signals of its own when it ends a job.
     let stop = StopFlag::on_signals(false, || backend::mpi::Job::quit());
-    let concluded = match job.run(&plan, &Observer { stop, ..observer(args) })? {
+    let concluded = match job.run(&plan, &Observer { stop, ..observer(args, false) })? {
         Some(summary) => conclude(&summary, &outputs),
         None => Ok(Exit::Done),
     };
@@ -101,11 +165,12 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
 /// Shows and writes what became of a run, and says with which exit code to end.
 fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // All are tried before any is complained about: the one may save what another lost.
-    let json = outputs.json.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
+    let json = |file: &Option<WholeFile>| file.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
+    let (folder, json) = (json(&outputs.folder), json(&outputs.json));
     let timings =
         outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
     let shown = output::show(summary);
-    json.and(timings).and(shown)?;
+    folder.and(json).and(timings).and(shown)?;
 
     if summary.bodies_lost != 0 {
         let found = summary.bodies.wrapping_add_signed(-summary.bodies_lost);
@@ -119,6 +184,8 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
 struct Outputs {
     json: Option<WholeFile>,
     timings: Option<WholeFile>,
+    /// The summary in the folder of the run.
+    folder: Option<WholeFile>,
 }
 
 impl Outputs {
@@ -130,6 +197,10 @@ impl Outputs {
             let reason = "--json writes to the same file".to_owned();
             return Err(RunError::BadOutput { option: "--timings", path: path.to_owned(), reason });
         }
-        Ok(Self { json: check("--json", json)?, timings: check("--timings", timings)? })
+        if let Some(folder) = folder(args).filter(|folder| args.out.is_some() || !folder.holds_run()) {
+            folder.check_free(args.overwrite)?;
+        }
+        let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
+        Ok(Self { json: check("--json", json)?, timings: check("--timings", timings)?, folder })
     }
 }

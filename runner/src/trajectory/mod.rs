@@ -25,6 +25,7 @@ mod facts;
 mod layout;
 mod reader;
 mod record;
+mod remove;
 mod segment;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -36,6 +37,8 @@ pub use error::TrajectoryError;
 pub use facts::RunFacts;
 pub use reader::Trajectory;
 pub use record::{Record, Row};
+pub use remove::remove_after;
+pub use segment::{RecordEntry, Segment};
 pub use writer::TrajectoryWriter;
 
 use std::path::{Path, PathBuf};

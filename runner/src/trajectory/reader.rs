@@ -81,6 +81,11 @@ impl Trajectory {
         &self.facts
     }
 
+    /// Its segments.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
     /// The steps of the records, ascending.
     pub fn steps(&self) -> &[u64] {
         &self.steps

@@ -28,20 +28,28 @@ const CHUNK: usize = 4096;
 const START: u64 = 4;
 
 /// A complete segment.
-pub(super) struct Segment {
-    pub(super) path: PathBuf,
-    pub(super) facts: RunFacts,
-    pub(super) rank: u32,
-    pub(super) ranks: u32,
-    pub(super) records: Vec<RecordEntry>,
+#[derive(Debug)]
+pub struct Segment {
+    path: PathBuf,
+    /// The run it is of.
+    pub facts: RunFacts,
+    /// Who wrote it.
+    pub rank: u32,
+    /// Of so many.
+    pub ranks: u32,
+    /// Its records, ascending.
+    pub records: Vec<RecordEntry>,
     file: Arc<File>,
     metadata: ParquetMetaData,
 }
 
 /// A record, as the metadata tells of it.
-pub(super) struct RecordEntry {
-    pub(super) step: u64,
-    pub(super) rows: u64,
+#[derive(Debug)]
+pub struct RecordEntry {
+    /// The step.
+    pub step: u64,
+    /// Bodies of the rank.
+    pub rows: u64,
     /// Its row group, if it has any rows.
     group: usize,
     /// Of the bytes of its row group.
@@ -50,7 +58,10 @@ pub(super) struct RecordEntry {
 
 impl Segment {
     /// Reads what a file says about itself, and none of its rows.
-    pub(super) fn open(path: &Path) -> Result<Self, TrajectoryError> {
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no segment, or a damaged one.
+    pub fn open(path: &Path) -> Result<Self, TrajectoryError> {
         let bad = |reason| TrajectoryError::BadSegment { path: path.to_owned(), reason };
         let failed = |error: io::Error| TrajectoryError::Read { path: path.to_owned(), reason: error.to_string() };
         let file = File::open(path).map_err(failed)?;

@@ -1,20 +1,25 @@
 //! One rank of a run, from an empty world to the last figure.
 
+mod begin;
+mod output;
+
 use crate::args::PanicAt;
 use crate::error::Exit;
 use crate::exchange::{ExchangeError, RankHalo};
+use crate::handshake::Refusal;
 use crate::interrupt::StopFlag;
 use crate::plan::Plan;
 use crate::progress::{Progress, Show};
 use crate::summary::{Gathered, RankFacts};
-use atoll_core::{SetupError, StepError, StepReport, TileFacts, World};
+use atoll_core::{SetupError, StepError, StepReport, TileFacts};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
+use begin::Beginning;
 use bytemuck::Pod;
 use rayon::ThreadPoolBuilder;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
-use tracing::{debug, info, info_span};
+use std::time::{Duration, Instant};
+use tracing::{debug, info_span};
 
 /// How a run is watched.
 #[derive(Clone, Default, Debug)]
@@ -47,6 +52,13 @@ pub enum RankError {
     Step(StepError<ExchangeError>),
     /// Outside of a step, the transport failed.
     Transport(TransportError),
+    /// What all ranks know alike: they ended together.
+    Agreed {
+        /// In words.
+        text: String,
+        /// The exit code they go with.
+        exit: Exit,
+    },
     /// It said so itself, in a process of its own.
     Told {
         /// Its words.
@@ -54,6 +66,15 @@ pub enum RankError {
         /// The exit code they go with.
         exit: Exit,
     },
+}
+
+impl From<Refusal> for RankError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Transport(error) => Self::Transport(error),
+            Refusal::Known(error) => Self::Agreed { text: error.to_string(), exit: error.exit() },
+        }
+    }
 }
 
 impl RankError {
@@ -109,62 +130,62 @@ fn run<T: Transport>(
     let start = Instant::now();
     let rank = transport.rank();
     let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
-    let mut world = build(plan, rank)?;
+    let Beginning { mut world, resumed } = begin::build(plan, rank, halo.transport())?;
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
+    let mut recorder = output::start(plan, rank, resumed, halo.transport())?;
     let built = Instant::now();
 
+    let steps = plan.config.run.steps;
     let show = if rank == Rank(0) { observer.show } else { Show::Nothing };
-    let mut progress = Progress::new(show, plan.config.run.steps);
+    let mut progress = Progress::new(show, world.step_count(), steps);
     let before = halo.transport().stats();
     let mut last = StepReport::default();
     let mut migrations = 0;
-    while world.step_count() < plan.config.run.steps && !last.stopped {
-        if observer.stop.is_requested() {
+    if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
+        recorder.write_due(&world);
+    }
+    while world.step_count() < steps && !last.stopped {
+        if observer.stop.is_requested() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some()) {
             world.request_stop();
         }
         if observer.panic_at == Some(PanicAt { rank: rank.0, step: world.step_count() }) {
             panic!("as --panic-at asks");
         }
-        if world.step_count() + 1 == plan.config.run.steps {
+        if world.step_count() + 1 == steps {
             world.measure_next_step();
         }
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
         *complete = world.step_count();
         observer.complete.store(*complete, Ordering::Relaxed);
+        if let Some(recorder) = &mut recorder {
+            recorder.write_due(&world);
+        }
         progress.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
+    let output_time = match recorder {
+        Some(recorder) => output::finish(recorder, &world, last.stopped, plan, halo.transport())?,
+        None => Duration::ZERO,
+    };
     progress.finish();
     let finished = Instant::now();
 
     let sent = halo.transport().stats().since(&before);
     let mut facts = RankFacts::new(&world, &last, &plan.scene);
     facts.migrations = migrations;
+    facts.resumed_at = resumed.unwrap_or(0);
     (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
     facts.build_nanos = (built - start).as_nanos() as u64;
     facts.wall_nanos = (finished - built).as_nanos() as u64;
     facts.wait_nanos = halo.waited().as_nanos() as u64;
+    facts.output_nanos = output_time.as_nanos() as u64;
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();
     }
     gather(halo.transport(), &facts, &tiles).map_err(RankError::Transport)
-}
-
-/// This rank's part of the scene.
-fn build(plan: &Plan, rank: Rank) -> Result<World, RankError> {
-    let tiles = plan.assignment.tiles_of(rank.index());
-    let mut world = World::new(&plan.blueprint, &tiles).map_err(RankError::Setup)?;
-    let mut bodies = 0_u64;
-    if !tiles.is_empty() {
-        for body in plan.scene.iter() {
-            bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
-        }
-    }
-    info!(tiles = tiles.len(), bodies, "built");
-    Ok(world)
 }
 
 /// Brings everything to rank 0.

@@ -1,0 +1,62 @@
+//! The beginning and the end of what a rank writes, which ranks come to together.
+
+use super::RankError;
+use crate::error::RunError;
+use crate::handshake;
+use crate::plan::{Output, Plan};
+use crate::recorder::Recorder;
+use crate::snapshot;
+use crate::telemetry::complain;
+use atoll_core::World;
+use atoll_transport::{Rank, Transport};
+use std::time::Duration;
+
+/// Starts to write, on all ranks or none. What an earlier attempt left after the step from which the run goes on is removed
+/// first.
+pub(super) fn start<'a>(
+    plan: &'a Plan,
+    rank: Rank,
+    resumed: Option<u64>,
+    transport: &mut impl Transport,
+) -> Result<Option<Recorder<'a>>, RankError> {
+    let Some(output) = &plan.output else { return Ok(None) };
+    let mut removed = Ok(());
+    if rank == Rank(0) {
+        removed = output.folder.remove_after(resumed).map_err(|error| output.folder.refusal(error));
+    }
+    // Nobody writes before it is done.
+    handshake::all_well(transport, removed.as_ref().err())?;
+    let recorder = Recorder::start(plan, output, rank, resumed);
+    handshake::all_well(transport, recorder.as_ref().err())?;
+    Ok(recorder.ok())
+}
+
+/// Waits until everything is written, on all ranks, and says how long this one spent on writing. A run that was `stopped`
+/// leaves a snapshot to go on from.
+pub(super) fn finish(
+    mut recorder: Recorder<'_>,
+    world: &World,
+    stopped: bool,
+    plan: &Plan,
+    transport: &mut impl Transport,
+) -> Result<Duration, RankError> {
+    let Output { folder, checkpoint_every, .. } = recorder.output();
+    if stopped || checkpoint_every.is_some() {
+        recorder.snapshot(world);
+    }
+    let kept = recorder.snapshot_before();
+    let (time, finished) = recorder.finish();
+    let trouble = finished.err().map(|why| RunError::StoppedWriting {
+        why: why.to_string(),
+        complete: world.step_count(),
+        steps: plan.config.run.steps,
+        folder: folder.path().to_owned(),
+    });
+    handshake::all_well(transport, trouble.as_ref())?;
+    if let (Rank(0), Some(kept)) = (transport.rank(), kept)
+        && let Err(error) = snapshot::remove_before(&folder.snapshots(), kept)
+    {
+        complain(&format!("old snapshots stay in {}: {error}", folder.snapshots().display()));
+    }
+    Ok(time)
+}

@@ -1,0 +1,52 @@
+//! A fixed number of buffers that go back and forth between who fills and who empties them.
+
+use std::sync::mpsc::{self, Receiver, Sender};
+
+/// The end of who fills them.
+#[derive(Debug)]
+pub(super) struct Buffers<T> {
+    back: Receiver<T>,
+    /// How many may still be made.
+    unmade: usize,
+}
+
+impl<T: Default> Buffers<T> {
+    /// So many buffers, made when they are needed, and where they come back to.
+    pub(super) fn new(count: usize) -> (Self, Sender<T>) {
+        let (sender, back) = mpsc::channel();
+        (Self { back, unmade: count }, sender)
+    }
+
+    /// A buffer to fill, once there is one. None if nobody will give any back.
+    pub(super) fn take(&mut self) -> Option<T> {
+        // One that was used has its memory already.
+        if let Ok(buffer) = self.back.try_recv() {
+            return Some(buffer);
+        }
+        if self.unmade > 0 {
+            self.unmade -= 1;
+            return Some(T::default());
+        }
+        self.back.recv().ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::thread;
+
+    #[test]
+    fn no_more_are_made_than_were_allowed() {
+        let (mut buffers, back) = Buffers::<Vec<u8>>::new(2);
+        let (first, second) = (buffers.take().unwrap(), buffers.take().unwrap());
+        let third = thread::scope(|scope| {
+            let third = scope.spawn(|| buffers.take());
+            back.send(vec![7]).unwrap();
+            third.join().unwrap()
+        });
+        assert_eq!((first, second, third), (vec![], vec![], Some(vec![7])));
+        drop(back);
+        assert_eq!(buffers.take(), None);
+    }
+}

@@ -1,0 +1,212 @@
+//! The folder of a run: what lies where, who may write, and what is there when a run begins or goes on.
+//!
+//! ```text
+//! DIR/run.toml        the configuration with every value that was used; `atoll run` this file to repeat the run
+//! DIR/summary.json    as --json writes it, once the run has ended
+//! DIR/lock            held by every process of the run
+//! DIR/rank-00000/     segments of the recording, a folder for each rank (trajectory/)
+//! DIR/snapshots/      (snapshot/)
+//! ```
+
+use crate::config::{Config, Difference, differences};
+use crate::error::RunError;
+use crate::output::write_durably;
+use crate::{snapshot, trajectory};
+use serde::Deserialize;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Ranks of a run whose launcher was killed end by themselves; so long they are given.
+const LINGERING: Duration = Duration::from_secs(10);
+
+/// Between two looks at whether they have.
+const POLL: Duration = Duration::from_millis(20);
+
+/// A folder that is, or is to be, that of a run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// What it was given with.
+    option: &'static str,
+}
+
+/// The right to write to the folder of a run, as long as this lives. Processes of one run share it.
+#[derive(Debug)]
+pub struct Claim {
+    _lock: Option<File>,
+}
+
+impl RunFolder {
+    /// The folder at a path, whatever is there, which was given with an option.
+    pub fn new(option: &'static str, path: &Path) -> Self {
+        Self { path: path.to_owned(), option }
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The resolved configuration.
+    pub fn configuration(&self) -> PathBuf {
+        self.path.join("run.toml")
+    }
+
+    /// The closing figures.
+    pub fn summary(&self) -> PathBuf {
+        self.path.join("summary.json")
+    }
+
+    /// The snapshots.
+    pub fn snapshots(&self) -> PathBuf {
+        self.path.join("snapshots")
+    }
+
+    /// What a rank records.
+    pub fn rank(&self, rank: u32) -> PathBuf {
+        trajectory::rank_folder(&self.path, rank)
+    }
+
+    /// Whether a run was begun here.
+    pub fn holds_run(&self) -> bool {
+        self.configuration().is_file()
+    }
+
+    /// Refuses a folder in which no run can begin, before anything is done to it.
+    ///
+    /// # Errors
+    /// If it holds anything, unless that is a run and `overwrite` is true, or cannot be looked at.
+    pub fn check_free(&self, overwrite: bool) -> Result<(), RunError> {
+        let refuse = |reason: &str| Err(self.refusal(reason));
+        match fs::read_dir(&self.path).map(|mut entries| entries.next().is_none()) {
+            Ok(true) => Ok(()),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            Err(error) => refuse(&format!("{error}; name a folder")),
+            Ok(false) if !self.holds_run() => {
+                refuse("it is not empty, and what it holds is no run; name another folder")
+            }
+            Ok(false) if !overwrite => refuse(
+                "it holds a run; go on with that with --resume, replace it with --overwrite, or name another folder",
+            ),
+            Ok(false) => Ok(()),
+        }
+    }
+
+    /// Refuses to go on with a run that is configured otherwise than the one here. More steps, or fewer, are no other run.
+    ///
+    /// # Errors
+    /// Naming the first key that differs; or if no run was begun here.
+    pub fn check_same_run(&self, config: &Config, tiles: [u32; 2]) -> Result<(), RunError> {
+        if !self.holds_run() {
+            return Err(self.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"));
+        }
+        let begun = Config::load(&self.configuration(), &[])?;
+        let recorded = (begun.output.record_every, config.output.record_every);
+        if recorded.0 != recorded.1 {
+            let [there, here] =
+                [recorded.0, recorded.1].map(|every| every.map_or("none".to_owned(), |k| k.to_string()));
+            return Err(
+                self.refusal(format!("output.record_every = {there} there, and {here} here; leave it as it was"))
+            );
+        }
+        let differences = differences(&config.canonical(tiles), &begun.canonical(tiles_of(&begun)));
+        differences.into_iter().find(|difference| difference.key != "run.steps").map_or(Ok(()), |difference| {
+            let Difference { key, ours, theirs } = difference;
+            Err(self.refusal(format!("{key} = {theirs} there, and {ours} here; only how a run is spread can change")))
+        })
+    }
+
+    /// Whether the run here has made so many steps and come to its end.
+    pub fn is_complete(&self, steps: u64) -> bool {
+        #[derive(Deserialize)]
+        struct Ended {
+            steps: u64,
+            interrupted: bool,
+        }
+        let summary = fs::read(self.summary()).ok().and_then(|text| serde_json::from_slice(&text).ok());
+        summary.is_some_and(|ended: Ended| !ended.interrupted && ended.steps == steps)
+    }
+
+    /// That this folder cannot be used.
+    pub fn refusal(&self, reason: impl ToString) -> RunError {
+        RunError::BadFolder { option: self.option, path: self.path.clone(), reason: reason.to_string() }
+    }
+
+    /// Makes the folder that of a run about to begin or to go on: nobody else may write there, what an overwritten run left
+    /// is gone, and the configuration is there.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run writes there.
+    pub fn claim(&self, begins: bool, configuration: &str) -> Result<Claim, RunError> {
+        let failed = |error: io::Error| self.refusal(format!("{error}; name a folder that can be written to"));
+        fs::create_dir_all(&self.path).map_err(failed)?;
+        let claim = self.lock()?;
+        if begins {
+            self.remove_after(None).map_err(failed)?;
+        }
+        let write = |file: &mut File| file.write_all(configuration.as_bytes());
+        write_durably(&self.configuration(), write).map_err(failed)?;
+        Ok(claim)
+    }
+
+    /// Takes part in a claim that another process of this run made. A folder of another run is not that of this one: hosts of
+    /// a cluster must see the same files. `hash` is that of the run's configuration.
+    ///
+    /// # Errors
+    /// If it is not there, or that of another run.
+    pub fn share(&self, hash: &str) -> Result<Claim, RunError> {
+        let refusal = |reason: &str| self.refusal(format!("{reason}; every process of a run must see the same folder"));
+        let found = Config::load(&self.configuration(), &[]).map_err(|error| refusal(&error.to_string()))?;
+        if found.hash(tiles_of(&found)) != hash {
+            return Err(refusal("another run is in it"));
+        }
+        let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
+        Ok(Claim { _lock: lock })
+    }
+
+    fn open_lock(&self) -> io::Result<File> {
+        File::options().create(true).truncate(false).write(true).open(self.path.join("lock"))
+    }
+
+    fn lock(&self) -> Result<Claim, RunError> {
+        let failed = |error: io::Error| self.refusal(format!("{error}; name a folder that can be written to"));
+        let lock = self.open_lock().map_err(failed)?;
+        let deadline = Instant::now() + LINGERING;
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if Instant::now() < deadline => sleep(POLL),
+                Err(TryLockError::WouldBlock) => {
+                    return Err(self.refusal("another run is writing there; wait for its end, or stop it"));
+                }
+                // A file system without locks; then nobody can tell.
+                Err(TryLockError::Error(_)) => return Ok(Claim { _lock: None }),
+            }
+        }
+        // From now on it is shared with the other processes of the run.
+        lock.lock_shared().map_err(failed)?;
+        Ok(Claim { _lock: Some(lock) })
+    }
+
+    /// Removes what a run left after `step`, as it goes on from there; everything but the configuration if there is no such
+    /// step.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn remove_after(&self, step: Option<u64>) -> io::Result<()> {
+        match fs::remove_file(self.summary()) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        snapshot::remove_after(&self.snapshots(), step)?;
+        trajectory::remove_after(&self.path, step)
+    }
+}
+
+/// The tile grid in the configuration of a folder, where it is always given.
+fn tiles_of(config: &Config) -> [u32; 2] {
+    config.run.tiles.unwrap_or_default()
+}

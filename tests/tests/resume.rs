@@ -1,0 +1,278 @@
+//! A run that ends early, however that happens, goes on to the same hashes and the same recording on other ranks and
+//! another transport.
+
+use atoll_tests::processes;
+use atoll_tests::program::{self, Ended, Running};
+use atoll_tests::ways::Way;
+use atoll_tests::world::noise;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use tempfile::tempdir;
+
+const CONFIG: &str = "configs/quickstart.toml";
+
+/// What every run here has in common.
+const OPTIONS: [&str; 6] = ["--quiet", "--record-every", "20", "--checkpoint-every", "50", "--tiles=5x5"];
+
+/// How often each kind of death is tried, and over how many steps: `ATOLL_KILLS=20x3000` for one.
+fn kills() -> (u64, String) {
+    let text = std::env::var("ATOLL_KILLS").unwrap_or("2x400".to_owned());
+    let (times, steps) = text.split_once('x').expect("ATOLL_KILLS is TIMESxSTEPS");
+    (times.parse().expect("ATOLL_KILLS is TIMESxSTEPS"), steps.to_owned())
+}
+
+fn run(command: &mut Command) -> Ended {
+    let ended = program::run(command);
+    assert_eq!(ended.code, Some(0), "{command:?}: {ended}");
+    ended
+}
+
+fn summary(folder: &Path) -> Value {
+    program::summary(&folder.join("summary.json"))
+}
+
+fn assert_same_end(found: &Path, expected: &Path, what: &str) {
+    let (found_end, expected_end) = (summary(found), summary(expected));
+    for key in ["state_hash", "contact_hash", "config_hash", "steps", "interrupted", "bodies_lost"] {
+        assert_eq!(found_end[key], expected_end[key], "{key}: {what}");
+    }
+    let mut diff = program::command();
+    let ended = program::run(diff.arg("diff").args([expected, found]));
+    assert!(ended.code == Some(0) && ended.stdout.starts_with("identical"), "{what}: {ended}");
+}
+
+/// Snapshots that are there, by step.
+fn snapshots(folder: &Path) -> Vec<u64> {
+    let entries = fs::read_dir(folder.join("snapshots")).into_iter().flatten().flatten();
+    let step = |name: &str| name.strip_prefix("step-").and_then(|step| step.parse().ok());
+    let mut steps: Vec<u64> = entries.filter_map(|entry| step(&entry.file_name().to_string_lossy())).collect();
+    steps.sort_unstable();
+    steps
+}
+
+#[test]
+fn killed_runs_go_on_elsewhere() {
+    let (times, steps) = kills();
+    let folder = tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    let options = |command: &mut Command| {
+        command.args(OPTIONS).args(["--steps", &steps]);
+    };
+    let start = Instant::now();
+    let mut command = Way::Channel.command(2, CONFIG);
+    options(&mut command);
+    run(command.arg("--out").arg(&whole));
+    let duration = start.elapsed().as_secs_f64();
+
+    let ways: Vec<Way> = Way::all().into_iter().filter(|way| *way != Way::Local).collect();
+    for (w, &way) in (0..).zip(&ways) {
+        for time in 0..times {
+            let number = |k: u64, below: usize| (noise(100 * w + time, k) * below as f64) as usize;
+            let killed = folder.path().join(format!("killed-{w}-{time}"));
+            let mut command = way.command(1 + number(0, 4), CONFIG);
+            options(&mut command);
+            // Where nothing is there yet, this begins; so the very same command may be given again.
+            let running = Running::start(command.arg("--resume").arg(&killed));
+            sleep(Duration::from_secs_f64(duration * noise(100 * w + time, 1)));
+            processes::kill_all(&running);
+            drop(running);
+
+            let (ranks, other) = (1 + number(2, 4), ways[number(3, ways.len())]);
+            let what = format!("{way}, time {time}: killed with snapshots {:?}, on {ranks} ranks", snapshots(&killed));
+            let mut command = if killed.join("run.toml").exists() {
+                other.resume(ranks, &killed)
+            } else {
+                let mut command = other.command(ranks, CONFIG);
+                options(&mut command);
+                command.arg("--resume").arg(&killed);
+                command
+            };
+            run(command.arg("--quiet"));
+            assert_same_end(&killed, &whole, &what);
+            fs::remove_dir_all(&killed).unwrap();
+        }
+    }
+}
+
+/// A recorded run over 120 steps with snapshots, uninterrupted.
+fn whole(folder: &Path) -> PathBuf {
+    let whole = folder.join("whole");
+    run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "120", "--out"]).arg(&whole));
+    assert_eq!(snapshots(&whole), [100, 120]);
+    whole
+}
+
+#[test]
+fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    for way in Way::all() {
+        let ranks = if way.supports(3) { 3 } else { 1 };
+        let run_folder = folder.path().join("run");
+        let mut command = way.command(ranks, CONFIG);
+        // So many steps that it does not come to its end by itself.
+        command.args(&OPTIONS[1..]).args(["--steps", "4000000000", "--out"]).arg(&run_folder);
+        let mut running = Running::start(&mut command);
+        running.wait_for_line("step ");
+        if let Way::Mpi(_) = way {
+            // What mpirun does about an interrupt of its own is its business.
+            processes::ranks_of(&running, ranks)[1].signal("TERM");
+        } else {
+            running.signal("INT");
+        }
+        let ended = running.end();
+        // Launchers of MPI jobs hand on the exit code, which is not 0, or complain of it.
+        assert!(ended.code == Some(130) || matches!(way, Way::Mpi(_)) && ended.code != Some(0), "{way}: {ended}");
+        let stopped = summary(&run_folder);
+        assert_eq!(stopped["interrupted"], true);
+        let steps = stopped["steps"].as_u64().unwrap();
+        assert_eq!(snapshots(&run_folder).last(), Some(&steps), "{way}");
+        assert!(snapshots(&run_folder).len() <= 2, "{way}: {:?}", snapshots(&run_folder));
+
+        // Fewer steps than are made already are refused; a few more lead to where a run of so many leads.
+        let refused = program::run(Way::Channel.resume(2, &run_folder).args(["--steps", &(steps - 1).to_string()]));
+        assert_eq!((refused.code, refused.complaints().len()), (Some(2), 1), "{refused}");
+        let more = (steps + 30).to_string();
+        run(Way::Channel.resume(2, &run_folder).args(["--quiet", "--steps", &more]));
+        let expected = folder.path().join("expected");
+        run(Way::Channel.command(1, CONFIG).args(OPTIONS).args(["--steps", &more, "--out"]).arg(&expected));
+        assert_same_end(&run_folder, &expected, &format!("{way} stopped after {steps} steps"));
+        fs::remove_dir_all(&run_folder).unwrap();
+        fs::remove_dir_all(&expected).unwrap();
+    }
+    // What is complete is not made once more.
+    let before = fs::metadata(whole.join("summary.json")).unwrap().modified().unwrap();
+    let again = run(&mut Way::Channel.resume(1, &whole));
+    assert!(again.stderr.contains("all 120 steps of this run are made already"), "{again}");
+    assert_eq!(fs::metadata(whole.join("summary.json")).unwrap().modified().unwrap(), before);
+}
+
+#[test]
+fn a_lost_rank_is_made_good_by_restarts() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    for way in Way::all().into_iter().filter(|way| matches!(way, Way::Channel | Way::Iceoryx2)) {
+        for panic_at in ["1@30", "2@117"] {
+            let run_folder = folder.path().join("run");
+            let mut command = way.command(3, CONFIG);
+            command.args(OPTIONS).args(["--steps", "120", "--out"]).arg(&run_folder).args(["--panic-at", panic_at]);
+            let ended = run(command.args(["--restarts", "1"]));
+            assert!(ended.stderr.contains("starting again (1 of 1 times)"), "{way}: {ended}");
+            assert_same_end(&run_folder, &whole, &format!("{way}, a panic at {panic_at}"));
+            fs::remove_dir_all(&run_folder).unwrap();
+        }
+    }
+}
+
+#[cfg(feature = "iceoryx2")]
+#[test]
+fn a_killed_rank_is_made_good_by_restarts() {
+    let folder = tempdir().unwrap();
+    let (whole, run_folder) = (folder.path().join("whole"), folder.path().join("run"));
+    run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "600", "--out"]).arg(&whole));
+    let mut command = Way::Iceoryx2.command(3, CONFIG);
+    command.args(OPTIONS).args(["--steps", "600", "--restarts", "5", "--out"]).arg(&run_folder);
+    let running = Running::start(&mut command);
+    for rank in [1, 0] {
+        let ranks = processes::ranks_of(&running, 3);
+        sleep(Duration::from_millis(300));
+        if ranks[rank].lives() {
+            ranks[rank].signal("KILL");
+        }
+        while ranks.iter().any(processes::RankProcess::lives) {
+            sleep(Duration::from_millis(2));
+        }
+    }
+    let ended = running.end();
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_same_end(&run_folder, &whole, "two ranks killed");
+}
+
+#[test]
+fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    let summary_before = fs::read(whole.join("summary.json")).unwrap();
+    // As if it had been killed just before its end.
+    fs::remove_file(whole.join("summary.json")).unwrap();
+    let newest = whole.join("snapshots/step-0000000120/rank-00001-of-00002.atoll");
+    let mut bytes = fs::read(&newest).unwrap();
+    let last = bytes.len() - 1;
+    for place in [9, 40, last] {
+        bytes[place] ^= 1;
+        fs::write(&newest, &bytes).unwrap();
+        let ended = run(Way::Channel.resume(3, &whole).arg("--quiet"));
+        let names = ended.stderr.contains("step-0000000120/rank-00001-of-00002.atoll: this snapshot is damaged");
+        assert!(names && ended.stderr.contains("after step 100"), "{ended}");
+        let end = summary(&whole);
+        let before: Value = serde_json::from_slice(&summary_before).unwrap();
+        assert_eq!(end["state_hash"], before["state_hash"]);
+        fs::remove_file(whole.join("summary.json")).unwrap();
+        // It was written anew, by other ranks.
+        fs::remove_dir_all(newest.parent().unwrap()).unwrap();
+        fs::create_dir(newest.parent().unwrap()).unwrap();
+        fs::write(newest.with_file_name("rank-00000-of-00002.atoll"), b"whatever").unwrap();
+        bytes[place] ^= 1;
+    }
+    // Where none is whole, that is an error and nothing is lost.
+    fs::remove_dir_all(whole.join("snapshots/step-0000000120")).unwrap();
+    for entry in fs::read_dir(whole.join("snapshots/step-0000000100")).unwrap() {
+        let path = entry.unwrap().path();
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    }
+    let ended = program::run(&mut Way::Channel.resume(3, &whole));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert!(ended.stderr.contains("no older snapshot is whole"), "{ended}");
+    assert!(whole.join("rank-00000").exists());
+}
+
+#[test]
+fn another_run_is_refused_by_the_key_that_differs() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    fs::remove_file(whole.join("summary.json")).unwrap();
+    for (options, expected) in [
+        (&["--seed", "2"][..], "scene.seed = 1 there, and 2 here"),
+        (&["--set", "restitution_threshold=2"], "physics.restitution_threshold = 1.0 there, and 2.0 here"),
+        (&["--record-every", "30"], "output.record_every = 20 there, and 30 here"),
+    ] {
+        let ended = program::run(Way::Channel.resume(2, &whole).args(options));
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{options:?}: {ended}");
+        assert!(ended.stderr.contains(expected), "{options:?}: {ended}");
+    }
+    let begins = |option: &str| {
+        let mut command = Way::Channel.command(2, CONFIG);
+        command.args(["--quiet", "--steps", "2", option]).arg(&whole);
+        program::run(&mut command)
+    };
+    let ended = begins("--out");
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert!(ended.stderr.contains("it holds a run; go on with that with --resume"), "{ended}");
+    // What is no run is never overwritten.
+    let other = folder.path().join("other");
+    fs::create_dir(&other).unwrap();
+    fs::write(other.join("thesis.tex"), "precious").unwrap();
+    let mut command = Way::Channel.command(2, CONFIG);
+    let ended = program::run(command.args(["--overwrite", "--out"]).arg(&other));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert_eq!(fs::read_to_string(other.join("thesis.tex")).unwrap(), "precious");
+}
+
+#[test]
+fn the_folder_of_a_running_run_is_left_alone() {
+    let folder = tempdir().unwrap();
+    let run_folder = folder.path().join("run");
+    let mut command = Way::Channel.command(2, CONFIG);
+    let mut running = Running::start(command.args(["--steps", "4000000000", "--out"]).arg(&run_folder));
+    running.wait_for_line("step ");
+    let ended = program::run(Way::Channel.command(2, CONFIG).args(["--overwrite", "--out"]).arg(&run_folder));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert!(ended.stderr.contains("another run is writing there"), "{ended}");
+    running.signal("INT");
+    assert_eq!(running.end().code, Some(130));
+}
