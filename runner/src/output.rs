@@ -1,4 +1,4 @@
-//! What is written in one go: to standard output, and to files, each whole or not at all.
+//! What is written when all is done: to standard output, and to files, each whole or not at all.
 
 use crate::error::RunError;
 use std::ffi::OsString;

@@ -1,4 +1,4 @@
-//! `atoll diff` as a user meets it: what it says of recordings that real runs have written, and with which exit code.
+//! What `atoll diff` writes and refuses. What it finds in recordings is in `recording.rs`.
 
 use atoll_tests::program::{self, Ended};
 use serde_json::Value;
@@ -18,20 +18,6 @@ fn record(folder: &TempDir, name: &str, options: &[&str]) -> PathBuf {
 
 fn diff(a: &Path, b: &Path, options: &[&str]) -> Ended {
     program::run(program::command().arg("diff").args([a, b]).args(options))
-}
-
-#[test]
-fn ranks_do_not_show_in_a_recording() {
-    let folder = tempdir().unwrap();
-    let one = record(&folder, "one", &[]);
-    // One of them idle.
-    let seven = record(&folder, "seven", &["--ranks", "7"]);
-    let ended = diff(&one, &seven, &[]);
-    assert_eq!(ended.code, Some(0), "{ended}");
-    assert_eq!(
-        (ended.stdout.as_str(), ended.stderr.as_str()),
-        ("identical: 16 records of 1000 bodies, steps 0 to 60\n", "")
-    );
 }
 
 #[test]
@@ -60,7 +46,7 @@ fn what_differs_is_told_and_written() {
 #[test]
 fn what_keeps_it_from_an_answer_is_told_in_one_line() {
     let folder = tempdir().unwrap();
-    let run = record(&folder, "run", &["--ranks", "2"]);
+    let run = record(&folder, "run", &[]);
     let refused = |a: &Path, options: &[&str], expected: &str| {
         let ended = diff(a, &run, options);
         let complaints = ended.complaints();
@@ -77,10 +63,4 @@ fn what_keeps_it_from_an_answer_is_told_in_one_line() {
     if Path::new("/dev/full").exists() {
         refused(&run, &["--json", "/dev/full"], "cannot write /dev/full: No space left");
     }
-    let segment = run.join("rank-00001/steps-0000000040-0000000060.parquet");
-    let bytes = fs::read(&segment).unwrap();
-    fs::write(&segment, &bytes[..bytes.len() - 1]).unwrap();
-    refused(&run, &[], "rank-00001/steps-0000000040-0000000060.parquet is damaged");
-    fs::remove_file(&segment).unwrap();
-    refused(&run, &[], "rank-00001: the segment that holds step 40 is missing");
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Whatever keeps it from an answer, or the answer from being written.
-pub fn diff(args: &DiffArgs) -> Result<Exit, RunError> {
+pub fn run(args: &DiffArgs) -> Result<Exit, RunError> {
     let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
     let (json, plot) = (check("--json", args.json.as_deref())?, check("--plot", args.plot.as_deref())?);
     if let Some(path) = args.plot.as_ref().filter(|_| args.json == args.plot) {

@@ -3,13 +3,13 @@
 use crate::args::InfoArgs;
 use crate::config::Config;
 use crate::error::{Exit, RunError};
+use crate::output;
 use crate::run_folder::RunFolder;
 use crate::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::trajectory::{Segment, Trajectory, TrajectoryError};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
 use std::path::Path;
 use std::{fs, iter};
 
@@ -30,8 +30,7 @@ pub fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         },
         _ => return Err(folder.refusal("is no run, snapshot or recording; name a folder, a .atoll or a .parquet file")),
     };
-    // Whoever has seen enough need not read on.
-    let _ = io::stdout().write_all(text.as_bytes());
+    output::show(&text)?;
     Ok(Exit::Done)
 }
 

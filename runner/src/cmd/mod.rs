@@ -20,7 +20,7 @@ pub fn main() -> ExitCode {
     };
     let result = telemetry::init().and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
-        Command::Diff(args) => diff::diff(args),
+        Command::Diff(args) => diff::run(args),
         Command::Info(args) => info::run(args),
     });
     let exit = result.unwrap_or_else(|error| {

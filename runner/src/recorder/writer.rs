@@ -54,7 +54,7 @@ impl Writer {
     ) -> Result<Self, RunError> {
         let (ranks, canonical) = (plan.config.run.ranks as u32, plan.config.canonical(plan.tiles));
         let recording = |every| {
-            let facts = RunFacts::new(plan, every, output.configuration.clone());
+            let facts = RunFacts::new(plan, every);
             TrajectoryWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
         };
         let trajectory = output.record_every.map(recording).transpose()?;

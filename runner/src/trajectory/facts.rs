@@ -31,8 +31,8 @@ pub struct RunFacts {
 }
 
 impl RunFacts {
-    /// Those of a run. `config` is its configuration as TOML.
-    pub fn new(plan: &Plan, record_every: u64, config: String) -> Self {
+    /// Those of a run that records every so many steps.
+    pub fn new(plan: &Plan, record_every: u64) -> Self {
         let (low, high) = plan.scene.domain();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -41,7 +41,7 @@ impl RunFacts {
             record_every,
             domain: [low, high],
             tiles: plan.tiles,
-            config,
+            config: plan.config.to_toml(plan.tiles),
             canonical: plan.config.canonical(plan.tiles),
         }
     }
