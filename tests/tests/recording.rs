@@ -84,21 +84,19 @@ fn missing_and_torn_files_are_named() {
     record(Way::Channel, 3, &whole, &[]);
     let name = "rank-00001/steps-0000000000-0000000045.parquet";
     let length = fs::metadata(whole.join(name)).unwrap().len();
-    let harms: [(&str, fn(&Path, u64), &str); 4] = [
-        ("missing", |path, _| fs::remove_file(path).unwrap(), "rank-00001: the segment that holds step 0 is missing"),
-        ("torn", |path, length| File::options().write(true).open(path).unwrap().set_len(length / 2).unwrap(), name),
-        ("empty", |path, _| drop(File::create(path).unwrap()), name),
-        (
-            "changed",
-            |path, length| {
-                let mut bytes = fs::read(path).unwrap();
-                bytes[length as usize / 2] ^= 1;
-                fs::write(path, bytes).unwrap();
-            },
-            name,
-        ),
-    ];
-    for (what, harm, expected) in harms {
+    type Harm = fn(&Path, u64);
+    let remove: Harm = |path, _| fs::remove_file(path).unwrap();
+    let tear: Harm = |path, length| File::options().write(true).open(path).unwrap().set_len(length / 2).unwrap();
+    let empty: Harm = |path, _| drop(File::create(path).unwrap());
+    let change: Harm = |path, length| {
+        let mut bytes = fs::read(path).unwrap();
+        bytes[length as usize / 2] ^= 1;
+        fs::write(path, bytes).unwrap();
+    };
+    let missing = "rank-00001: the segment that holds step 0 is missing";
+    for (what, harm, expected) in
+        [("missing", remove, missing), ("torn", tear, name), ("empty", empty, name), ("changed", change, name)]
+    {
         let harmed = copy(&whole, what);
         harm(&harmed.join(name), length);
         for ended in [diff(&whole, &harmed, &[]), diff(&harmed, &whole, &["--tolerance", "1e6"])] {
