@@ -8,6 +8,7 @@
 //! | `choices` | What does each choice of the report cost, in time and in quality? |
 //! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
 //! | `exchange` | What does an exchange cost over each transport, and what do two ranks bring? |
+//! | `output` | What do recording and snapshots cost a run, and how long does it take to compare two recordings? |
 //! | `peers` | How do Box2D and rapier2d do on the same scene? With `--features peers` only. |
 //!
 //! They print a table to stderr and one line of JSON per row to stdout, so that
@@ -19,11 +20,13 @@ pub mod peers;
 
 use atoll::{Config, Summary};
 
-/// A configuration file: what errors call it, and its text.
+/// A configuration file.
 #[derive(Clone, Copy, Debug)]
 pub struct File {
-    name: &'static str,
-    text: &'static str,
+    /// What errors call it.
+    pub name: &'static str,
+    /// Its content.
+    pub text: &'static str,
 }
 
 /// The file of that name in `configs/`.

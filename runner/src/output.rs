@@ -1,7 +1,7 @@
 //! What is written when all is done: to standard output, and to files, each whole or not at all.
 
 use crate::error::RunError;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -104,6 +104,12 @@ fn sync_folder(path: &Path) -> io::Result<()> {
         Ok(Err(error)) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
         _ => Ok(()),
     }
+}
+
+/// Whether a file of that name is what somebody who was killed left who would have written `path`.
+pub fn is_temporary(name: &OsStr, path: &Path) -> bool {
+    let parts = name.to_str().zip(path.file_name().and_then(OsStr::to_str));
+    parts.is_some_and(|(name, of)| name.starts_with(&format!(".{of}.")) && name.ends_with(".tmp"))
 }
 
 /// Beside the file, so that renaming never crosses file systems.

@@ -1,7 +1,7 @@
 //! What every rank of a run must know alike, worked out once before any of them starts.
 
 use crate::assignment::Assignment;
-use crate::config::{Config, TransportKind};
+use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
 use crate::run_folder::{Claim, RunFolder};
 use crate::scene::Scene;
@@ -57,10 +57,13 @@ impl Output {
 }
 
 /// Refuses a world that this machine cannot hold, before it tries to. `here` is how many of the ranks it surely holds.
-fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64) -> Result<(), RunError> {
+fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64, output: Option<&OutputConfig>) -> Result<(), RunError> {
     // A body takes 48 bytes and its contacts as much again and more; an empty tile a few buffers, and four bytes in
-    // every rank's map of tiles; a pair of ranks a channel.
-    let needed = (bodies.saturating_mul(200) + tiles * 1000) / ranks * here + here * (4 * tiles + 500 * ranks);
+    // every rank's map of tiles; a pair of ranks a channel. What is written is copied first: records twice.
+    let copies = if output.is_some_and(|output| output.record_every.is_some()) { 100 } else { 0 };
+    let saved = if output.is_some_and(|output| output.checkpoint_every.is_some()) { 200 } else { 0 };
+    let each = 200 + copies + saved;
+    let needed = (bodies.saturating_mul(each) + tiles * 1000) / ranks * here + here * (4 * tiles + 500 * ranks);
     let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|facts| {
         let line = facts.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
         Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
@@ -77,7 +80,7 @@ impl Plan {
     /// # Errors
     /// If no world can be made of it.
     pub fn new(config: &Config) -> Result<Self, RunError> {
-        Self::from_found(config, Found::default())
+        Self::from_found(config, Found::default(), None)
     }
 
     /// A run that begins in a folder and writes there.
@@ -85,7 +88,7 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn beginning(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
-        Ok(Self::new(config)?.writing(folder, true))
+        Self::from_found(config, Found::default(), Some((folder, true)))
     }
 
     /// A run that goes on in a folder, from the newest snapshot that is whole; from the start if none was complete when
@@ -107,24 +110,24 @@ impl Plan {
                 format!("{step} steps are made there already, and {steps} asked for; give --steps as many or more");
             return Err(folder.refusal(reason));
         }
-        Ok(Self::from_found(config, found)?.writing(folder, false))
+        Self::from_found(config, found, Some((folder, false)))
     }
 
-    fn writing(mut self, folder: RunFolder, begins: bool) -> Self {
-        let (output, configuration) = (&self.config.output, self.config.to_toml(self.tiles));
-        let (record_every, checkpoint_every) = (output.record_every, output.checkpoint_every);
-        self.output = Some(Output { folder, configuration, record_every, checkpoint_every, begins });
-        self
-    }
-
-    fn from_found(config: &Config, found: Found) -> Result<Self, RunError> {
+    /// `folder` is written to, and says whether the run begins there.
+    fn from_found(config: &Config, found: Found, folder: Option<(RunFolder, bool)>) -> Result<Self, RunError> {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
         let transport = config.transport();
         let ranks = config.run.ranks as u64;
         // Of an MPI job the others may be anywhere.
         let here = if transport == TransportKind::Mpi { 1 } else { ranks };
-        check_memory(scene.bodies(), u64::from(tiles[0]) * u64::from(tiles[1]), ranks, here)?;
+        check_memory(
+            scene.bodies(),
+            u64::from(tiles[0]) * u64::from(tiles[1]),
+            ranks,
+            here,
+            folder.is_some().then_some(&config.output),
+        )?;
         let (low, high) = scene.domain();
         let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
         let params = config.params.clone();
@@ -141,7 +144,14 @@ impl Plan {
             weights
         });
         let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
-        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output: None, found })
+        let output = folder.map(|(folder, begins)| Output {
+            folder,
+            configuration: config.to_toml(tiles),
+            record_every: config.output.record_every,
+            checkpoint_every: config.output.checkpoint_every,
+            begins,
+        });
+        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output, found })
     }
 
     /// What the user may want to know before it starts, a sentence each.

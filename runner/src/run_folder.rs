@@ -10,9 +10,10 @@
 
 use crate::config::{Config, Difference, differences};
 use crate::error::RunError;
-use crate::output::write_durably;
+use crate::output::{is_temporary, write_durably};
 use crate::{snapshot, trajectory};
 use serde::Deserialize;
+use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -21,6 +22,9 @@ use std::time::{Duration, Instant};
 
 /// Ranks of a run whose launcher was killed end by themselves; so long they are given.
 const LINGERING: Duration = Duration::from_secs(10);
+
+/// What every process of a run holds.
+const LOCK: &str = "lock";
 
 /// Between two looks at whether they have.
 const POLL: Duration = Duration::from_millis(20);
@@ -80,19 +84,24 @@ impl RunFolder {
     /// # Errors
     /// If it holds anything, unless that is a run and `overwrite` is true, or cannot be looked at.
     pub fn check_free(&self, overwrite: bool) -> Result<(), RunError> {
-        let refuse = |reason: &str| Err(self.refusal(reason));
-        match fs::read_dir(&self.path).map(|mut entries| entries.next().is_none()) {
-            Ok(true) => Ok(()),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-            Err(error) => refuse(&format!("{error}; name a folder")),
-            Ok(false) if !self.holds_run() => {
-                refuse("it is not empty, and what it holds is no run; name another folder")
-            }
-            Ok(false) if !overwrite => refuse(
-                "it holds a run; go on with that with --resume, replace it with --overwrite, or name another folder",
-            ),
-            Ok(false) => Ok(()),
+        if self.holds_run() {
+            let how = "go on with that with --resume, replace it with --overwrite, or name another folder";
+            return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
         }
+        let is_ours = |name: &OsStr| name == LOCK || self.is_unfinished(name);
+        match fs::read_dir(&self.path).map(|mut all| all.all(|entry| entry.is_ok_and(|one| is_ours(&one.file_name()))))
+        {
+            // A run that was killed before it began leaves a little.
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.refusal("it is not empty, and what it holds is no run; name another folder")),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            Err(error) => Err(self.refusal(format!("{error}; name a folder"))),
+        }
+    }
+
+    /// Whether a file of that name in here is one that a killed run did not finish.
+    fn is_unfinished(&self, name: &OsStr) -> bool {
+        [self.configuration(), self.summary()].iter().any(|path| is_temporary(name, path))
     }
 
     /// Refuses to go on with a run that is configured otherwise than the one here. More steps, or fewer, are no other run.
@@ -168,7 +177,7 @@ impl RunFolder {
     }
 
     fn open_lock(&self) -> io::Result<File> {
-        File::options().create(true).truncate(false).write(true).open(self.path.join("lock"))
+        File::options().create(true).truncate(false).write(true).open(self.path.join(LOCK))
     }
 
     fn lock(&self) -> Result<Claim, RunError> {
@@ -197,9 +206,11 @@ impl RunFolder {
     /// # Errors
     /// What the system says.
     pub fn remove_after(&self, step: Option<u64>) -> io::Result<()> {
-        match fs::remove_file(self.summary()) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-            _ => {}
+        for entry in fs::read_dir(&self.path)? {
+            let entry = entry?;
+            if entry.path() == self.summary() || self.is_unfinished(&entry.file_name()) {
+                fs::remove_file(entry.path())?;
+            }
         }
         snapshot::remove_after(&self.snapshots(), step)?;
         trajectory::remove_after(&self.path, step)
@@ -209,4 +220,84 @@ impl RunFolder {
 /// The tile grid in the configuration of a folder, where it is always given.
 fn tiles_of(config: &Config) -> [u32; 2] {
     config.run.tiles.unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tempfile::tempdir;
+
+    fn folder(files: &[&str]) -> (tempfile::TempDir, RunFolder) {
+        let folder = tempdir().unwrap();
+        files.iter().for_each(|name| fs::write(folder.path().join(name), "").unwrap());
+        let run = RunFolder::new("--out", folder.path());
+        (folder, run)
+    }
+
+    #[test]
+    fn runs_begin_in_empty_folders_and_over_runs() {
+        let refused = |files: &[&str], overwrite| {
+            let (_folder, run) = folder(files);
+            run.check_free(overwrite).err().map(|error| error.to_string())
+        };
+        assert_eq!(refused(&[], false), None);
+        assert_eq!(refused(&["lock", ".run.toml.123.tmp"], false), None);
+        assert_eq!(refused(&["run.toml", "summary.json"], true), None);
+        for (files, overwrite, expected) in [
+            (&["run.toml", "lock"][..], false, "it holds a run; go on with that with --resume"),
+            (&["lock", "thesis.tex"], true, "it is not empty, and what it holds is no run"),
+            (&[".thesis.tex.1.tmp"], true, "it is not empty, and what it holds is no run"),
+        ] {
+            let told = refused(files, overwrite).unwrap();
+            assert!(told.starts_with("--out /") && told.contains(expected), "{told}");
+        }
+        let (_folder, run) = folder(&["file"]);
+        let file = RunFolder::new("--out", &run.path().join("file"));
+        assert!(file.check_free(true).unwrap_err().to_string().contains("name a folder"));
+    }
+
+    #[test]
+    fn what_ended_runs_left_is_removed() {
+        let (folder, run) = folder(&["run.toml", "summary.json", ".summary.json.7.tmp", "notes", "lock"]);
+        run.remove_after(Some(3)).unwrap();
+        let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["lock", "notes", "run.toml"]);
+    }
+
+    #[test]
+    fn one_run_at_a_time_and_all_its_processes() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--out", &folder.path().join("new"));
+        let text = "[scene]\nkind = \"rooms\"\n[run]\ntiles = [2, 2]\n";
+        let config = Config::from_toml_str("test", text, &[]).unwrap();
+        let claim = run.claim(true, &config.to_toml([2, 2])).unwrap();
+        let shared = run.share(&config.hash([2, 2])).unwrap();
+        let told = run.share("another").unwrap_err().to_string();
+        assert!(told.contains("another run is in it; every process of a run must see the same folder"), "{told}");
+        let other = File::options().write(true).open(run.path().join(LOCK)).unwrap();
+        assert!(matches!(other.try_lock(), Err(TryLockError::WouldBlock)));
+        drop((claim, shared));
+        other.try_lock().unwrap();
+    }
+
+    #[test]
+    fn another_run_is_told_by_what_differs() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--resume", folder.path());
+        let config = |overrides: &[(&str, &str)]| {
+            Config::from_toml_str("test", "[scene]\nkind = \"rooms\"\n[output]\nrecord_every = 5\n", overrides).unwrap()
+        };
+        let check = |overrides| run.check_same_run(&config(overrides), [2, 2]).map_err(|error| error.to_string());
+        assert!(check(&[]).unwrap_err().contains("no run was begun there"));
+        run.claim(true, &config(&[]).to_toml([2, 2])).unwrap();
+        check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
+        let told = check(&[("seed", "4")]).unwrap_err();
+        assert!(told.contains("scene.seed = 1 there, and 4 here"), "{told}");
+        let told = check(&[("record_every", "4")]).unwrap_err();
+        assert!(told.contains("output.record_every = 5 there, and 4 here"), "{told}");
+        assert!(!run.is_complete(600));
+        fs::write(run.summary(), "{\"steps\": 600, \"interrupted\": false}").unwrap();
+        assert!(run.is_complete(600) && !run.is_complete(700));
+    }
 }

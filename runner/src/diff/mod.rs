@@ -150,7 +150,7 @@ fn read_sorted(trajectory: &Trajectory, step: u64, rows: &mut Vec<Row>) -> Resul
 }
 
 impl Comparison {
-    /// As JSON. What is infinite, as after a division by zero, is null there.
+    /// As JSON, where what is infinite is null.
     pub fn to_json(&self) -> Vec<u8> {
         let mut text = serde_json::to_vec_pretty(self).expect("figures and words, under names");
         text.push(b'\n');

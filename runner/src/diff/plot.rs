@@ -43,8 +43,10 @@ fn draw(
         .x_label_area_size(44)
         .y_label_area_size(76)
         .build_cartesian_2d(first..last.max(first + 1.0), (low..high).log_scale())?;
+    let label = |value: &f64| if *value < 2.0 * low { "0".to_owned() } else { format!("{value:.0e}") };
     let mut mesh = chart.configure_mesh();
-    mesh.light_line_style(WHITE).x_desc("step").y_desc("deviation").y_label_formatter(&|value| format!("{value:.0e}"));
+    mesh.light_line_style(WHITE).x_desc("step").y_desc("deviation");
+    mesh.x_label_formatter(&|step| format!("{step:.0}")).y_label_formatter(&label);
     mesh.draw()?;
     for (name, color, quantity) in LINES {
         let points = steps.iter().map(|step| (step.step as f64, quantity(step).clamp(low, high)));

@@ -1,0 +1,161 @@
+//! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
+
+use atoll::trajectory::{Row, Trajectory};
+use atoll_tests::program::{self, Ended};
+use atoll_tests::ways::Way;
+use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
+use serde_json::Value;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::tempdir;
+use xxhash_rust::xxh3::xxh3_64;
+
+const CONFIG: &str = "configs/quickstart.toml";
+
+/// Records every fifth of sixty steps.
+fn record(way: Way, ranks: usize, folder: &Path, options: &[&str]) {
+    let mut command = way.command(ranks, CONFIG);
+    command.args(["--quiet", "--steps", "60", "--bodies", "4000", "--tiles", "4x3", "--record-every", "5"]);
+    let ended = program::run(command.args(options).arg("--out").arg(folder));
+    assert_eq!(ended.code, Some(0), "{way}: {ended}");
+}
+
+fn diff(a: &Path, b: &Path, options: &[&str]) -> Ended {
+    program::run(program::command().arg("diff").args([a, b]).args(options))
+}
+
+/// Copies a run, which then can be harmed.
+fn copy(run: &Path, name: &str) -> PathBuf {
+    let copy = run.with_file_name(name);
+    assert!(Command::new("cp").arg("-r").args([run, &copy]).status().unwrap().success());
+    copy
+}
+
+#[test]
+fn every_transport_records_the_same_and_another_seed_does_not() {
+    let folder = tempdir().unwrap();
+    let local = folder.path().join("local");
+    record(Way::Local, 1, &local, &[]);
+    let expected = "identical: 13 records of 4000 bodies, steps 0 to 60\n";
+    for (k, way) in Way::all().into_iter().enumerate() {
+        for ranks in [2, 3, 13].into_iter().filter(|&ranks| way.supports(ranks)) {
+            // One rank of thirteen has no tile.
+            let other = folder.path().join(format!("{k}-{ranks}"));
+            record(way, ranks, &other, &[]);
+            let ended = diff(&local, &other, &[]);
+            assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), expected), "{way}, {ranks} ranks: {ended}");
+        }
+    }
+
+    let other = folder.path().join("other");
+    record(Way::Channel, 2, &other, &["--seed", "2"]);
+    let json = folder.path().join("diff.json");
+    let ended = diff(&local, &other, &["--json", json.to_str().unwrap()]);
+    assert_eq!(ended.code, Some(1), "{ended}");
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    assert!(lines[0].starts_with("the configurations differ: scene.seed is 1 in "), "{ended}");
+    assert!(lines[2].starts_with("first difference: step 0, body "), "{ended}");
+    let told: Value = program::summary(&json);
+    assert_eq!((&told["identical"], &told["first_difference"]["step"]), (&Value::Bool(false), &Value::from(0)));
+    // Nothing is so far apart.
+    assert_eq!(diff(&local, &other, &["--tolerance", "1e6"]).code, Some(0));
+}
+
+#[test]
+fn a_run_repeats_itself_from_its_folder() {
+    let folder = tempdir().unwrap();
+    let (first, again) = (folder.path().join("first"), folder.path().join("again"));
+    record(Way::Channel, 3, &first, &["--set", "hertz=57", "--set", "linear_damping=0.1", "--seed", "9"]);
+    let mut command = program::command();
+    let ended = program::run(command.arg("run").arg(first.join("run.toml")).args(["--quiet", "--out"]).arg(&again));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_eq!(diff(&first, &again, &[]).code, Some(0));
+    let file = |run: &Path, name: &str| fs::read_to_string(run.join(name)).unwrap();
+    assert_eq!(file(&first, "run.toml"), file(&again, "run.toml"));
+    let hash = |run: &Path| program::summary(&run.join("summary.json"))["state_hash"].clone();
+    assert_eq!(hash(&first), hash(&again));
+}
+
+#[test]
+fn missing_and_torn_files_are_named() {
+    let folder = tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    record(Way::Channel, 3, &whole, &[]);
+    let name = "rank-00001/steps-0000000000-0000000045.parquet";
+    let length = fs::metadata(whole.join(name)).unwrap().len();
+    type Harm = fn(&Path, u64);
+    let remove: Harm = |path, _| fs::remove_file(path).unwrap();
+    let tear: Harm = |path, length| File::options().write(true).open(path).unwrap().set_len(length / 2).unwrap();
+    let empty: Harm = |path, _| drop(File::create(path).unwrap());
+    let change: Harm = |path, length| {
+        let mut bytes = fs::read(path).unwrap();
+        bytes[length as usize / 2] ^= 1;
+        fs::write(path, bytes).unwrap();
+    };
+    let missing = "rank-00001: the segment that holds step 0 is missing";
+    for (what, harm, expected) in
+        [("missing", remove, missing), ("torn", tear, name), ("empty", empty, name), ("changed", change, name)]
+    {
+        let harmed = copy(&whole, what);
+        harm(&harmed.join(name), length);
+        for ended in [diff(&whole, &harmed, &[]), diff(&harmed, &whole, &["--tolerance", "1e6"])] {
+            assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{what}: {ended}");
+            let complaint = ended.complaints()[0];
+            assert!(complaint.contains(expected) && complaint.contains(&*harmed.to_string_lossy()), "{what}: {ended}");
+        }
+    }
+    let nothing = diff(&whole, folder.path(), &[]);
+    assert_eq!((nothing.code, nothing.complaints().len()), (Some(2), 1), "{nothing}");
+}
+
+/// Where in a file the rows of a record lie.
+fn bytes_of(group: &RowGroupMetaData) -> std::ops::Range<usize> {
+    let ranges = || group.columns().iter().map(|column| column.byte_range());
+    let start = ranges().map(|(start, _)| start).min().unwrap();
+    let end = ranges().map(|(start, length)| start + length).max().unwrap();
+    start as usize..end as usize
+}
+
+#[test]
+fn the_last_bit_of_one_number_in_a_file_is_found() {
+    let folder = tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    record(Way::Local, 1, &whole, &[]);
+    let edited = copy(&whole, "edited");
+    let path = edited.join("rank-00000/steps-0000000000-0000000045.parquet");
+    let bytes = fs::read(&path).unwrap();
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&File::open(&path).unwrap()).unwrap();
+    let group = metadata.row_group(6);
+    let range = bytes_of(group);
+    // As the file says of itself, so that the change looks as if it had been written.
+    let entry = |bytes: &[u8]| format!("30:4000:{:016x}", xxh3_64(&bytes[range.clone()]));
+    let old_entry = entry(&bytes);
+    let place = bytes.windows(old_entry.len()).position(|bytes| bytes == old_entry.as_bytes()).unwrap();
+
+    let rows = |run: &Path| {
+        let mut rows = Vec::new();
+        Trajectory::open(run).and_then(|trajectory| trajectory.read(30, &mut rows)).map(|()| rows)
+    };
+    let before: Vec<Row> = rows(&whole).unwrap();
+    // The lowest bytes of the positions come first, behind a header whose length nobody tells.
+    let start = group.column(2).data_page_offset() as usize;
+    let changed = (start..start + 200).find_map(|at| {
+        let mut edited_bytes = bytes.clone();
+        edited_bytes[at] ^= 1;
+        let new_entry = entry(&edited_bytes);
+        edited_bytes[place..place + new_entry.len()].copy_from_slice(new_entry.as_bytes());
+        fs::write(&path, edited_bytes).unwrap();
+        let after = rows(&edited).ok()?;
+        let mut differing = before.iter().zip(&after).filter(|(a, b)| a != b);
+        let (a, b) = differing.next()?;
+        let by_one_bit = Row { x: b.x, ..*a } == *b && (a.x.next_up() == b.x || a.x.next_down() == b.x);
+        (by_one_bit && differing.next().is_none()).then_some((a.id, a.x, b.x))
+    });
+    let (id, was, is) = changed.expect("one of them is the lowest byte of a position");
+    let ended = diff(&whole, &edited, &[]);
+    assert_eq!(ended.code, Some(1), "{ended}");
+    assert!(ended.stdout.contains(&format!("first difference: step 30, body {id}, in x\n")), "{ended}");
+    assert!(ended.stdout.contains(&format!(": x {was},")) && ended.stdout.contains(&format!(": x {is},")), "{ended}");
+    assert_eq!(diff(&whole, &edited, &["--tolerance", "1e-9"]).code, Some(0));
+}
