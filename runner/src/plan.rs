@@ -100,15 +100,19 @@ impl Plan {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
         folder.check_same_run(config, tiles)?;
-        if folder.is_complete(config.run.steps) {
-            return Err(RunError::Complete { summary: folder.summary(), steps: config.run.steps });
+        let (steps, completed) = (config.run.steps, folder.completed());
+        if completed == Some(steps) {
+            return Err(RunError::Complete { summary: folder.summary(), steps });
         }
         let found = snapshot::find(&folder.snapshots(), &config.canonical(tiles))?;
-        if let Some(step) = found.snapshots.first().map(Snapshot::step).filter(|&step| step > config.run.steps) {
-            let steps = config.run.steps;
-            let reason =
-                format!("{step} steps are made there already, and {steps} asked for; give --steps as many or more");
-            return Err(folder.refusal(reason));
+        let newest = found.snapshots.first().map(Snapshot::step);
+        if let Some(made) = newest.max(completed).filter(|&made| made > steps) {
+            let reason = format!("{made} steps are made there already, and {steps} asked for");
+            return Err(folder.refusal(format!("{reason}; give --steps as many or more")));
+        }
+        if let (Some(made), None) = (completed, newest) {
+            let reason = format!("all {made} steps of this run are made, and there is no snapshot to go on from");
+            return Err(folder.refusal(format!("{reason}; begin another run with --out")));
         }
         Self::from_found(config, found, Some((folder, false)))
     }

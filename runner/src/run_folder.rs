@@ -112,7 +112,7 @@ impl RunFolder {
         if !self.holds_run() {
             return Err(self.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"));
         }
-        let begun = Config::load(&self.configuration(), &[])?;
+        let begun = Config::load_begun(&self.configuration())?;
         let recorded = (begun.output.record_every, config.output.record_every);
         if recorded.0 != recorded.1 {
             let [there, here] =
@@ -128,15 +128,15 @@ impl RunFolder {
         })
     }
 
-    /// Whether the run here has made so many steps and come to its end.
-    pub fn is_complete(&self, steps: u64) -> bool {
+    /// How many steps the run here has made, if it has come to its end.
+    pub fn completed(&self) -> Option<u64> {
         #[derive(Deserialize)]
         struct Ended {
             steps: u64,
             interrupted: bool,
         }
         let summary = fs::read(self.summary()).ok().and_then(|text| serde_json::from_slice(&text).ok());
-        summary.is_some_and(|ended: Ended| !ended.interrupted && ended.steps == steps)
+        summary.filter(|ended: &Ended| !ended.interrupted).map(|ended| ended.steps)
     }
 
     /// That this folder cannot be used.
@@ -168,7 +168,7 @@ impl RunFolder {
     /// If it is not there, or that of another run.
     pub fn share(&self, hash: &str) -> Result<Claim, RunError> {
         let refusal = |reason: &str| self.refusal(format!("{reason}; every process of a run must see the same folder"));
-        let found = Config::load(&self.configuration(), &[]).map_err(|error| refusal(&error.to_string()))?;
+        let found = Config::load_begun(&self.configuration()).map_err(|error| refusal(&error.to_string()))?;
         if found.hash(tiles_of(&found)) != hash {
             return Err(refusal("another run is in it"));
         }
@@ -292,12 +292,16 @@ mod tests {
         assert!(check(&[]).unwrap_err().contains("no run was begun there"));
         run.claim(true, &config(&[]).to_toml([2, 2])).unwrap();
         check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
+        // Wherever it was begun.
+        let begun = fs::read_to_string(run.configuration()).unwrap();
+        fs::write(run.configuration(), begun.replace("[run]", "[run]\ntransport = \"mpi\"")).unwrap();
+        check(&[("transport", "channel")]).unwrap();
         let told = check(&[("seed", "4")]).unwrap_err();
         assert!(told.contains("scene.seed = 1 there, and 4 here"), "{told}");
         let told = check(&[("record_every", "4")]).unwrap_err();
         assert!(told.contains("output.record_every = 5 there, and 4 here"), "{told}");
-        assert!(!run.is_complete(600));
+        assert_eq!(run.completed(), None);
         fs::write(run.summary(), "{\"steps\": 600, \"interrupted\": false}").unwrap();
-        assert!(run.is_complete(600) && !run.is_complete(700));
+        assert_eq!(run.completed(), Some(600));
     }
 }

@@ -35,7 +35,7 @@ pub fn run(args: &InfoArgs) -> Result<Exit, RunError> {
 }
 
 fn of_run(folder: &RunFolder) -> Result<String, RunError> {
-    let config = Config::load(&folder.configuration(), &[])?;
+    let config = Config::load_begun(&folder.configuration())?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {} x {} tiles\n", tiles[0], tiles[1]);

@@ -116,10 +116,14 @@ impl TransportKind {
 impl Config {
     /// Reads a configuration file.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ConfigError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ConfigError::Read { file: file.clone(), reason: error.to_string() })?;
-        Self::read(&file, &text, overrides)
+        let (file, text) = read_file(path)?;
+        Self::read(&file, &text, overrides, TransportKind::is_built_in)
+    }
+
+    /// Reads the configuration of a run that was begun somewhere, perhaps on a transport that this program lacks.
+    pub fn load_begun(path: &Path) -> Result<Self, ConfigError> {
+        let (file, text) = read_file(path)?;
+        Self::read(&file, &text, &[], |_| true)
     }
 
     /// Reads a configuration from text. `name` stands for it in errors; `overrides` are keys and values as after
@@ -133,14 +137,19 @@ impl Config {
     /// ```
     pub fn from_toml_str(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Self, ConfigError> {
         let overrides: Vec<Override> = overrides.iter().map(|(key, value)| Override::set(key, value)).collect();
-        Self::read(name, text, &overrides)
+        Self::read(name, text, &overrides, TransportKind::is_built_in)
     }
 
-    /// The keys in the order of the documentation.
-    fn read(name: &str, text: &str, overrides: &[Override]) -> Result<Self, ConfigError> {
+    /// The keys in the order of the documentation. `has` says which transports will do.
+    fn read(
+        name: &str,
+        text: &str,
+        overrides: &[Override],
+        has: fn(TransportKind) -> bool,
+    ) -> Result<Self, ConfigError> {
         let mut settings = Settings::new(name, text, overrides)?;
         let scene = SceneConfig::read(&mut settings)?;
-        let run = read_run(&mut settings)?;
+        let run = read_run(&mut settings, has)?;
         let params = read_params(&mut settings, scene.kind)?;
         let output = read_output(&mut settings)?;
         settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
@@ -154,12 +163,21 @@ impl Config {
     }
 }
 
-fn read_run(settings: &mut Settings) -> Result<RunConfig, ConfigError> {
+/// A file's name as errors call it, and its text.
+fn read_file(path: &Path) -> Result<(String, String), ConfigError> {
+    let file = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok((file, text)),
+        Err(error) => Err(ConfigError::Read { file, reason: error.to_string() }),
+    }
+}
+
+fn read_run(settings: &mut Settings, has: fn(TransportKind) -> bool) -> Result<RunConfig, ConfigError> {
     let steps = settings.integer("run.steps", 1..=u64::from(u32::MAX), 600)?;
     let threads = settings.integer("run.threads", 1..=1024, 1)? as usize;
     let ranks_asked_for = settings.place("run.ranks").is_some_and(|place| !matches!(place.origin, Origin::File(_)));
     let transport = settings.choice("run.transport", words::TRANSPORT)?;
-    if let Some(kind) = transport.filter(|kind| !kind.is_built_in()) {
+    if let Some(kind) = transport.filter(|&kind| !has(kind)) {
         let place = settings.place("run.transport").expect("it was given").clone();
         return Err(ConfigError::NotBuiltIn { place, feature: kind.name() });
     }

@@ -281,7 +281,7 @@ fn a_file_that_is_not_there_is_named() {
 #[test]
 fn options_are_named_as_they_were_written() {
     let overrides = [Override::option("--bodies", "scene.bodies", "-5")];
-    let error = Config::read("test.toml", ROOMS, &overrides).unwrap_err().to_string();
+    let error = Config::read("test.toml", ROOMS, &overrides, |_| true).unwrap_err().to_string();
     assert!(error.starts_with("--bodies -5: must be a whole number within 100"), "{error}");
     assert_eq!(
         Override::parse("solver").unwrap_err().to_string().split(';').next(),
