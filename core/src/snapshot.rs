@@ -143,21 +143,20 @@ impl SavedTile {
 }
 
 impl World {
-    /// Appends a block for each tile, ascending, to `bytes`, and tells what is in them. For a world between two steps:
+    /// Replaces `bytes` with a block for each tile, ascending, and tells what is in them. For a world between two steps:
     /// one that failed has left its tiles halfway. A state that is no longer finite, as only the next step would tell,
     /// can be saved and not restored.
     pub fn save(&self, bytes: &mut Vec<u8>) -> Vec<SavedTile> {
         let tiles = self.tile_states();
-        let (before, added) = (bytes.len(), tiles.iter().map(length).sum::<usize>());
-        if bytes.capacity() - before < added {
-            // New memory comes zeroed from the system: the threads are the first to touch it.
-            let mut larger = vec![0; before + added];
-            larger[..before].copy_from_slice(bytes);
-            *bytes = larger;
-        } else {
-            bytes.resize(before + added, 0);
+        let total = tiles.iter().map(length).sum::<usize>();
+        if bytes.capacity() < total {
+            // Given back before there is more; with some to spare, as contacts grow from one snapshot to the next. New memory
+            // comes zeroed from the system: the threads are the first to touch it.
+            *bytes = Vec::new();
+            *bytes = vec![0; total + total / 16];
         }
-        let mut rest = &mut bytes[before..];
+        bytes.resize(total, 0);
+        let mut rest = &mut bytes[..];
         let blocks = tiles.iter().map(|tile| rest.split_off_mut(..length(tile)).expect("room was made for every tile"));
         let blocks: Vec<_> = blocks.collect();
         tiles.par_iter().zip(blocks).with_max_len(1).map(|(tile, block)| save(tile, block)).collect()

@@ -86,19 +86,22 @@ impl WholeFile {
 /// Writes a file whole and durably, or not at all: under another name first.
 ///
 /// # Errors
-/// What the system says; nothing is left then.
+/// What the system says. What was begun is removed then.
 pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let temporary = temporary(path);
     let written = File::create(&temporary).and_then(|mut file| {
         write(&mut file)?;
         file.sync_all()
     });
-    let renamed = written.and_then(|()| fs::rename(&temporary, path)).and_then(|()| sync_folder(path));
+    let renamed = written.and_then(|()| fs::rename(&temporary, path)).and_then(|()| sync_folder_of(path));
     renamed.inspect_err(|_| drop(fs::remove_file(&temporary)))
 }
 
-/// Makes it durable that there is a file of that name, where folders can be made durable.
-fn sync_folder(path: &Path) -> io::Result<()> {
+/// Makes it durable that there is something of that name, where folders can be made durable.
+///
+/// # Errors
+/// If the system says that it is not.
+pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match File::open(folder).map(|folder| folder.sync_all()) {
         Ok(Err(error)) if error.kind() != io::ErrorKind::InvalidInput => Err(error),

@@ -38,21 +38,19 @@ pub struct Output {
     pub folder: RunFolder,
     /// The folder's configuration, every value resolved.
     pub configuration: String,
-    /// Steps between two records.
-    pub record_every: Option<u64>,
-    /// Steps between two snapshots.
-    pub checkpoint_every: Option<u64>,
+    /// How often.
+    pub every: OutputConfig,
     /// Whether the run begins there, or goes on.
     pub begins: bool,
 }
 
 impl Output {
-    /// Makes the folder that of this run.
+    /// Makes the folder that of this run. `held` is what [`RunFolder::hold`] gave before the plan was made.
     ///
     /// # Errors
     /// If it cannot be written to, or another run writes there.
-    pub fn claim(&self) -> Result<Claim, RunError> {
-        self.folder.claim(self.begins, &self.configuration)
+    pub fn claim(&self, held: Option<Claim>) -> Result<Claim, RunError> {
+        self.folder.claim(held, self.begins, &self.configuration)
     }
 }
 
@@ -61,7 +59,7 @@ fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64, output: Option<&
     // A body takes 48 bytes and its contacts as much again and more; an empty tile a few buffers, and four bytes in
     // every rank's map of tiles; a pair of ranks a channel. What is written is copied first: records twice.
     let copies = if output.is_some_and(|output| output.record_every.is_some()) { 100 } else { 0 };
-    let saved = if output.is_some_and(|output| output.checkpoint_every.is_some()) { 200 } else { 0 };
+    let saved = if output.is_some() { 200 } else { 0 };
     let each = 200 + copies + saved;
     let needed = (bodies.saturating_mul(each) + tiles * 1000) / ranks * here + here * (4 * tiles + 500 * ranks);
     let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|facts| {
@@ -104,8 +102,12 @@ impl Plan {
         if completed == Some(steps) {
             return Err(RunError::Complete { summary: folder.summary(), steps });
         }
-        let found = snapshot::find(&folder.snapshots(), &config.canonical(tiles))?;
+        let mut found = snapshot::find(&folder.snapshots(), &config.identity(tiles))?;
         let newest = found.snapshots.first().map(Snapshot::step);
+        if found.snapshots.len() > 1 && newest == Some(steps) {
+            // So that there is a step to make, of which the summary tells.
+            found.snapshots.remove(0);
+        }
         if let Some(made) = newest.max(completed).filter(|&made| made > steps) {
             let reason = format!("{made} steps are made there already, and {steps} asked for");
             return Err(folder.refusal(format!("{reason}; give --steps as many or more")));
@@ -151,8 +153,7 @@ impl Plan {
         let output = folder.map(|(folder, begins)| Output {
             folder,
             configuration: config.to_toml(tiles),
-            record_every: config.output.record_every,
-            checkpoint_every: config.output.checkpoint_every,
+            every: config.output,
             begins,
         });
         Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output, found })

@@ -8,9 +8,10 @@
 //! DIR/snapshots/      (snapshot/)
 //! ```
 
-use crate::config::{Config, Difference, differences};
+use crate::config::{Config, Difference, is_resolved, other_run};
 use crate::error::RunError;
 use crate::output::{is_temporary, write_durably};
+use crate::telemetry::complain;
 use crate::{snapshot, trajectory};
 use serde::Deserialize;
 use std::ffi::OsStr;
@@ -20,8 +21,12 @@ use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Ranks of a run whose launcher was killed end by themselves; so long they are given.
-const LINGERING: Duration = Duration::from_secs(10);
+/// Ranks of a run whose launcher was killed end by themselves, and file systems of a network free the locks of a lost
+/// host after a while; so long they are given.
+const LINGERING: Duration = Duration::from_secs(100);
+
+/// Hosts of a cluster may see a new file a little later than the one that wrote it.
+const UNSEEN: Duration = Duration::from_secs(10);
 
 /// What every process of a run holds.
 const LOCK: &str = "lock";
@@ -74,9 +79,9 @@ impl RunFolder {
         trajectory::rank_folder(&self.path, rank)
     }
 
-    /// Whether a run was begun here.
+    /// Whether a run was begun here: the configuration is one that a run wrote.
     pub fn holds_run(&self) -> bool {
-        self.configuration().is_file()
+        fs::read_to_string(self.configuration()).is_ok_and(|text| is_resolved(&text))
     }
 
     /// Refuses a folder in which no run can begin, before anything is done to it.
@@ -113,16 +118,7 @@ impl RunFolder {
             return Err(self.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"));
         }
         let begun = Config::load_begun(&self.configuration())?;
-        let recorded = (begun.output.record_every, config.output.record_every);
-        if recorded.0 != recorded.1 {
-            let [there, here] =
-                [recorded.0, recorded.1].map(|every| every.map_or("none".to_owned(), |k| k.to_string()));
-            return Err(
-                self.refusal(format!("output.record_every = {there} there, and {here} here; leave it as it was"))
-            );
-        }
-        let differences = differences(&config.canonical(tiles), &begun.canonical(tiles_of(&begun)));
-        differences.into_iter().find(|difference| difference.key != "run.steps").map_or(Ok(()), |difference| {
+        other_run(&config.identity(tiles), &begun.identity(tiles_of(&begun))).map_or(Ok(()), |difference| {
             let Difference { key, ours, theirs } = difference;
             Err(self.refusal(format!("{key} = {theirs} there, and {ours} here; only how a run is spread can change")))
         })
@@ -144,15 +140,55 @@ impl RunFolder {
         RunError::BadFolder { option: self.option, path: self.path.clone(), reason: reason.to_string() }
     }
 
-    /// Makes the folder that of a run about to begin or to go on: nobody else may write there, what an overwritten run left
-    /// is gone, and the configuration is there.
+    /// Keeps other runs from writing here, if there is such a folder. Waits for one that is about to end if that makes
+    /// sense, as it does for a run that is to go on.
     ///
     /// # Errors
-    /// If it cannot be written to, or another run writes there.
-    pub fn claim(&self, begins: bool, configuration: &str) -> Result<Claim, RunError> {
-        let failed = |error: io::Error| self.refusal(format!("{error}; name a folder that can be written to"));
-        fs::create_dir_all(&self.path).map_err(failed)?;
-        let claim = self.lock()?;
+    /// If another run writes here, or nobody can.
+    pub fn hold(&self, waits: bool) -> Result<Option<Claim>, RunError> {
+        if !self.path.is_dir() {
+            return Ok(None);
+        }
+        let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
+        let deadline = Instant::now() + if waits { LINGERING } else { Duration::ZERO };
+        let mut told = false;
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
+                    if !std::mem::replace(&mut told, true) {
+                        complain(&format!("{}: waiting for the run that still writes there", self.path.display()));
+                    }
+                    sleep(POLL);
+                }
+                Err(TryLockError::WouldBlock) => {
+                    return Err(self.refusal("another run is writing there; wait for its end, or stop it"));
+                }
+                // A file system without locks; then nobody can tell.
+                Err(TryLockError::Error(_)) => return Ok(Some(Claim { _lock: None })),
+            }
+        }
+        // From now on it is shared with the other processes of the run.
+        let shared = lock.lock_shared().is_ok();
+        Ok(Some(Claim { _lock: Some(lock).filter(|_| shared) }))
+    }
+
+    /// Makes the folder that of a run about to begin or to go on: what an overwritten run left is gone, and the configuration
+    /// is there. `held` is what [`hold`](Self::hold) gave before the folder was looked at.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run has begun there meanwhile.
+    pub fn claim(&self, held: Option<Claim>, begins: bool, configuration: &str) -> Result<Claim, RunError> {
+        let failed = |error: io::Error| self.not_writable(&error);
+        let claim = match held {
+            Some(claim) => claim,
+            None => {
+                fs::create_dir_all(&self.path).map_err(failed)?;
+                let claim = self.hold(false)?;
+                self.check_free(false)?;
+                claim.ok_or_else(|| self.refusal("it was removed while the run began; try again"))?
+            }
+        };
         if begins {
             self.remove_after(None).map_err(failed)?;
         }
@@ -167,37 +203,31 @@ impl RunFolder {
     /// # Errors
     /// If it is not there, or that of another run.
     pub fn share(&self, hash: &str) -> Result<Claim, RunError> {
-        let refusal = |reason: &str| self.refusal(format!("{reason}; every process of a run must see the same folder"));
-        let found = Config::load_begun(&self.configuration()).map_err(|error| refusal(&error.to_string()))?;
-        if found.hash(tiles_of(&found)) != hash {
-            return Err(refusal("another run is in it"));
-        }
-        let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
-        Ok(Claim { _lock: lock })
+        let deadline = Instant::now() + UNSEEN;
+        let reason = loop {
+            let reason = match Config::load_begun(&self.configuration()) {
+                Ok(found) if found.hash(tiles_of(&found)) == hash => {
+                    let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
+                    return Ok(Claim { _lock: lock });
+                }
+                Ok(_) => "another run is in it".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            if Instant::now() > deadline {
+                break reason;
+            }
+            sleep(POLL);
+        };
+        Err(self.refusal(format!("{reason}; every process of a run must see the same folder")))
     }
 
     fn open_lock(&self) -> io::Result<File> {
-        File::options().create(true).truncate(false).write(true).open(self.path.join(LOCK))
+        // Some file systems share only what can be read.
+        File::options().create(true).truncate(false).read(true).write(true).open(self.path.join(LOCK))
     }
 
-    fn lock(&self) -> Result<Claim, RunError> {
-        let failed = |error: io::Error| self.refusal(format!("{error}; name a folder that can be written to"));
-        let lock = self.open_lock().map_err(failed)?;
-        let deadline = Instant::now() + LINGERING;
-        loop {
-            match lock.try_lock() {
-                Ok(()) => break,
-                Err(TryLockError::WouldBlock) if Instant::now() < deadline => sleep(POLL),
-                Err(TryLockError::WouldBlock) => {
-                    return Err(self.refusal("another run is writing there; wait for its end, or stop it"));
-                }
-                // A file system without locks; then nobody can tell.
-                Err(TryLockError::Error(_)) => return Ok(Claim { _lock: None }),
-            }
-        }
-        // From now on it is shared with the other processes of the run.
-        lock.lock_shared().map_err(failed)?;
-        Ok(Claim { _lock: Some(lock) })
+    fn not_writable(&self, error: &io::Error) -> RunError {
+        self.refusal(format!("{error}; name a folder that can be written to"))
     }
 
     /// Removes what a run left after `step`, as it goes on from there; everything but the configuration if there is no such
@@ -227,9 +257,15 @@ mod tests {
     use super::*;
     use tempfile::tempdir;
 
+    fn config(overrides: &[(&str, &str)]) -> Config {
+        let text = "[scene]\nkind = \"rooms\"\n[run]\ntiles = [2, 2]\n[output]\nrecord_every = 5\n";
+        Config::from_toml_str("test", text, overrides).unwrap()
+    }
+
     fn folder(files: &[&str]) -> (tempfile::TempDir, RunFolder) {
         let folder = tempdir().unwrap();
-        files.iter().for_each(|name| fs::write(folder.path().join(name), "").unwrap());
+        let configuration = config(&[]).to_toml([2, 2]);
+        files.iter().for_each(|name| fs::write(folder.path().join(name), &configuration).unwrap());
         let run = RunFolder::new("--out", folder.path());
         (folder, run)
     }
@@ -253,6 +289,9 @@ mod tests {
         }
         let (_folder, run) = folder(&["file"]);
         let file = RunFolder::new("--out", &run.path().join("file"));
+        // A person's own is no run.
+        fs::write(run.configuration(), "[scene]\nkind = \"rooms\"\n").unwrap();
+        assert!(run.check_free(true).unwrap_err().to_string().contains("what it holds is no run"));
         assert!(file.check_free(true).unwrap_err().to_string().contains("name a folder"));
     }
 
@@ -269,28 +308,29 @@ mod tests {
     fn one_run_at_a_time_and_all_its_processes() {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", &folder.path().join("new"));
-        let text = "[scene]\nkind = \"rooms\"\n[run]\ntiles = [2, 2]\n";
-        let config = Config::from_toml_str("test", text, &[]).unwrap();
-        let claim = run.claim(true, &config.to_toml([2, 2])).unwrap();
-        let shared = run.share(&config.hash([2, 2])).unwrap();
-        let told = run.share("another").unwrap_err().to_string();
-        assert!(told.contains("another run is in it; every process of a run must see the same folder"), "{told}");
-        let other = File::options().write(true).open(run.path().join(LOCK)).unwrap();
-        assert!(matches!(other.try_lock(), Err(TryLockError::WouldBlock)));
-        drop((claim, shared));
-        other.try_lock().unwrap();
+        assert!(run.hold(false).unwrap().is_none());
+        let claim = run.claim(None, true, &config(&[]).to_toml([2, 2])).unwrap();
+        let shared = run.share(&config(&[]).hash([2, 2])).unwrap();
+        let told = run.hold(false).unwrap_err().to_string();
+        assert!(told.contains("another run is writing there"), "{told}");
+        drop(claim);
+        assert!(run.hold(false).is_err());
+        drop(shared);
+        let held = run.hold(false).unwrap();
+        assert!(held.is_some());
+        // Who comes later finds what was begun meanwhile.
+        drop(held);
+        let told = run.claim(None, true, "").unwrap_err().to_string();
+        assert!(told.contains("it holds a run"), "{told}");
     }
 
     #[test]
     fn another_run_is_told_by_what_differs() {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--resume", folder.path());
-        let config = |overrides: &[(&str, &str)]| {
-            Config::from_toml_str("test", "[scene]\nkind = \"rooms\"\n[output]\nrecord_every = 5\n", overrides).unwrap()
-        };
         let check = |overrides| run.check_same_run(&config(overrides), [2, 2]).map_err(|error| error.to_string());
         assert!(check(&[]).unwrap_err().contains("no run was begun there"));
-        run.claim(true, &config(&[]).to_toml([2, 2])).unwrap();
+        run.claim(None, true, &config(&[]).to_toml([2, 2])).unwrap();
         check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
         // Wherever it was begun.
         let begun = fs::read_to_string(run.configuration()).unwrap();

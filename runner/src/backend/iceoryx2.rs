@@ -45,12 +45,11 @@ impl Signals {
     }
 }
 
-/// Starts this program once more for each rank, with the arguments it was started with, and waits for all. `goes_on` says
-/// that they are not the first to do this.
+/// Whether the ranks can be started, before anything is changed for them.
 ///
 /// # Errors
-/// The one that ended the run, whichever and however many ranks it ended.
-pub fn run(plan: &Plan, config: &Path, signals: &Signals, goes_on: bool) -> Result<Summary, RunError> {
+/// If not.
+pub fn check(plan: &Plan, config: &Path) -> Result<(), RunError> {
     if !config.is_file() {
         // What can be read but once would leave nothing for the ranks.
         let config = config.display();
@@ -58,6 +57,15 @@ pub fn run(plan: &Plan, config: &Path, signals: &Signals, goes_on: bool) -> Resu
             "{config}: each rank reads the configuration itself, so with transport iceoryx2 it must be a regular file"
         )));
     }
+    iceoryx2::check(plan.config.run.ranks).map_err(|error| RunError::Ranks(error.to_string()))
+}
+
+/// Starts this program once more for each rank, with the arguments it was started with, and waits for all. `goes_on` says
+/// that they are not the first to do this.
+///
+/// # Errors
+/// The one that ended the run, whichever and however many ranks it ended.
+pub fn run(plan: &Plan, signals: &Signals, goes_on: bool) -> Result<Summary, RunError> {
     let program = env::current_exe()
         .map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))?;
     let control = || match (signals.quit.is_requested(), signals.stop.is_requested()) {

@@ -42,7 +42,7 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
-    let found = snapshot::find(&folder.snapshots(), &config.canonical(tiles))?;
+    let found = snapshot::find(&folder.snapshots(), &config.identity(tiles))?;
     if found.snapshots.is_empty() {
         row(&mut text, "snapshots", "none");
     }
@@ -66,7 +66,8 @@ fn state(folder: &RunFolder, steps: u64) -> String {
     let Some(summary) = summary else {
         return format!("to make {steps} steps; under way, or ended before it could say how");
     };
-    let how = if summary["interrupted"] == true { "interrupted after" } else { "complete," };
+    let complete = summary["interrupted"] == false && summary["steps"] == steps;
+    let how = if complete { "complete," } else { "ended after" };
     let hash = |name: &str| summary[name].as_str().unwrap_or("unknown").to_owned();
     format!("{how} {} of {steps} steps: state hash {}", summary["steps"], hash("state_hash"))
 }

@@ -16,6 +16,7 @@ use crate::summary::Summary;
 use crate::telemetry::complain;
 use crate::timings;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// Does it, with everything that can be refused refused before anything heavy starts.
 ///
@@ -25,26 +26,32 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     #[cfg(feature = "iceoryx2")]
     if let Some(rank) = backend::iceoryx2::RankProcess::of_this() {
         let goes_on = rank.goes_on();
-        let plan = load(args).and_then(|config| plan(args, &config, goes_on));
+        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on));
         return Ok(rank.run(plan, observer(args, goes_on)));
     }
-    let config = load(args);
+    let config = load(args, false);
     #[cfg(feature = "mpi")]
     if is_for_mpi(args, &config) {
         return over_mpi(args, config);
     }
     let config = config?;
+    // First of all: what is in a folder may change while another run writes there.
+    let held = hold(args)?;
     let outputs = Outputs::check(args)?;
-    let first = plan(args, &config, false)?;
+    let first = match plan(args, &config, false) {
+        Err(error @ RunError::Complete { .. }) => return outputs.copy_summary(error),
+        plan => plan?,
+    };
     tell(&first);
-    let _claim = claim(&first)?;
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
+        backend::iceoryx2::check(&first, &configuration(args, false))?;
+        let _claim = claim(&first, held)?;
         let signals = backend::iceoryx2::Signals::handle();
-        let path = configuration(args);
-        let run = |plan: &Plan, goes_on| backend::iceoryx2::run(plan, &path, &signals, goes_on);
+        let run = |plan: &Plan, goes_on| backend::iceoryx2::run(plan, &signals, goes_on);
         return conclude(&supervise(args, &config, first, run, || signals.ask_to_stop())?, &outputs);
     }
+    let _claim = claim(&first, held)?;
     let stop = StopFlag::on_signals(true, || std::process::exit(Exit::Interrupted as i32));
     let run = |plan: &Plan, goes_on| backend::run(plan, &Observer { stop: stop.clone(), ..observer(args, goes_on) });
     conclude(&supervise(args, &config, first, run, || stop.is_requested())?, &outputs)
@@ -79,18 +86,20 @@ fn folder(args: &RunArgs) -> Option<RunFolder> {
     out.or_else(|| args.resume.as_ref().map(|path| RunFolder::new("--resume", path)))
 }
 
-/// The file that says what to run: the user's, or the one in the folder of the run that is to go on.
-fn configuration(args: &RunArgs) -> PathBuf {
-    let file = args.config.clone().or_else(|| Some(folder(args)?.configuration()));
+/// The file that says what to run: the user's, or the one in the folder of the run that is to go on. One that was begun
+/// here has the latter, whatever became of the former.
+fn configuration(args: &RunArgs, goes_on: bool) -> PathBuf {
+    let own = folder(args).map(|folder| folder.configuration());
+    let file = if goes_on { own } else { args.config.clone().or(own) };
     file.expect("either is required on the command line")
 }
 
-fn load(args: &RunArgs) -> Result<Config, RunError> {
+fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
     match folder(args) {
         Some(folder) if args.config.is_none() && !folder.holds_run() => {
             Err(folder.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"))
         }
-        _ => Ok(Config::load(&configuration(args), &args.overrides()?)?),
+        _ => Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?),
     }
 }
 
@@ -117,9 +126,14 @@ fn tell(plan: &Plan) {
     }
 }
 
+/// Keeps other runs from the folder of this one, if it has one that is there.
+fn hold(args: &RunArgs) -> Result<Option<Claim>, RunError> {
+    folder(args).map_or(Ok(None), |folder| folder.hold(args.resume.is_some()))
+}
+
 /// Makes the folder of a run ready, if it has one.
-fn claim(plan: &Plan) -> Result<Option<Claim>, RunError> {
-    plan.output.as_ref().map(|output| output.claim()).transpose()
+fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
+    plan.output.as_ref().map(|output| output.claim(held)).transpose()
 }
 
 /// Whether ranks are to be joined by MPI. Where the configuration cannot be read, the command line says so, or that a
@@ -137,6 +151,7 @@ fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
 fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, RunError> {
     let mut job = backend::mpi::Job::join()?;
     let speaks = job.speaks();
+    let held = job.all_well(if speaks && config.is_ok() { hold(args) } else { Ok(None) })?;
     let prepared = config.and_then(|config| {
         if args.restarts > 0 {
             let reason = "with transport mpi, start again with --resume, as configs/slurm/ does".to_owned();
@@ -148,7 +163,7 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         Ok((plan, outputs))
     });
     let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
-    let _claim = job.all_well(if speaks { claim(&plan) } else { Ok(None) })?;
+    let _claim = job.all_well(if speaks { claim(&plan, held) } else { Ok(None) })?;
     if speaks {
         tell(&plan);
     }
@@ -189,6 +204,15 @@ struct Outputs {
 }
 
 impl Outputs {
+    /// Of a run that is complete: its summary goes where this one's was to go.
+    fn copy_summary(&self, complete: RunError) -> Result<Exit, RunError> {
+        if let (RunError::Complete { summary, .. }, Some(json)) = (&complete, &self.json) {
+            let failed = |error: io::Error| RunError::Output { path: summary.clone(), reason: error.to_string() };
+            json.write(&fs::read(summary).map_err(failed)?)?;
+        }
+        Err(complete)
+    }
+
     /// Where the summary and the timings are to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
         let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();

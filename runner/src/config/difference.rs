@@ -24,6 +24,12 @@ pub fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
     all.filter(|one| one.ours != one.theirs).collect()
 }
 
+/// The first key in which two texts as of [`Config::identity`](super::Config::identity) differ that cannot be of one run:
+/// one that goes on may make more steps, or fewer.
+pub fn other_run(ours: &str, theirs: &str) -> Option<Difference> {
+    differences(ours, theirs).into_iter().find(|difference| difference.key != "run.steps")
+}
+
 fn pairs(text: &str) -> Vec<(&str, &str)> {
     text.lines().map(|line| line.split_once(" = ").unwrap_or((line, ""))).collect()
 }

@@ -13,8 +13,9 @@ mod settings;
 mod tests;
 mod words;
 
-pub use difference::{Difference, differences};
+pub use difference::{Difference, differences, other_run};
 pub use error::{ConfigError, OneLine, Origin, Place};
+pub use resolved::{identity, is_resolved};
 pub use scene::{SceneConfig, SceneKind};
 pub use settings::Override;
 

@@ -134,6 +134,12 @@ impl Config {
         entries.map(|(key, value)| format!("{key} = {value}\n")).collect()
     }
 
+    /// What all parts of one run have in common, a `key = value` line each: [`canonical`](Self::canonical), and how often it
+    /// is recorded. [`other_run`](super::other_run) compares two.
+    pub fn identity(&self, tiles: [u32; 2]) -> String {
+        identity(self.output.record_every, &self.canonical(tiles))
+    }
+
     /// A fingerprint of [`canonical`](Self::canonical): 32 hexadecimal digits, the same for runs that must agree.
     pub fn hash(&self, tiles: [u32; 2]) -> String {
         format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
@@ -160,6 +166,17 @@ fn hertz(dt: f32) -> f32 {
     let near = [nearest, nearest.next_down(), nearest.next_up()];
     let exact = near.into_iter().filter(|hertz| hertz.is_finite() && 1.0 / hertz == dt);
     exact.min_by_key(|hertz| hertz.to_string().len()).unwrap_or(nearest)
+}
+
+/// Whether a text is a configuration that a run wrote, and not one that a person did.
+pub fn is_resolved(text: &str) -> bool {
+    text.starts_with(HEADING)
+}
+
+/// As [`Config::identity`].
+pub fn identity(record_every: Option<u64>, canonical: &str) -> String {
+    let every = record_every.map_or("nothing".to_owned(), |every| every.to_string());
+    format!("output.record_every = {every}\n{canonical}")
 }
 
 #[cfg(test)]

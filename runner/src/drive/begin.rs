@@ -4,7 +4,7 @@ use super::RankError;
 use crate::error::RunError;
 use crate::handshake::{self, Refusal};
 use crate::plan::Plan;
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Snapshot, SnapshotError};
 use crate::telemetry::complain;
 use atoll_core::World;
 use atoll_transport::{Rank, Transport};
@@ -22,6 +22,13 @@ pub(super) fn build(plan: &Plan, rank: Rank, transport: &mut impl Transport) -> 
     let mut snapshots = plan.found.snapshots.iter().peekable();
     while let Some(snapshot) = snapshots.next() {
         let restored = restore(plan, rank, snapshot)?;
+        // What cannot be read just now is no reason to give it up.
+        let (unreadable, restored) = match restored {
+            Err(error) if !error.is_damage() => (Some(RunError::Snapshot(error)), None),
+            restored => (None, Some(restored.map_err(RunError::Snapshot))),
+        };
+        handshake::all_well(transport, unreadable.as_ref())?;
+        let Some(restored) = restored else { unreachable!("all can read it") };
         match (handshake::all_well(transport, restored.as_ref().err()), restored) {
             (Ok(()), Ok(world)) => return Ok(Beginning { world, resumed: Some(snapshot.step()) }),
             (Err(Refusal::Known(error)), _) if snapshots.peek().is_some() => {
@@ -38,11 +45,13 @@ pub(super) fn build(plan: &Plan, rank: Rank, transport: &mut impl Transport) -> 
 }
 
 /// This rank's tiles of a snapshot. That they cannot be read is for all ranks to hear.
-fn restore(plan: &Plan, rank: Rank, snapshot: &Snapshot) -> Result<Result<World, RunError>, RankError> {
+fn restore(plan: &Plan, rank: Rank, snapshot: &Snapshot) -> Result<Result<World, SnapshotError>, RankError> {
     let mut world = World::new(&plan.blueprint, &plan.assignment.tiles_of(rank.index())).map_err(RankError::Setup)?;
     let restored = snapshot.restore(&mut world);
-    info!(step = snapshot.step(), bodies = world.bodies().count(), "restored");
-    Ok(restored.map(|()| world).map_err(RunError::Snapshot))
+    if restored.is_ok() {
+        info!(step = snapshot.step(), bodies = world.bodies().count(), "restored");
+    }
+    Ok(restored.map(|()| world))
 }
 
 /// This rank's part of the scene.

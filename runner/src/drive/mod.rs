@@ -129,11 +129,15 @@ fn run<T: Transport>(
 ) -> Result<Option<Gathered>, RankError> {
     let start = Instant::now();
     let rank = transport.rank();
+    // Before the halo: where this rank fails, the others hear of it before the last of what it writes is written.
+    let mut recorder;
     let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
     let Beginning { mut world, resumed } = begin::build(plan, rank, halo.transport())?;
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
-    let mut recorder = output::start(plan, rank, resumed, halo.transport())?;
+    recorder = output::start(plan, rank, resumed, halo.transport())?;
+    *complete = world.step_count();
+    observer.complete.store(*complete, Ordering::Relaxed);
     let built = Instant::now();
 
     let steps = plan.config.run.steps;
@@ -143,7 +147,7 @@ fn run<T: Transport>(
     let mut last = StepReport::default();
     let mut migrations = 0;
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
-        recorder.write_due(&world);
+        recorder.write_due(&world, false);
     }
     while world.step_count() < steps && !last.stopped {
         if observer.stop.is_requested() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some()) {
@@ -160,7 +164,7 @@ fn run<T: Transport>(
         *complete = world.step_count();
         observer.complete.store(*complete, Ordering::Relaxed);
         if let Some(recorder) = &mut recorder {
-            recorder.write_due(&world);
+            recorder.write_due(&world, last.stopped);
         }
         progress.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");

@@ -8,7 +8,7 @@ use crate::recorder::Recorder;
 use crate::snapshot;
 use crate::telemetry::complain;
 use atoll_core::World;
-use atoll_transport::{Rank, Transport};
+use atoll_transport::{Collective, Rank, Transport};
 use std::time::Duration;
 
 /// Starts to write, on all ranks or none. What an earlier attempt left after the step from which the run goes on is removed
@@ -20,13 +20,15 @@ pub(super) fn start<'a>(
     transport: &mut impl Transport,
 ) -> Result<Option<Recorder<'a>>, RankError> {
     let Some(output) = &plan.output else { return Ok(None) };
-    let mut removed = Ok(());
-    if rank == Rank(0) {
-        removed = output.folder.remove_after(resumed).map_err(|error| output.folder.refusal(error));
+    let claim = output.folder.share(&plan.config.hash(plan.tiles));
+    let mut ready = claim.as_ref().map(|_| ()).map_err(|error| error.to_string());
+    if rank == Rank(0) && ready.is_ok() {
+        ready = output.folder.remove_after(resumed).map_err(|error| error.to_string());
     }
     // Nobody writes before it is done.
-    handshake::all_well(transport, removed.as_ref().err())?;
-    let recorder = Recorder::start(plan, output, rank, resumed);
+    let trouble = ready.err().map(|reason| output.folder.refusal(reason));
+    handshake::all_well(transport, trouble.as_ref())?;
+    let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
     handshake::all_well(transport, recorder.as_ref().err())?;
     Ok(recorder.ok())
 }
@@ -40,13 +42,19 @@ pub(super) fn finish(
     plan: &Plan,
     transport: &mut impl Transport,
 ) -> Result<Duration, RankError> {
-    let Output { folder, checkpoint_every, .. } = recorder.output();
-    if stopped || checkpoint_every.is_some() {
+    let Output { folder, every, .. } = recorder.output();
+    if stopped || every.checkpoint_every.is_some() {
         recorder.snapshot(world);
     }
     let kept = recorder.snapshot_before();
-    let (time, finished) = recorder.finish();
-    let trouble = finished.err().map(|why| RunError::StoppedWriting {
+    // However slow the disk of one is, the others hear of it.
+    let mut done = false;
+    while !done {
+        let own = [u8::from(recorder.close(plan.config.run.peer_timeout / 4))];
+        done = transport.all_gather(&own).map_err(RankError::Transport)?.iter().all(|rank| rank == &[1]);
+    }
+    let time = recorder.time();
+    let trouble = recorder.failure().map(|why| RunError::StoppedWriting {
         why: why.to_string(),
         complete: world.step_count(),
         steps: plan.config.run.steps,

@@ -3,9 +3,10 @@
 //! The rank only copies its state into a buffer; encoding and writing go on beside the next steps. There are two buffers for
 //! records and one for snapshots: where the disk cannot keep up, the rank waits, and memory stays bounded.
 //!
-//! Every rank writes its part of a snapshot by itself. Once it has made the step after a snapshot, all ranks have at least
-//! begun to write theirs, as they meet in each step's exchange, and so are done with the one before, as each has one buffer.
-//! Only then are older ones removed, so at any moment there is a whole one.
+//! Every rank writes its part of a snapshot by itself. Once it has made the step after a snapshot, and nobody has asked to
+//! stop, all ranks have at least begun to write theirs, as they meet in each step's exchange, and so have written the one
+//! before, as each has one buffer, and who could not write asks to stop. Only then are older ones removed, so at any moment
+//! there is a whole one.
 
 mod buffers;
 mod writer;
@@ -17,12 +18,14 @@ use crate::trajectory::Record;
 use atoll_core::World;
 use atoll_transport::Rank;
 use buffers::Buffers;
-use std::panic::resume_unwind;
 use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use writer::{Job, Saved, Writer};
+
+/// Between two looks at whether everything is written.
+const POLL: Duration = Duration::from_millis(1);
 
 /// What a rank writes.
 pub struct Recorder<'a> {
@@ -46,9 +49,14 @@ impl<'a> Recorder<'a> {
     /// Starts to write for a rank that begins, or goes on from the snapshot of the step `resumed`.
     ///
     /// # Errors
-    /// If the folder is not that of this run, or cannot be written to.
-    pub fn start(plan: &'a Plan, output: &'a Output, rank: Rank, resumed: Option<u64>) -> Result<Self, RunError> {
-        let claim = output.folder.share(&plan.config.hash(plan.tiles))?;
+    /// If the folder cannot be written to.
+    pub fn start(
+        plan: &'a Plan,
+        output: &'a Output,
+        claim: Claim,
+        rank: Rank,
+        resumed: Option<u64>,
+    ) -> Result<Self, RunError> {
         // One is written while the next is filled.
         let (records, record_back) = Buffers::new(2);
         let (saves, save_back) = Buffers::new(1);
@@ -74,24 +82,26 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Writes what is due after the steps that were made. Waits where the disk is behind.
-    pub fn write_due(&mut self, world: &World) {
+    /// Writes what is due after the steps that were made. Waits where the disk is behind. `stopped` says that somebody asked
+    /// to stop.
+    pub fn write_due(&mut self, world: &World, stopped: bool) {
         let start = Instant::now();
         let step = world.step_count();
         let due = |every: Option<u64>| every.is_some_and(|every| step.is_multiple_of(every));
-        if self.last_snapshot.is_some_and(|last| last < step)
+        if !stopped
+            && self.last_snapshot.is_some_and(|last| last < step)
             && let Some(kept) = self.snapshot_before.take()
             && self.removes
         {
             self.ask(Job::RemoveBefore(kept));
         }
-        if due(self.output.record_every)
+        if due(self.output.every.record_every)
             && let Some(mut record) = self.records.take()
         {
             record.fill(step, world.bodies());
             self.ask(Job::Record(record));
         }
-        if step > 0 && due(self.output.checkpoint_every) {
+        if step > 0 && due(self.output.every.checkpoint_every) {
             self.snapshot(world);
         }
         self.time += start.elapsed();
@@ -125,31 +135,35 @@ impl<'a> Recorder<'a> {
         self.failure.get()
     }
 
-    /// Waits until everything is written. Says how long the rank copied its state, or waited for the disk; and the first
-    /// thing that could not be written, if there is one.
-    pub fn finish(mut self) -> (Duration, Result<(), RunError>) {
+    /// Lets nothing more be written than was asked for, and waits until that is done, but no longer than `patience`. Says
+    /// whether it is.
+    pub fn close(&mut self, patience: Duration) -> bool {
         let start = Instant::now();
-        if let Some(Err(panic)) = self.join() {
-            resume_unwind(panic);
+        self.jobs = None;
+        let done = |thread: &Option<JoinHandle<()>>| thread.as_ref().is_none_or(JoinHandle::is_finished);
+        while !done(&self.thread) && start.elapsed() < patience {
+            thread::sleep(POLL);
         }
-        let failure = Arc::into_inner(std::mem::take(&mut self.failure)).and_then(OnceLock::into_inner);
-        (self.time + start.elapsed(), failure.map_or(Ok(()), Err))
+        self.time += start.elapsed();
+        done(&self.thread)
+    }
+
+    /// How long the rank copied its state, or waited for the disk.
+    pub fn time(&self) -> Duration {
+        self.time
     }
 
     fn ask(&self, job: Job) {
         // A writer that is gone has panicked, which `finish` finds out.
-        let _ = self.jobs.as_ref().expect("there until the end").send(job);
-    }
-
-    fn join(&mut self) -> Option<thread::Result<()>> {
-        self.jobs = None;
-        self.thread.take().map(JoinHandle::join)
+        let _ = self.jobs.as_ref().expect("there until it is closed").send(job);
     }
 }
 
 /// Also where the run fails: what was recorded before is whole.
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        let _ = self.join();
+        self.jobs = None;
+        // It catches its panics.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }

@@ -6,6 +6,7 @@ use crate::snapshot::{self, SnapshotWriter};
 use crate::trajectory::{Record, RunFacts, TrajectoryWriter};
 use atoll_core::{SavedTile, World};
 use atoll_transport::Rank;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, OnceLock};
@@ -32,7 +33,6 @@ pub(super) struct Saved {
 impl Saved {
     pub(super) fn fill(&mut self, world: &World) {
         self.step = world.step_count();
-        self.blocks.clear();
         self.tiles = world.save(&mut self.blocks);
     }
 }
@@ -52,20 +52,20 @@ impl Writer {
         rank: Rank,
         failure: Arc<OnceLock<RunError>>,
     ) -> Result<Self, RunError> {
-        let (ranks, canonical) = (plan.config.run.ranks as u32, plan.config.canonical(plan.tiles));
+        let (ranks, identity) = (plan.config.run.ranks as u32, plan.config.identity(plan.tiles));
         let recording = |every| {
             let facts = RunFacts::new(plan, every);
             TrajectoryWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
         };
-        let trajectory = output.record_every.map(recording).transpose()?;
-        let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, canonical);
+        let trajectory = output.every.record_every.map(recording).transpose()?;
+        let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, identity);
         Ok(Self { trajectory, snapshot, snapshots: output.folder.snapshots(), failure })
     }
 
     /// Does what it is asked for until nobody can ask any more, and gives the buffers back.
     pub(super) fn work(mut self, jobs: &Receiver<Job>, records: &Sender<Record>, saves: &Sender<Saved>) {
         for job in jobs {
-            // Whoever asked may have ended, and need no buffer.
+            // Whoever asked may have ended, and need no buffer. One that comes back was written, or there is a failure.
             match job {
                 Job::Record(record) => {
                     self.attempt(|writer| writer.record(&record));
@@ -75,6 +75,8 @@ impl Writer {
                     self.attempt(|writer| writer.save(&saved));
                     let _ = saves.send(saved);
                 }
+                // After a failure nobody can tell which snapshots are whole.
+                Job::RemoveBefore(_) if self.failure.get().is_some() => {}
                 Job::RemoveBefore(step) => {
                     if let Err(error) = snapshot::remove_before(&self.snapshots, step) {
                         warn!("old snapshots stay in {}: {error}", self.snapshots.display());
@@ -86,9 +88,14 @@ impl Writer {
     }
 
     fn attempt(&mut self, write: impl FnOnce(&mut Self) -> Result<(), RunError>) {
-        if self.failure.get().is_none()
-            && let Err(error) = write(self)
-        {
+        if self.failure.get().is_some() {
+            return;
+        }
+        let written = catch_unwind(AssertUnwindSafe(|| write(self))).unwrap_or_else(|_| {
+            let reason = "the code that writes panicked; please report this".to_owned();
+            Err(RunError::Output { path: self.snapshots.with_file_name(""), reason })
+        });
+        if let Err(error) = written {
             let _ = self.failure.set(error);
         }
     }

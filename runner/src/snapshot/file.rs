@@ -12,7 +12,7 @@
 //! Everything is little-endian. Each block has a checksum of its own, so every byte is covered.
 
 use super::SnapshotError;
-use crate::output::write_durably;
+use crate::output::{sync_folder_of, write_durably};
 use atoll_core::{Hashes, SNAPSHOT_FORMAT, SavedTile, TileId};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
@@ -40,8 +40,8 @@ pub struct Facts {
     pub ranks: u32,
     /// Columns and rows of tiles of the whole world.
     pub tiles: [u32; 2],
-    /// Everything that the state depends on, a `key = value` line each.
-    pub canonical: String,
+    /// Of its run, as [`Config::identity`](crate::Config::identity).
+    pub identity: String,
 }
 
 /// Where a tile lies and what it holds.
@@ -86,10 +86,10 @@ pub struct SnapshotWriter {
 }
 
 impl SnapshotWriter {
-    /// Writes what a rank of so many has to save; `canonical` and `tiles` are those of the whole run.
-    pub fn new(rank: u32, ranks: u32, tiles: [u32; 2], canonical: String) -> Self {
+    /// Writes what a rank of so many has to save; `tiles` and `identity` are those of the whole run.
+    pub fn new(rank: u32, ranks: u32, tiles: [u32; 2], identity: String) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, canonical } }
+        Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, identity } }
     }
 
     /// Writes the tiles that were saved after `step` to `blocks`, one after the other, to a file that is whole and durable
@@ -112,7 +112,10 @@ impl SnapshotWriter {
             write_durably(&path, |file| {
                 file.write_all(&head)?;
                 file.write_all(blocks)
-            })
+            })?;
+            // The folders that it lies in have names as well.
+            sync_folder_of(&folder)?;
+            sync_folder_of(snapshots)
         });
         match written {
             Ok(()) => Ok(path),

@@ -88,8 +88,8 @@ impl SnapshotError {
         Self::Read { path: path.to_owned(), reason: error.to_string() }
     }
 
-    /// Whether an older snapshot may do: not where this one is fine and merely not for this run.
+    /// Whether an older snapshot may do: not where this one is merely not for this run, or cannot be read just now.
     pub fn is_damage(&self) -> bool {
-        matches!(self, Self::Read { .. } | Self::Damaged { .. })
+        matches!(self, Self::Damaged { .. })
     }
 }

@@ -1,7 +1,7 @@
 //! A whole snapshot: the files of all ranks that wrote it.
 
 use super::{SnapshotError, SnapshotFile, store};
-use crate::config::differences;
+use crate::config::other_run;
 use atoll_core::{Hashes, TileId, World};
 use std::path::{Path, PathBuf};
 
@@ -26,13 +26,16 @@ impl Snapshot {
         let Some(paths) = store::complete_set(folder)? else { return Ok(None) };
         let files: Vec<_> = paths.iter().map(|path| SnapshotFile::open(path)).collect::<Result<_, _>>()?;
         let (first, ranks) = (&files[0].facts, files.len() as u32);
-        let tiles = first.tiles[0] as usize * first.tiles[1] as usize;
+        let tiles: usize = files.iter().map(|file| file.blocks.len()).sum();
+        if u64::from(first.tiles[0]) * u64::from(first.tiles[1]) != tiles as u64 {
+            return Err(SnapshotError::damaged(folder, format!("its files have {tiles} tiles, not those of its grid")));
+        }
         let mut places = vec![None; tiles];
         for ((number, file), path) in (0..).zip(&files).zip(&paths) {
             let facts = &file.facts;
             let alike = (facts.rank, facts.ranks) == (number, ranks)
-                && (facts.step, facts.tiles, &facts.canonical) == (first.step, first.tiles, &first.canonical);
-            if !alike || store::step_of(folder) != Some(facts.step) {
+                && (facts.step, facts.tiles, &facts.identity) == (first.step, first.tiles, &first.identity);
+            if !alike {
                 return Err(SnapshotError::damaged(path, "it belongs to another snapshot"));
             }
             for (place, block) in (0..).zip(&file.blocks) {
@@ -43,21 +46,18 @@ impl Snapshot {
                 }
             }
         }
-        if let Some(tile) = places.iter().position(Option::is_none) {
-            return Err(SnapshotError::damaged(folder, format!("no file has tile {tile}")));
-        }
+        // As many tiles as places, and none twice: each has its own.
         let places = places.into_iter().flatten().collect();
         Ok(Some(Self { folder: folder.to_owned(), files, places }))
     }
 
-    /// Refuses a snapshot of a run that is configured otherwise; more steps, or fewer, are no other run.
+    /// Refuses a snapshot of a run that is configured otherwise than one of this identity.
     ///
     /// # Errors
     /// Naming the first key that differs.
-    pub fn check_configuration(&self, canonical: &str) -> Result<(), SnapshotError> {
+    pub fn check_identity(&self, identity: &str) -> Result<(), SnapshotError> {
         let file = &self.files[0];
-        let differs = differences(canonical, &file.facts.canonical).into_iter().find(|key| key.key != "run.steps");
-        differs.map_or(Ok(()), |difference| {
+        other_run(identity, &file.facts.identity).map_or(Ok(()), |difference| {
             Err(SnapshotError::OtherConfiguration {
                 path: file.path.clone(),
                 key: difference.key,

@@ -17,13 +17,15 @@ pub(super) fn file_name(rank: u32, ranks: u32) -> String {
 
 /// The step that a folder is named after.
 pub(super) fn step_of(folder: &Path) -> Option<u64> {
-    folder.file_name()?.to_str()?.strip_prefix("step-")?.parse().ok()
+    let name = folder.file_name()?.to_str()?;
+    name.strip_prefix("step-")?.parse().ok().filter(|&step| folder_name(step) == name)
 }
 
 /// Rank and number of ranks of the file that is so named.
 fn ranks_of(name: &OsStr) -> Option<(u32, u32)> {
     let (rank, ranks) = name.to_str()?.strip_prefix("rank-")?.strip_suffix(".atoll")?.split_once("-of-")?;
-    Some((rank.parse().ok()?, ranks.parse().ok()?))
+    let (rank, ranks) = (rank.parse().ok()?, ranks.parse().ok()?);
+    (name == file_name(rank, ranks).as_str()).then_some((rank, ranks))
 }
 
 /// The files of all ranks in a folder, by rank, if all are there. Where a run was resumed on other ranks, more than one
@@ -69,15 +71,20 @@ pub struct Found {
 /// Finds the snapshots of a run. Those that were not complete when the run ended are passed over.
 ///
 /// # Errors
-/// If there are some and all are damaged, or one is of another version or configuration than `canonical`.
-pub fn find(snapshots: &Path, canonical: &str) -> Result<Found, SnapshotError> {
+/// If there are some and all are damaged, or one cannot be read, or is of another version or
+/// run than that of this identity.
+pub fn find(snapshots: &Path, identity: &str) -> Result<Found, SnapshotError> {
     let mut found = Found::default();
     let folders = folders(snapshots).map_err(|error| SnapshotError::read(snapshots, &error))?;
-    for folder in folders.values().rev() {
+    for (&step, folder) in folders.iter().rev() {
         match Snapshot::open(folder) {
-            Ok(Some(snapshot)) => {
-                snapshot.check_configuration(canonical)?;
+            Ok(Some(snapshot)) if snapshot.step() == step => {
+                snapshot.check_identity(identity)?;
                 found.snapshots.push(snapshot);
+            }
+            Ok(Some(snapshot)) => {
+                let reason = format!("it is of step {}", snapshot.step());
+                found.damaged.push(SnapshotError::damaged(folder, reason));
             }
             Ok(None) => {}
             Err(error) if error.is_damage() => found.damaged.push(error),

@@ -23,8 +23,8 @@ fn world(plan: &Plan, tiles: &[u32]) -> World {
     world
 }
 
-fn canonical(plan: &Plan) -> String {
-    plan.config.canonical(plan.tiles)
+fn identity(plan: &Plan) -> String {
+    plan.config.identity(plan.tiles)
 }
 
 /// Writes what two ranks have to save after a step.
@@ -33,7 +33,7 @@ fn write(plan: &Plan, snapshots: &Path, step: u64) -> Hashes {
     for (rank, tiles) in [(0, [0, 3]), (1, [1, 2])] {
         let (world, mut blocks) = (world(plan, &tiles), Vec::new());
         let saved = world.save(&mut blocks);
-        SnapshotWriter::new(rank, 2, plan.tiles, canonical(plan)).write(snapshots, step, &saved, &blocks).unwrap();
+        SnapshotWriter::new(rank, 2, plan.tiles, identity(plan)).write(snapshots, step, &saved, &blocks).unwrap();
         hashes = hashes.merge(world.hashes());
     }
     hashes
@@ -53,7 +53,7 @@ fn file(folder: &TempDir, step: u64, rank: u32) -> PathBuf {
 
 /// Goes on from the newest snapshot that can be restored, on one rank, and says from which step; or what is wrong.
 fn go_on(plan: &Plan, folder: &TempDir, expected: Hashes) -> Result<(u64, Vec<String>), SnapshotError> {
-    let found = find(folder.path(), &canonical(plan))?;
+    let found = find(folder.path(), &identity(plan))?;
     let mut passed_over: Vec<String> = found.damaged.iter().map(ToString::to_string).collect();
     for snapshot in &found.snapshots {
         let mut world = World::new(&plan.blueprint, &[0, 1, 2, 3].map(TileId)).unwrap();
@@ -74,7 +74,7 @@ fn the_newest_is_used() {
     let plan = plan(&[]);
     let (folder, hashes) = two(&plan);
     assert_eq!(go_on(&plan, &folder, hashes).unwrap(), (8, vec![]));
-    let found = find(folder.path(), &canonical(&plan)).unwrap();
+    let found = find(folder.path(), &identity(&plan)).unwrap();
     assert_eq!(found.snapshots[0].weights().iter().sum::<u64>(), 12);
     found.snapshots[0].check().unwrap();
 }
@@ -91,7 +91,7 @@ fn no_changed_byte_goes_unnoticed() {
         let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
         assert_eq!((step, passed_over.len()), (4, 1), "{what}: {passed_over:?}");
         assert!(passed_over[0].starts_with(&name), "{what}: {passed_over:?}");
-        let found = find(folder.path(), &canonical(&plan)).unwrap();
+        let found = find(folder.path(), &identity(&plan)).unwrap();
         assert!(found.damaged.len() == 1 || found.snapshots[0].check().is_err(), "{what}");
     };
     for place in 0..bytes.len() {
@@ -132,8 +132,8 @@ fn what_was_not_complete_is_passed_over_and_what_is_all_damaged_is_told() {
         "{error}"
     );
     fs::remove_file(file(&folder, 4, 0)).unwrap();
-    assert!(find(folder.path(), &canonical(&plan)).unwrap().snapshots.is_empty());
-    assert!(find(&folder.path().join("none"), &canonical(&plan)).unwrap().snapshots.is_empty());
+    assert!(find(folder.path(), &identity(&plan)).unwrap().snapshots.is_empty());
+    assert!(find(&folder.path().join("none"), &identity(&plan)).unwrap().snapshots.is_empty());
 }
 
 #[test]
@@ -143,13 +143,14 @@ fn another_configuration_is_refused_by_the_key_that_differs() {
         ("seed", "scene.seed", ["1", "2"]),
         ("contact_hertz", "physics.contact_hertz", ["30.0", "25.0"]),
         ("bodies", "scene.bodies", ["12", "13"]),
+        ("record_every", "output.record_every", ["nothing", "2"]),
     ] {
         let error = go_on(&plan(&[(key, values[1])]), &folder, hashes).unwrap_err().to_string();
         let expected = format!("{full} = {} in this snapshot, and {} in the configuration", values[0], values[1]);
         assert!(error.contains(&expected), "{error}");
     }
     // How it is spread is no part of that, nor how long it is to last.
-    for other in [("ranks", "3"), ("steps", "20"), ("islands", "dfs"), ("record_every", "2")] {
+    for other in [("ranks", "3"), ("steps", "20"), ("islands", "dfs"), ("checkpoint_every", "2")] {
         assert_eq!(go_on(&plan(&[other]), &folder, hashes).unwrap().0, 8, "{other:?}");
     }
 }
@@ -172,6 +173,26 @@ fn another_version_is_refused_and_no_damage() {
 }
 
 #[test]
+fn an_index_that_was_forged_with_its_checksum_is_no_use() {
+    let plan = plan(&[]);
+    let (folder, hashes) = two(&plan);
+    for rank in [0, 1] {
+        let path = file(&folder, 8, rank);
+        let bytes = fs::read(&path).unwrap();
+        file::tests::rewrite_facts(&path, &bytes, |facts| facts.replace("[2,2]", "[4294967295,4294967295]"));
+    }
+    let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
+    assert!(step == 4 && passed_over[0].ends_with("not those of its grid"), "{passed_over:?}");
+    // Wherever it lies, it is a snapshot; but not that of another step.
+    let elsewhere = folder.path().join("copy");
+    fs::rename(folder.path().join(store::folder_name(4)), &elsewhere).unwrap();
+    Snapshot::open(&elsewhere).unwrap().unwrap().check().unwrap();
+    fs::rename(elsewhere, folder.path().join(store::folder_name(6))).unwrap();
+    let error = find(folder.path(), &identity(&plan)).unwrap_err().to_string();
+    assert!(error.contains("no older snapshot is whole"), "{error}");
+}
+
+#[test]
 fn snapshots_are_removed_by_step() {
     let plan = plan(&[]);
     let folder = tempdir().unwrap();
@@ -180,7 +201,7 @@ fn snapshots_are_removed_by_step() {
     }
     fs::create_dir(folder.path().join("mine")).unwrap();
     let steps = || {
-        let found = find(folder.path(), &canonical(&plan)).unwrap();
+        let found = find(folder.path(), &identity(&plan)).unwrap();
         found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>()
     };
     remove_before(folder.path(), 4).unwrap();

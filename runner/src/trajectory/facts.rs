@@ -94,9 +94,8 @@ impl RunFacts {
     /// In what this differs from the facts of another file, if both cannot be of one run. A run that was taken up again may
     /// have been given more steps, and a newer program.
     pub(super) fn other_run(&self, other: &Self) -> Option<String> {
-        let lines = |facts: &Self| format!("output.record_every = {}\n{}", facts.record_every, facts.canonical);
-        let all = config::differences(&lines(self), &lines(other));
-        let one = all.into_iter().find(|one| one.key != "run.steps")?;
+        let identity = |facts: &Self| config::identity(Some(facts.record_every), &facts.canonical);
+        let one = config::other_run(&identity(self), &identity(other))?;
         Some(format!("{} is {} in the one and {} in the other", one.key, one.ours, one.theirs))
     }
 }

@@ -99,6 +99,22 @@ pub enum LaunchError {
     },
 }
 
+/// Whether so many ranks can be launched on this machine, as far as that can be told beforehand.
+///
+/// # Errors
+/// What keeps them from it.
+pub fn check(size: usize) -> Result<(), LaunchError> {
+    make_room(size).map(drop)
+}
+
+/// A folder for a run, after the dead have made room, on a machine that can hold it.
+fn make_room(size: usize) -> Result<OwnedRunFolder, LaunchError> {
+    let folder = common_folder();
+    let run = OwnedRunFolder::create(&folder).map_err(|source| LaunchError::Folder { folder, source })?;
+    Machine::ours().check(size).map_err(LaunchError::Limits)?;
+    Ok(run)
+}
+
 /// Runs `size` processes, each started by what `command` returns for its rank, and returns how each ended, in rank
 /// order, when all have.
 ///
@@ -123,12 +139,9 @@ pub fn launch(
             "the peer timeout is zero, so every wait would fail; give it some seconds".into(),
         ));
     }
-    let common = common_folder();
-    let cannot = |source| LaunchError::Folder { folder: common.clone(), source };
-    let run = OwnedRunFolder::create(&common).map_err(cannot)?;
-    // After the dead have made room.
-    Machine::ours().check(size).map_err(LaunchError::Limits)?;
+    let run = make_room(size)?;
     let folder = run.folder();
+    let cannot = |source| LaunchError::Folder { folder: common_folder(), source };
     Board::create(&folder.board(), size).map_err(cannot)?;
     // Dropped before the folder is: the processes end first.
     let mut ranks = Ranks { record: Record::new(folder.path(), "launcher"), ranks: Vec::new() };

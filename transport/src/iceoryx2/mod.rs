@@ -74,7 +74,7 @@ use std::sync::atomic::Ordering::SeqCst;
 
 pub use self::endpoint::Iceoryx2;
 pub use self::environment::{is_rank_process, process_rank};
-pub use self::launch::{Control, LaunchError, LaunchOptions, RankExit, launch};
+pub use self::launch::{Control, LaunchError, LaunchOptions, RankExit, check, launch};
 pub use self::limits::MAX_RANKS;
 pub use self::notices::stop_requested;
 
