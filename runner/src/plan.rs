@@ -185,6 +185,9 @@ impl Plan {
                 "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
             ));
         }
+        if self.output.is_none() && self.config.output != OutputConfig::default() {
+            notes.push("[output] says what to write, and there is no --out: nothing is written".to_owned());
+        }
         notes.extend(self.output.as_ref().filter(|output| !output.begins).map(|output| {
             let folder = output.folder.path().display();
             match self.found.snapshots.first() {

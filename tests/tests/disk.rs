@@ -51,9 +51,11 @@ fn a_full_disk_ends_the_run_cleanly() {
     let folder = tempdir().unwrap();
     // 20,000 bodies: about half a megabyte a record, two and a half a snapshot.
     let run = "run configs/quickstart.toml --quiet --steps 200 --ranks 3";
-    for (name, options) in
-        [("recording", "--record-every 5 --checkpoint-every 20"), ("snapshots", "--checkpoint-every 10")]
-    {
+    for (name, options) in [
+        ("recording", "--record-every 5 --checkpoint-every 20"),
+        ("snapshots", "--checkpoint-every 10"),
+        ("a snapshot each step", "--checkpoint-every 1"),
+    ] {
         let whole = folder.path().join("whole.json");
         let expected = program::run_to_summary(
             Way::Channel.command(3, "configs/quickstart.toml").args(["--quiet", "--steps", "200"]),
@@ -78,6 +80,8 @@ fn a_full_disk_ends_the_run_cleanly() {
         // What has its final name is whole, and nothing else is left.
         let (full, done) = (folder.path().join("kept/full"), folder.path().join("kept/done"));
         assert!(files(&full).iter().all(|name| !name.ends_with(".tmp")), "{name}: {:?}", files(&full));
+        // Two snapshots fit, so one of them is whole, and was gone on from.
+        assert!(ended.stderr.contains("going on with"), "{name}: {ended}");
         if name == "recording" {
             let ended = program::run(program::command().arg("diff").args([&full, &full]));
             assert_eq!(ended.code, Some(0), "{ended}");

@@ -78,7 +78,12 @@ fn killed_runs_go_on_elsewhere() {
             // Where nothing is there yet, this begins; so the very same command may be given again.
             let running = Running::start(command.arg("--resume").arg(&killed));
             sleep(Duration::from_secs_f64(duration * noise(100 * w + time, 1)));
-            processes::kill_all(&running);
+            if time % 2 == 0 {
+                processes::kill_all(&running);
+            } else {
+                // Its ranks, if they are processes, find out by themselves, and the next run waits for that.
+                running.signal("KILL");
+            }
             drop(running);
 
             let (ranks, other) = (1 + number(2, 4), ways[number(3, ways.len())]);
@@ -198,8 +203,9 @@ fn a_killed_rank_is_made_good_by_restarts() {
 fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
     let folder = tempdir().unwrap();
     let whole = whole(folder.path());
+    let longer = folder.path().join("longer");
+    run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "130", "--out"]).arg(&longer));
     // As if it had been killed just before its end.
-    let expected = summary(&whole);
     fs::remove_file(whole.join("summary.json")).unwrap();
     let newest = "snapshots/step-0000000120/rank-00001-of-00002.atoll";
     let length = fs::metadata(whole.join(newest)).unwrap().len() as usize;
@@ -209,10 +215,10 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
         let mut bytes = fs::read(damaged.join(newest)).unwrap();
         bytes[place] ^= 1;
         fs::write(damaged.join(newest), bytes).unwrap();
-        let ended = run(Way::Channel.resume(3, &damaged).arg("--quiet"));
+        let ended = run(Way::Channel.resume(3, &damaged).args(["--quiet", "--steps", "130"]));
         let named = ended.stderr.contains(&format!("{newest}: this snapshot is damaged"));
         assert!(named && ended.stderr.contains("after step 100"), "byte {place}: {ended}");
-        assert_eq!(summary(&damaged)["state_hash"], expected["state_hash"], "byte {place}");
+        assert_eq!(summary(&damaged)["state_hash"], summary(&longer)["state_hash"], "byte {place}");
         assert_eq!(summary(&damaged)["resumed_at"], 100, "byte {place}");
     }
     // Where none is whole, that is an error and nothing is lost.
@@ -226,6 +232,25 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
     assert!(ended.stderr.contains("no older snapshot is whole"), "{ended}");
     assert!(whole.join("rank-00000").exists());
+}
+
+#[test]
+fn a_run_that_was_killed_at_its_very_end_tells_all_there_is_to_tell() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    let expected = summary(&whole);
+    fs::remove_file(whole.join("summary.json")).unwrap();
+    run(Way::Channel.resume(3, &whole).arg("--quiet"));
+    let found = summary(&whole);
+    for key in ["state_hash", "contact_hash", "ghosts", "islands", "colors", "constraint_violation", "contacts"] {
+        assert_eq!(found[key], expected[key], "{key}");
+    }
+    // Without any snapshot a finished run is left as it is.
+    fs::remove_dir_all(whole.join("snapshots")).unwrap();
+    let ended = program::run(Way::Channel.resume(3, &whole).args(["--steps", "200"]));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert!(ended.stderr.contains("no snapshot to go on from"), "{ended}");
+    assert_eq!(summary(&whole)["steps"], 120);
 }
 
 #[test]

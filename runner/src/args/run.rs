@@ -45,7 +45,7 @@ pub struct RunArgs {
     /// Write where the time of each rank went to this file, as CSV.
     #[arg(long, value_name = "FILE")]
     pub timings: Option<PathBuf>,
-    /// Record the trajectory, and write snapshots, to this folder, which must be new or empty.
+    /// Write configuration and summary to this folder, which must be new or empty, and records and snapshots as asked for.
     #[arg(long, value_name = "DIR", group = "folder")]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder from its newest snapshot. With CONFIG, begin it there if there is none yet.

@@ -107,17 +107,19 @@ impl Writer {
 
     /// Whoever goes on from a snapshot finds everything that was recorded before it, and in segments of its own.
     fn save(&mut self, saved: &Saved) -> Result<(), RunError> {
-        if let Some(trajectory) = &mut self.trajectory {
-            trajectory.close_segment()?;
-            trajectory.sync()?;
-        }
+        self.close()?;
         let written = self.snapshot.write(&self.snapshots, saved.step, &saved.tiles, &saved.blocks);
         let path = written.map_err(|(path, error)| RunError::Output { path, reason: error.to_string() })?;
         debug!(step = saved.step, bytes = saved.blocks.len(), "saved to {}", path.display());
         Ok(())
     }
 
+    /// Completes what was recorded so far.
     fn close(&mut self) -> Result<(), RunError> {
-        self.trajectory.as_mut().map_or(Ok(()), |trajectory| Ok(trajectory.close_segment()?))
+        if let Some(trajectory) = &mut self.trajectory {
+            trajectory.close_segment()?;
+            trajectory.sync()?;
+        }
+        Ok(())
     }
 }
