@@ -99,7 +99,7 @@ mod world;
 pub use body::{Bodies, Body, StaticBody};
 pub use codec::{FORMAT, Frames};
 pub use contact::{Contact, ContactPoint};
-pub use error::{CodecError, RestoreError, SetupError, StepError};
+pub use error::{CodecError, SetupError, StepError};
 pub use facts::{Facts, TileFacts};
 pub use halo::{
     BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Halo, Inbox, Message, Outbox, Unseen, Verdict,
@@ -112,6 +112,6 @@ pub use partition::{Region, TileGrid};
 pub use phase::{Phase, Timings};
 pub use setup::Blueprint;
 pub use shape::{Kind, Material, Shape};
-pub use snapshot::{SNAPSHOT_FORMAT, SavedTile};
+pub use snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use step::{StepReport, finish, step};
 pub use world::World;

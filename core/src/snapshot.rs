@@ -18,7 +18,6 @@
 
 use crate::body::{Bodies, Body};
 use crate::contact::{Contact, ContactCache, PairKey, SlotKind};
-use crate::error::RestoreError;
 use crate::halo::Unseen;
 use crate::hash::Hashes;
 use crate::id::{GlobalId, TileId};
@@ -30,8 +29,11 @@ use bytemuck::{Pod, Zeroable, cast_slice};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
+mod error;
 #[cfg(test)]
 mod tests;
+
+pub use error::RestoreError;
 
 /// The version of a saved tile; grows with every change of what is saved.
 pub const SNAPSHOT_FORMAT: u32 = 1;

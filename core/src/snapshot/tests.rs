@@ -3,13 +3,13 @@
 
 use super::{HEADER, SNAPSHOT_FORMAT, SavedTile, UNCHECKED, checksum};
 use crate::body::{Body, StaticBody};
-use crate::error::RestoreError;
 use crate::hash::Hashes;
 use crate::id::{GlobalId, KindId, TileId};
 use crate::math::Rot;
 use crate::params::Params;
 use crate::partition::TileGrid;
 use crate::setup::Blueprint;
+use crate::snapshot::RestoreError;
 use crate::step::step;
 use crate::testing::{Loopback, circle, rectangle};
 use crate::tile::Tile;

@@ -79,6 +79,8 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
         trajectory => trajectory?,
     };
     let (steps, files) = (trajectory.steps(), trajectory.files());
+    let mut rows = Vec::new();
+    steps.iter().try_for_each(|&step| trajectory.read(step, &mut rows))?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
     Ok(format!("{count} records, steps 0 to {last}, every {every}; {size} in {} files", files.len()))
