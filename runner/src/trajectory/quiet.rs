@@ -34,7 +34,7 @@ mod tests {
 
     #[test]
     fn silence_ends_with_the_work() {
-        assert_eq!(catch(|| QUIET.get()).unwrap(), true);
+        assert!(catch(|| QUIET.get()).unwrap());
         assert!(catch(|| panic!("nobody hears this")).is_err());
         assert!(!QUIET.get());
     }
