@@ -102,7 +102,14 @@ pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()
 /// # Errors
 /// If the system says that it is not.
 pub fn sync_folder_of(path: &Path) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    sync_folder(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+}
+
+/// Makes the names in a folder durable, where folders can be made durable.
+///
+/// # Errors
+/// If the system says that they are not.
+pub fn sync_folder(folder: &Path) -> io::Result<()> {
     match File::open(folder).map(|folder| folder.sync_all()) {
         Ok(Err(error)) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
         _ => Ok(()),

@@ -1,5 +1,7 @@
 //! In what two configurations differ.
 
+use std::collections::BTreeMap;
+
 /// A key that two configurations give different values.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Difference {
@@ -14,13 +16,21 @@ pub struct Difference {
 /// All keys in which two texts as of [`Config::canonical`](super::Config::canonical) differ: those of the first in its
 /// order, then those that are in the second alone. The texts may come from anywhere.
 pub fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
+    if ours == theirs {
+        return Vec::new();
+    }
     let (ours, theirs) = (pairs(ours), pairs(theirs));
-    let value_in =
-        |pairs: &[(&str, &str)], key: &str| pairs.iter().find(|pair| pair.0 == key).map(|pair| pair.1.to_owned());
-    let only_theirs = theirs.iter().filter(|(key, _)| value_in(&ours, key).is_none());
+    // Of keys that are there more than once, the first counts.
+    let look_up = |pairs: &[_]| pairs.iter().rev().copied().collect::<BTreeMap<&str, &str>>();
+    let (our_values, their_values) = (look_up(&ours), look_up(&theirs));
+    let only_theirs = theirs.iter().filter(|(key, _)| !our_values.contains_key(key));
     let keys = ours.iter().chain(only_theirs).map(|(key, _)| *key);
-    let value = |pairs, key| value_in(pairs, key).unwrap_or_else(|| "nothing".to_owned());
-    let all = keys.map(|key| Difference { key: key.to_owned(), ours: value(&ours, key), theirs: value(&theirs, key) });
+    let value = |values: &BTreeMap<_, &str>, key| (*values.get(key).unwrap_or(&"nothing")).to_owned();
+    let all = keys.map(|key| Difference {
+        key: key.to_owned(),
+        ours: value(&our_values, key),
+        theirs: value(&their_values, key),
+    });
     all.filter(|one| one.ours != one.theirs).collect()
 }
 
@@ -61,5 +71,9 @@ mod tests {
         );
         assert_eq!(found(&usual, &format!("{usual}physics.new = 1\n")), ["physics.new: nothing, 1"]);
         assert_eq!(found("a = 1\nnonsense\n", "a = 1\n"), ["nonsense: , nothing"]);
+        assert_eq!(
+            found("b = 1\na = 1\nb = 2\n", "d = 1\nc = 1\nb = 3\nb = 1\n"),
+            ["b: 1, 3", "a: 1, nothing", "b: 1, 3", "d: nothing, 1", "c: nothing, 1"]
+        );
     }
 }

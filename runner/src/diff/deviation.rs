@@ -63,12 +63,13 @@ impl StepDeviation {
         self.differing == 0 && self.has_same_bodies()
     }
 
-    /// Whether no quantity deviates more than so much.
-    pub fn is_within(&self, most: f64) -> bool {
-        self.has_same_bodies() && self.greatest() <= most
+    /// Whether no quantity deviates more than so much; without a tolerance, whether the records are the same bit for bit.
+    pub fn is_same(&self, tolerance: Option<f64>) -> bool {
+        tolerance.map_or(self.is_none(), |most| self.has_same_bodies() && self.greatest() <= most)
     }
 
-    fn has_same_bodies(&self) -> bool {
+    /// Whether each record has each body once.
+    pub(super) fn has_same_bodies(&self) -> bool {
         [self.missing_in_a, self.missing_in_b, self.doubled_in_a, self.doubled_in_b].iter().all(|some| some.count == 0)
     }
 }
@@ -80,80 +81,90 @@ impl Bodies {
     }
 }
 
-impl Deviation {
-    /// Until [`finish`](Self::finish), `rms` is the sum of squares.
+/// What becomes a [`Deviation`] when all bodies are added.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    max: f64,
+    squares: f64,
+    id: Option<u64>,
+}
+
+impl Sum {
     fn add(&mut self, id: u64, value: f64) {
-        let value = if value.is_nan() { f64::INFINITY } else { value };
-        self.rms += value * value;
+        self.squares += value * value;
         if value > self.max {
             (self.max, self.id) = (value, Some(id));
         }
     }
 
-    fn finish(&mut self, bodies: u64) {
-        self.rms = (self.rms / bodies.max(1) as f64).sqrt();
+    fn finish(self, bodies: u64) -> Deviation {
+        Deviation { max: self.max, rms: (self.squares / bodies.max(1) as f64).sqrt(), id: self.id }
     }
 }
 
 /// Compares two records whose rows are in the order of their bodies. Also gives the rows that each has of the lowest body
-/// that is not the same in both.
-pub(super) fn measure<'a>(step: u64, a: &'a [Row], b: &'a [Row]) -> (StepDeviation, Option<[&'a [Row]; 2]>) {
-    let (none, nobody) = (Deviation::default(), Bodies::default());
-    let mut sum = StepDeviation {
-        step,
-        bodies: 0,
-        differing: 0,
-        position: none,
-        angle: none,
-        velocity: none,
-        angular_velocity: none,
-        missing_in_a: nobody,
-        missing_in_b: nobody,
-        doubled_in_a: nobody,
-        doubled_in_b: nobody,
-    };
+/// that is not the same in both: within the tolerance, if there is one, else bit for bit.
+pub(super) fn measure<'a>(
+    step: u64,
+    mut a: &'a [Row],
+    mut b: &'a [Row],
+    tolerance: Option<f64>,
+) -> (StepDeviation, Option<[&'a [Row]; 2]>) {
+    let (mut bodies, mut differing, mut sums) = (0, 0, [Sum::default(); 4]);
+    let (mut missing, mut doubled) = ([Bodies::default(); 2], [Bodies::default(); 2]);
     let mut first = None;
-    let (mut a, mut b) = (a, b);
     while let Some(id) = a.first().into_iter().chain(b.first()).map(|row| row.id).min() {
-        let (of_a, of_b) = (take(&mut a, id), take(&mut b, id));
-        if let ([in_a], [in_b]) = (of_a, of_b) {
-            sum.bodies += 1;
+        let both = [take(&mut a, id), take(&mut b, id)];
+        if let [[in_a], [in_b]] = both {
+            bodies += 1;
             if bytemuck::bytes_of(in_a) == bytemuck::bytes_of(in_b) {
                 continue;
             }
-            sum.add(in_a, in_b);
-        } else {
-            for (rows, missing, doubled) in [
-                (of_a, &mut sum.missing_in_a, &mut sum.doubled_in_a),
-                (of_b, &mut sum.missing_in_b, &mut sum.doubled_in_b),
-            ] {
-                match rows.len() {
-                    0 => missing.add(id),
-                    1 => {}
-                    _ => doubled.add(id),
-                }
+            differing += 1;
+            let apart = apart(in_a, in_b);
+            sums.iter_mut().zip(apart).for_each(|(sum, value)| sum.add(id, value));
+            if tolerance.is_some_and(|most| apart.iter().all(|value| *value <= most)) {
+                continue;
             }
         }
-        first.get_or_insert([of_a, of_b]);
+        for (side, rows) in both.iter().enumerate() {
+            match rows.len() {
+                0 => missing[side].add(id),
+                1 => {}
+                _ => doubled[side].add(id),
+            }
+        }
+        first.get_or_insert(both);
     }
-    for quantity in [&mut sum.position, &mut sum.angle, &mut sum.velocity, &mut sum.angular_velocity] {
-        quantity.finish(sum.bodies);
-    }
-    (sum, first)
+    let [position, angle, velocity, angular_velocity] = sums.map(|sum| sum.finish(bodies));
+    let ([missing_in_a, missing_in_b], [doubled_in_a, doubled_in_b]) = (missing, doubled);
+    let deviation = StepDeviation {
+        step,
+        bodies,
+        differing,
+        position,
+        angle,
+        velocity,
+        angular_velocity,
+        missing_in_a,
+        missing_in_b,
+        doubled_in_a,
+        doubled_in_b,
+    };
+    (deviation, first)
 }
 
-impl StepDeviation {
-    /// Adds a body that differs.
-    fn add(&mut self, a: &Row, b: &Row) {
-        let id = a.id;
-        let apart = |a: f32, b: f32| f64::from(a) - f64::from(b);
-        self.differing += 1;
-        self.position.add(id, libm::hypot(a.x - b.x, a.y - b.y));
-        let turn = apart(a.angle, b.angle).abs() % TAU;
-        self.angle.add(id, if turn > PI { TAU - turn } else { turn });
-        self.velocity.add(id, libm::hypot(apart(a.vx, b.vx), apart(a.vy, b.vy)));
-        self.angular_velocity.add(id, apart(a.omega, b.omega).abs());
-    }
+/// How far a body is apart in position, angle, velocity and angular velocity.
+fn apart(a: &Row, b: &Row) -> [f64; 4] {
+    let less = |a: f32, b: f32| f64::from(a) - f64::from(b);
+    let turn = less(a.angle, b.angle).abs() % TAU;
+    let values = [
+        libm::hypot(a.x - b.x, a.y - b.y),
+        if turn > PI { TAU - turn } else { turn },
+        libm::hypot(less(a.vx, b.vx), less(a.vy, b.vy)),
+        less(a.omega, b.omega).abs(),
+    ];
+    values.map(|value| if value.is_nan() { f64::INFINITY } else { value })
 }
 
 /// Takes the rows of a body from the front.

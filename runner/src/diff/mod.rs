@@ -22,9 +22,9 @@ use std::path::{Path, PathBuf};
 /// How two recordings compare. The fields are the keys of the JSON file, in its order.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Comparison {
-    /// Whether they are the same: within the tolerance, if there is one, else bit for bit.
+    /// Whether they are the same: within the tolerance, if there is one, else bit for bit. Never where steps were left out.
     pub same: bool,
-    /// Whether they are the same bit for bit.
+    /// Whether they are the same bit for bit. Never where steps were left out.
     pub identical: bool,
     /// Deviations up to this count as none.
     pub tolerance: Option<f64>,
@@ -34,7 +34,7 @@ pub struct Comparison {
     pub b: Side,
     /// Keys of the configurations with different values, of those that a result depends on.
     pub configuration: Vec<Key>,
-    /// Where they first differ.
+    /// Where they are first not the same: within the tolerance, if there is one, else bit for bit.
     pub first_difference: Option<Difference>,
     /// Steps that only the first recorded.
     pub only_in_a: Vec<u64>,
@@ -68,7 +68,7 @@ pub struct Key {
     pub b: String,
 }
 
-/// The lowest body that differs at the first step at which any does.
+/// The lowest body that is not the same at the first step at which any is not.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Difference {
     /// The step.
@@ -77,18 +77,19 @@ pub struct Difference {
     pub id: u64,
     /// How often each recording has it. Once is right.
     pub times: [usize; 2],
-    /// The columns in which `a` and `b` differ.
+    /// The columns in which `a` and `b` differ, if both have the body once.
     pub columns: Vec<&'static str>,
-    /// The body in the first recording, if it is there.
+    /// The body in the first recording, if it is there; any of them, if it is there more than once.
     pub a: Option<State>,
-    /// The body in the second recording, if it is there.
+    /// The body in the second recording, if it is there; any of them, if it is there more than once.
     pub b: Option<State>,
 }
 
 /// A body as it was recorded.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct State {
-    /// The tile that owned it.
+    /// The tile in which its position lies. In that step another may have owned it still: bodies change their owner when the
+    /// next one begins. None for a position that is not finite.
     pub tile: Option<u32>,
     /// In m.
     pub x: f64,
@@ -126,16 +127,16 @@ pub fn compare(
     for step in common() {
         let (read_a, read_b) = rayon::join(|| read_sorted(&a, step, &mut of_a), || read_sorted(&b, step, &mut of_b));
         read_a.and(read_b)?;
-        let (deviation, first) = deviation::measure(step, &of_a, &of_b);
+        let (deviation, first) = deviation::measure(step, &of_a, &of_b, tolerance);
         steps.push(deviation);
         if first_difference.is_none() {
             first_difference = first.map(|rows| Difference::new(step, rows, [&a, &b]));
         }
         compared(steps.len(), count);
     }
-    let alike = only_in_a.is_empty() && only_in_b.is_empty();
+    let alike = only_in_a.is_empty() && only_in_b.is_empty() && a.incomplete() == 0 && b.incomplete() == 0;
     let identical = alike && steps.iter().all(StepDeviation::is_none);
-    let same = tolerance.map_or(identical, |most| alike && steps.iter().all(|step| step.is_within(most)));
+    let same = alike && steps.iter().all(|step| step.is_same(tolerance));
     let keys = config::differences(&a.facts().canonical, &b.facts().canonical).into_iter();
     let configuration = keys.map(|one| Key { key: one.key, a: one.ours, b: one.theirs }).collect();
     let (a, b) = (Side::new(&a), Side::new(&b));
@@ -150,7 +151,7 @@ fn read_sorted(trajectory: &Trajectory, step: u64, rows: &mut Vec<Row>) -> Resul
 }
 
 impl Comparison {
-    /// As JSON, where what is infinite is null.
+    /// As JSON, where what is infinite or no number is null.
     pub fn to_json(&self) -> Vec<u8> {
         let mut text = serde_json::to_vec_pretty(self).expect("figures and words, under names");
         text.push(b'\n');
@@ -173,8 +174,10 @@ impl Difference {
     fn new(step: u64, rows: [&[Row]; 2], sides: [&Trajectory; 2]) -> Self {
         let [a, b] = [0, 1].map(|i| rows[i].first().map(|row| State::new(row, sides[i])));
         let id = rows.iter().find_map(|rows| rows.first()).map_or(0, |row| row.id);
-        let columns = a.zip(b).map_or_else(Vec::new, |(a, b)| a.columns_that_differ(&b));
-        Self { step, id, times: rows.map(<[Row]>::len), columns, a, b }
+        let times = rows.map(<[Row]>::len);
+        let once = a.zip(b).filter(|_| times == [1, 1]);
+        let columns = once.map_or_else(Vec::new, |(a, b)| a.columns_that_differ(&b));
+        Self { step, id, times, columns, a, b }
     }
 }
 
@@ -184,7 +187,8 @@ impl State {
         let [low, high] = facts.domain;
         // A domain that makes no grid comes from no run.
         let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).ok();
-        let tile = grid.map(|grid| grid.locate(DVec2::new(row.x, row.y)).0);
+        let position = DVec2::new(row.x, row.y);
+        let tile = grid.filter(|_| position.is_finite()).map(|grid| grid.locate(position).0);
         let &Row { id: _, x, y, angle, vx, vy, omega } = row;
         Self { tile, x, y, angle, vx, vy, omega }
     }

@@ -9,10 +9,11 @@ const SIZE: (u32, u32) = (900, 540);
 /// What is drawn of a step.
 type Quantity = fn(&StepDeviation) -> f64;
 
-const LINES: [(&str, RGBColor, Quantity); 3] = [
+const LINES: [(&str, RGBColor, Quantity); 4] = [
     ("position, m", RGBColor(31, 119, 180), |step| step.position.max),
     ("velocity, m/s", RGBColor(255, 127, 14), |step| step.velocity.max),
     ("angle, rad", RGBColor(44, 160, 44), |step| step.angle.max),
+    ("angular velocity, rad/s", RGBColor(148, 103, 189), |step| step.angular_velocity.max),
 ];
 
 /// The greatest deviations over the steps, on a logarithmic scale whose lower edge stands for zero, as SVG.
@@ -35,7 +36,8 @@ fn draw(
     area.fill(&WHITE)?;
     let title = match comparison.identical {
         true => "identical",
-        false => "greatest deviation of any body",
+        false if steps.iter().all(StepDeviation::has_same_bodies) => "greatest deviation of any body",
+        false => "greatest deviation of any body; some are missing or doubled",
     };
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 20))
@@ -61,13 +63,31 @@ fn draw(
     Ok(())
 }
 
+/// What is less, or more, is drawn as if it were that: the scale would have no end otherwise.
+const DRAWN: (f64, f64) = (1e-30, 1e30);
+
 /// Powers of ten that hold all values between them, and one more below, for zero.
 fn decades(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let real = values.filter(|value| *value > 0.0 && value.is_finite());
+    let real = values.filter(|value| *value > 0.0 && value.is_finite()).map(|value| value.clamp(DRAWN.0, DRAWN.1));
     let least = real.clone().fold(f64::INFINITY, f64::min);
     let most = real.fold(0.0, f64::max);
     if most == 0.0 {
         return (1e-16, 1.0);
     }
     (10_f64.powf(least.log10().floor() - 1.0), 10_f64.powf(most.log10().floor() + 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_has_an_end() {
+        let near = |(low, high): (f64, f64), expected: [f64; 2]| {
+            [low, high].iter().zip(expected).all(|(value, expected)| (value / expected - 1.0).abs() < 1e-9)
+        };
+        assert!(near(decades([0.0, 0.02, 3.0].into_iter()), [1e-3, 10.0]));
+        let (low, high) = decades([f64::from_bits(1), f64::MAX, f64::INFINITY].into_iter());
+        assert!(low >= 1e-32 && high <= 1e32 && low <= DRAWN.0 && high >= DRAWN.1, "{low} to {high}");
+    }
 }

@@ -1,6 +1,8 @@
 //! A comparison as people read it.
 
 use super::{Bodies, Comparison, Difference, Side, State, StepDeviation};
+use crate::config::OneLine;
+use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 
 /// Rows of the table, at most.
@@ -10,12 +12,18 @@ impl Display for Comparison {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let (a, b) = (self.a.folder.display(), self.b.folder.display());
         for key in &self.configuration {
-            writeln!(f, "the configurations differ: {} is {} in {a} and {} in {b}", key.key, key.a, key.b)?;
+            // They come from files that anybody may have written.
+            let [key, in_a, in_b] = [&key.key, &key.a, &key.b].map(|text| OneLine(text));
+            writeln!(f, "the configurations differ: {key} is {in_a} in {a} and {in_b} in {b}")?;
         }
         for side in [&self.a, &self.b] {
             if side.incomplete > 0 {
-                let (folder, steps) = (side.folder.display(), plural(side.incomplete, "step"));
-                writeln!(f, "{folder}: {steps} at the end were not written by all ranks and are left out")?;
+                let folder = side.folder.display();
+                let steps = match side.incomplete {
+                    1 => "last step is".to_owned(),
+                    count => format!("last {count} steps are"),
+                };
+                writeln!(f, "{folder}: the {steps} held by some ranks only, and left out")?;
             }
         }
         self.write_verdict(f)?;
@@ -35,9 +43,15 @@ impl Display for Comparison {
 
 impl Comparison {
     fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        // What keeps them from being the same is then that steps were left out.
+        let as_far = self.only_in_a.is_empty()
+            && self.only_in_b.is_empty()
+            && self.steps.iter().all(|step| step.is_same(self.tolerance));
         let verdict = match (self.identical, self.same, self.tolerance) {
             (true, ..) => "identical".to_owned(),
             (_, true, Some(most)) => format!("the same within {most}"),
+            (_, false, Some(most)) if as_far => format!("the same within {most} as far as all ranks recorded"),
+            (_, false, None) if as_far => "the same as far as all ranks recorded".to_owned(),
             (_, _, Some(most)) if self.steps.iter().any(|step| step.greatest() > most) => {
                 format!("differ by more than {most}")
             }
@@ -85,18 +99,24 @@ impl Comparison {
     fn write_first(&self, f: &mut Formatter<'_>, first: &Difference) -> fmt::Result {
         let columns =
             if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
-        writeln!(f, "first difference: step {}, body {}{columns}", first.step, first.id)?;
+        let beyond = match self.tolerance {
+            Some(most) if first.times == [1, 1] => format!(" beyond {most}"),
+            _ => String::new(),
+        };
+        writeln!(f, "first difference{beyond}: step {}, body {}{columns}", first.step, first.id)?;
         let width =
             [&self.a, &self.b].map(|side| side.folder.display().to_string().len()).into_iter().max().unwrap_or(0);
-        let mut line = |side: &Side, state: &Option<State>| {
-            let folder = side.folder.display().to_string();
-            match state {
-                Some(state) => writeln!(f, "  {folder:<width$}  {state}"),
-                None => writeln!(f, "  {folder:<width$}  lacks it"),
+        let mut line = |side: &Side, times: usize, state: &Option<State>| {
+            write!(f, "  {:<width$}  ", side.folder.display().to_string())?;
+            match (times, state) {
+                (1, Some(state)) => writeln!(f, "{state}"),
+                (0 | 1, _) => writeln!(f, "lacks it"),
+                (2, _) => writeln!(f, "has it twice"),
+                _ => writeln!(f, "has it {times} times"),
             }
         };
-        line(&self.a, &first.a)?;
-        line(&self.b, &first.b)
+        line(&self.a, first.times[0], &first.a)?;
+        line(&self.b, first.times[1], &first.b)
     }
 
     /// How the greatest deviations grow.
@@ -110,7 +130,7 @@ impl Comparison {
             writeln!(f)
         };
         row(f, heads.map(str::to_owned))?;
-        for step in evenly(&self.steps) {
+        for step in self.rows() {
             let figure = |value: f64| if value == 0.0 { "0".to_owned() } else { format!("{value:.3e}") };
             let StepDeviation { position, angle, velocity, angular_velocity, .. } = step;
             let figures = [position.max, position.rms, angle.max, velocity.max, angular_velocity.max].map(figure);
@@ -119,23 +139,37 @@ impl Comparison {
         }
         Ok(())
     }
+
+    /// The rows of the table: steps as far apart as can be, the last among them, with that of the first difference and that
+    /// of the greatest deviation in position.
+    fn rows(&self) -> impl Iterator<Item = &StepDeviation> {
+        let first = self.first_difference.as_ref();
+        let first = first.and_then(|first| self.steps.iter().position(|step| step.step == first.step));
+        let mut far = None;
+        for (i, step) in self.steps.iter().enumerate() {
+            if step.position.max > far.map_or(0.0, |far: usize| self.steps[far].position.max) {
+                far = Some(i);
+            }
+        }
+        let all = self.steps.len();
+        let rows = |count: usize| {
+            let evenly = (1..=count).map(|i| i * all / count - 1);
+            evenly.chain(first).chain(far).collect::<BTreeSet<_>>()
+        };
+        let few = (1..=all.min(ROWS)).rev().map(rows).find(|rows| rows.len() <= ROWS);
+        few.unwrap_or_default().into_iter().map(|i| &self.steps[i])
+    }
 }
 
 impl Display for State {
     /// In full: every number is read back as the same bits.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         if let Some(tile) = self.tile {
-            write!(f, "tile {tile}: ")?;
+            write!(f, "in tile {tile}: ")?;
         }
         let Self { tile: _, x, y, angle, vx, vy, omega } = self;
         write!(f, "x {x}, y {y}, angle {angle}, vx {vx}, vy {vy}, omega {omega}")
     }
-}
-
-/// Some of many, as far apart as can be, the last among them.
-fn evenly<T>(all: &[T]) -> impl Iterator<Item = &T> {
-    let count = all.len().min(ROWS);
-    (1..=count).map(move |i| &all[i * all.len() / count - 1])
 }
 
 fn plural(count: usize, word: &str) -> String {

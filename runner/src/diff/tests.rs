@@ -81,7 +81,7 @@ fn the_last_bit_of_one_body_at_one_step_is_found() {
     let verdict = "differ: 13 records of 20 bodies, steps 0 to 60, 1 of them not alike in every bit\n\
                    first difference: step 35, body 111, in vx\n";
     assert!(text.starts_with(verdict), "{text}");
-    let full = format!("  A  tile {}: x {}, y {}, angle", state.tile.unwrap(), was.position.x, was.position.y);
+    let full = format!("  A  in tile {}: x {}, y {}, angle", state.tile.unwrap(), was.position.x, was.position.y);
     assert!(text.contains(&full) && text.contains(&format!("vx {}", was.velocity.x.next_up())), "{text}");
     assert!(text.lines().last().unwrap().trim_start().starts_with("60          0"), "{text}");
 }
@@ -132,6 +132,7 @@ fn a_tolerance_is_for_all_four_quantities() {
         let b = run(10, |_, bodies| change(with_id(bodies, 108)));
         let within = compared(&a, &b, Some(0.26));
         assert!(within.same && !within.identical);
+        assert_eq!(within.first_difference, None);
         assert!(told(&a, &b, &within).starts_with("the same within 0.26: 3 records of 20 bodies, steps 0 to 10, none"));
         let beyond = compared(&a, &b, Some(0.24));
         assert!(!beyond.same);
@@ -139,7 +140,29 @@ fn a_tolerance_is_for_all_four_quantities() {
     }
     // What is no number is far from everything.
     let b = run(10, |_, bodies| with_id(bodies, 108).position.x = f64::NAN);
-    assert!(!compared(&a, &b, Some(1e300)).same);
+    let nowhere = compared(&a, &b, Some(1e300));
+    assert!(!nowhere.same);
+    let first = nowhere.first_difference.unwrap();
+    assert!(first.id == 108 && first.a.unwrap().tile.is_some() && first.b.unwrap().tile.is_none());
+}
+
+#[test]
+fn the_first_difference_is_what_made_them_differ() {
+    let a = run(10, unchanged);
+    let b = run(10, |step, bodies| {
+        with_id(bodies, 102).position.x += 1e-9;
+        if step > 0 {
+            with_id(bodies, 115).velocity.y += 0.5;
+        }
+    });
+    let bits = compared(&a, &b, None).first_difference.unwrap();
+    assert_eq!((bits.step, bits.id, bits.columns), (0, 102, vec!["x"]));
+    let beyond = compared(&a, &b, Some(0.1));
+    let first = beyond.first_difference.as_ref().unwrap();
+    assert_eq!((first.step, first.id, first.columns.as_slice()), (5, 115, &["vy"][..]));
+    let text = told(&a, &b, &beyond);
+    assert!(text.contains("\nfirst difference beyond 0.1: step 5, body 115, in vy\n"), "{text}");
+    assert_eq!((beyond.steps[0].differing, beyond.steps[1].differing), (1, 2));
 }
 
 #[test]
@@ -165,6 +188,12 @@ fn bodies_that_are_missing_or_doubled_are_counted_and_named() {
     assert!(text.contains("\nB lacks 2 bodies at step 5, the lowest is 107, and some at 1 later step\n"), "{text}");
     assert!(text.contains("\nA has more than once 1 body at step 10, the lowest is 110\n"), "{text}");
     assert!(text.contains("\n  B  lacks it\n"), "{text}");
+    let doubled = compared(&a, &run(10, unchanged), Some(1.0));
+    let first = doubled.first_difference.as_ref().unwrap();
+    assert_eq!((first.step, first.id, first.times, first.columns.len()), (10, 110, [3, 1], 0));
+    let text = doubled.to_string();
+    assert!(text.contains("\nfirst difference: step 10, body 110\n") && text.contains("  has it 3 times\n"), "{text}");
+    assert!(svg(&doubled).contains("some are missing or doubled"));
     let other = compared(&b, &a, None);
     assert_eq!(other.steps[2].missing_in_a, Bodies { count: 2, first: Some(107) });
     // A recording that has a body twice is not even like itself.
@@ -198,6 +227,10 @@ fn configurations_are_compared_before_all_else() {
                     the configurations differ: run.steps is 100 in A and 10 in B\n\
                     identical: 3 records of 20 bodies, steps 0 to 10\n";
     assert_eq!(told(&a, &b, &comparison), expected);
+    let strange = facts(5).canonical + "physics.\x1b[31mnew = \x1b[2J1\n";
+    let b = run_of(1, &RunFacts { canonical: strange, ..facts(5) }, (0..=10).step_by(5), unchanged);
+    let text = told(&a, &b, &compared(&a, &b, None));
+    assert!(text.starts_with("the configurations differ: physics. [31mnew is nothing in A and [2J1 in B\n"), "{text}");
 }
 
 #[test]
@@ -207,10 +240,20 @@ fn what_a_killed_run_lost_is_said() {
     let comparison = compared(&a, &b, None);
     assert_eq!((comparison.only_in_a.len(), comparison.b.incomplete, comparison.b.records), (3, 3, 10));
     let text = told(&a, &b, &comparison);
-    assert!(
-        text.starts_with("B: 3 steps at the end were not written by all ranks and are left out\ndiffer:"),
-        "{text}"
-    );
+    assert!(text.starts_with("B: the last 3 steps are held by some ranks only, and left out\ndiffer:"), "{text}");
+    // What was left out could be anything.
+    fs::remove_file(a.path().join("rank-00000/steps-0000000050-0000000060.parquet")).unwrap();
+    for tolerance in [None, Some(0.5)] {
+        let comparison = compared(&a, &b, tolerance);
+        assert!(!comparison.same && !comparison.identical && comparison.first_difference.is_none());
+        let within = if tolerance.is_some() { "within 0.5 " } else { "" };
+        let expected = format!(
+            "A: the last 3 steps are held by some ranks only, and left out\n\
+             B: the last 3 steps are held by some ranks only, and left out\n\
+             the same {within}as far as all ranks recorded: 10 records of 20 bodies, steps 0 to 45\n"
+        );
+        assert_eq!(told(&a, &b, &comparison), expected);
+    }
     fs::remove_dir_all(b.path().join("rank-00000")).unwrap();
     let error = compare(a.path(), b.path(), None, |_, _| {}).unwrap_err().to_string();
     assert!(error.ends_with("give the folder of a run that recorded"), "{error}");
@@ -218,12 +261,25 @@ fn what_a_killed_run_lost_is_said() {
 
 #[test]
 fn a_table_has_twelve_rows_and_ends_with_the_last_step() {
-    let (a, b) = (run(300, unchanged), run(300, |_, bodies| bodies[0].position.y += 0.5));
-    let text = compared(&a, &b, None).to_string();
-    let (_, table) = text.split_once("\n\n").unwrap();
-    let steps: Vec<&str> = table.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
-    assert_eq!(steps.len(), 13);
-    assert_eq!((steps[0], steps[1], steps[12]), ("step", "20", "300"));
+    let a = run(300, unchanged);
+    let steps = |change: fn(u64, &mut Vec<Body>)| {
+        let text = compared(&a, &run(300, change), None).to_string();
+        let (_, table) = text.split_once("\n\n").unwrap();
+        let steps: Vec<_> = table.lines().map(|line| line.split_whitespace().next().unwrap().to_owned()).collect();
+        assert_eq!(steps[0], "step");
+        steps[1..].iter().map(|step| step.parse::<u64>().unwrap()).collect::<Vec<_>>()
+    };
+    let far = |step, bodies: &mut Vec<Body>| bodies[0].angular_velocity += if step == 20 { 0.5 } else { 0.0 };
+    assert_eq!(steps(far), [20, 45, 70, 95, 120, 145, 170, 195, 220, 245, 270, 300]);
+    // What counts most is never left out.
+    let between = |step, bodies: &mut Vec<Body>| match step {
+        5 => bodies[0].velocity.x += 0.25,
+        110 => bodies[0].position.y += 0.5,
+        115 => bodies[0].position.y += 0.25,
+        _ => {}
+    };
+    let steps = steps(between);
+    assert!(steps.len() <= 12 && [5, 110, 300].iter().all(|step| steps.contains(step)), "{steps:?}");
 }
 
 #[test]
@@ -247,7 +303,8 @@ fn pictures_show_growth_and_its_absence() {
     });
     let picture = svg(&compared(&a, &grown, None));
     assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
-    for text in ["position, m", "velocity, m/s", "angle, rad", "step", "greatest deviation"] {
+    for text in ["position, m", "velocity, m/s", "angle, rad", "angular velocity, rad/s", "step", "greatest deviation"]
+    {
         assert!(picture.contains(text), "{text}");
     }
     assert!(svg(&compared(&a, &a, None)).contains("identical"));
@@ -255,4 +312,17 @@ fn pictures_show_growth_and_its_absence() {
     assert!(svg(&compared(&a, &one, None)).ends_with("</svg>\n"));
     let nowhere = run(0, |_, bodies| bodies[0].position.x = f64::NAN);
     assert!(!svg(&compared(&one, &nowhere, None)).contains("NaN"));
+    let tiny = |step: u64, x: f64| {
+        run(5, move |at, bodies| {
+            bodies[0].position = DVec2::ZERO;
+            bodies[0].position.x = if at == step { x } else { 0.0 };
+        })
+    };
+    let (zero, least, most) = (tiny(0, 0.0), tiny(0, f64::from_bits(1)), tiny(5, f64::MAX));
+    for (a, b) in [(&zero, &least), (&zero, &most), (&least, &most)] {
+        let comparison = compared(a, b, None);
+        assert!(!comparison.identical);
+        let picture = svg(&comparison);
+        assert!(picture.len() < 100_000 && !picture.contains("NaN"), "{}", picture.len());
+    }
 }

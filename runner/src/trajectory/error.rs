@@ -1,5 +1,6 @@
 //! What can go wrong with a recording.
 
+use crate::config::OneLine;
 use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -24,7 +25,7 @@ pub enum TrajectoryError {
         reason: String,
     },
     /// A file under the name of a segment that is none, or no longer.
-    #[error("{} is damaged, or no segment of a recording: {reason}; bring back a good copy of it", .path.display())]
+    #[error("{} is damaged, or no segment of a recording: {}; bring back a good copy of it", .path.display(), OneLine(.reason))]
     BadSegment {
         /// The file.
         path: PathBuf,
@@ -32,7 +33,7 @@ pub enum TrajectoryError {
         reason: String,
     },
     /// The summary of the run cannot be understood.
-    #[error("{} is no summary of a run: {reason}; bring back a good copy of it", .path.display())]
+    #[error("{} is no summary of a run: {}; bring back a good copy of it", .path.display(), OneLine(.reason))]
     BadSummary {
         /// The file.
         path: PathBuf,
@@ -71,7 +72,7 @@ pub enum TrajectoryError {
         step: u64,
     },
     /// Two files are of different runs.
-    #[error("{} and {} are of different runs: {what}; keep each run in a folder of its own", .paths[0].display(), .paths[1].display())]
+    #[error("{} and {} are of different runs: {}; keep each run in a folder of its own", .paths[0].display(), .paths[1].display(), OneLine(.what))]
     OtherRun {
         /// The files.
         paths: [PathBuf; 2],

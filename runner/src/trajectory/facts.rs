@@ -92,11 +92,16 @@ impl RunFacts {
     }
 
     /// In what this differs from the facts of another file, if both cannot be of one run. A run that was taken up again may
-    /// have been given more steps, and a newer program.
+    /// have been given more steps, but goes on in the version it began in.
     pub(super) fn other_run(&self, other: &Self) -> Option<String> {
         let identity = |facts: &Self| config::identity(Some(facts.record_every), &facts.canonical);
+        let differ =
+            |key: &str, ours: &str, theirs: &str| Some(format!("{key} is {ours} in the one and {theirs} in the other"));
+        if self.version != other.version {
+            return differ("version", &self.version, &other.version);
+        }
         let one = config::other_run(&identity(self), &identity(other))?;
-        Some(format!("{} is {} in the one and {} in the other", one.key, one.ours, one.theirs))
+        differ(&one.key, &one.ours, &one.theirs)
     }
 }
 

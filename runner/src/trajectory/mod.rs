@@ -20,9 +20,11 @@
 //! | `vx`, `vy` | f32 | m/s |
 //! | `omega` | f32 | rad/s |
 
+mod ended;
 mod error;
 mod facts;
 mod layout;
+mod quiet;
 mod reader;
 mod record;
 mod remove;
@@ -33,6 +35,7 @@ pub(crate) mod testing;
 mod tests;
 mod writer;
 
+pub use ended::Ended;
 pub use error::TrajectoryError;
 pub use facts::RunFacts;
 pub use reader::Trajectory;

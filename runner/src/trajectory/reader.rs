@@ -3,9 +3,9 @@
 use super::facts::RunFacts;
 use super::record::Row;
 use super::segment::Segment;
-use super::{TrajectoryError, rank_folder, rank_of_folder, steps_of_segment};
+use super::{Ended, TrajectoryError, rank_folder, rank_of_folder, steps_of_segment};
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -136,7 +136,7 @@ impl Trajectory {
             }
         }
         let every = self.facts.record_every;
-        let told = last_step(&self.folder)?.map(|step| step - step % every);
+        let told = Ended::read(&self.folder)?.map(|ended| ended.steps - ended.steps % every);
         let last = complete.last().copied().max(told);
         let unbroken = complete.iter().zip(0..).take_while(|(step, count)| **step == count * every).count();
         let missing = unbroken as u64 * every;
@@ -191,19 +191,4 @@ fn names(folder: &Path) -> Result<Vec<String>, TrajectoryError> {
         Ok(names)
     };
     read().map_err(|error: io::Error| TrajectoryError::Read { path: folder.to_owned(), reason: error.to_string() })
-}
-
-/// How many steps the run made, if it has ended and said so.
-fn last_step(folder: &Path) -> Result<Option<u64>, TrajectoryError> {
-    let path = folder.join("summary.json");
-    let text = match fs::read(&path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(TrajectoryError::Read { path, reason: error.to_string() }),
-    };
-    let summary: Result<serde_json::Value, _> = serde_json::from_slice(&text);
-    let steps = summary.map_err(|error| error.to_string()).and_then(|summary| {
-        summary["steps"].as_u64().ok_or_else(|| "it does not say how many steps were made".to_owned())
-    });
-    steps.map(Some).map_err(|reason| TrajectoryError::BadSummary { path, reason })
 }

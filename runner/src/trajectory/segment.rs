@@ -7,16 +7,15 @@
 use super::error::reason;
 use super::facts::{RunFacts, parse};
 use super::record::Row;
-use super::{TrajectoryError, layout, steps_of_segment};
+use super::{TrajectoryError, layout, quiet, steps_of_segment};
 use parquet::column::reader::ColumnReaderImpl;
-use parquet::data_type::{DataType, DoubleType, FloatType, Int64Type};
+use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::serialized_reader::SerializedPageReader;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
-use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3Default;
@@ -102,12 +101,18 @@ impl Segment {
         }
         let rows = self.records.iter().map(|record| record.rows).filter(|rows| *rows > 0);
         let groups = self.metadata.row_groups();
-        if !rows.eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
+        if !rows.clone().eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
             return Err("it holds other row groups than it says");
         }
         let mut at = START;
-        for group in groups {
-            at = range(group, at).filter(|range| range.end <= length).ok_or("its columns do not lie as written")?.end;
+        for (group, rows) in groups.iter().zip(rows) {
+            let range = range(group, at).filter(|range| range.end <= length);
+            let range = range.ok_or("its columns do not lie as written")?;
+            // However alike its bodies are, a row takes at least 1.5 bytes: no small file can ask for much memory.
+            if rows > range.end - range.start {
+                return Err("it has more rows than they have bytes");
+            }
+            at = range.end;
         }
         Ok(())
     }
@@ -127,7 +132,7 @@ impl Segment {
             return Err(bad(format!("the bytes of step {step} are not those that were written")));
         }
         // Rows that are half filled are of no use to anybody, nor are they looked at.
-        match panic::catch_unwind(AssertUnwindSafe(|| self.decode(record, rows))) {
+        match quiet::catch(|| self.decode(record, rows)) {
             Ok(decoded) => decoded.map_err(|error| bad(format!("step {step}: {}", reason(&error)))),
             Err(_) => Err(bad(format!("step {step} cannot be decoded"))),
         }
@@ -152,6 +157,13 @@ impl Segment {
     }
 
     fn decode(&self, record: &RecordEntry, rows: &mut Vec<Row>) -> Result<(), ParquetError> {
+        let mut alike = true;
+        self.column::<Int32Type>(record, 0, |_, steps| {
+            alike &= steps.iter().all(|step| u64::from(step.cast_unsigned()) == record.step);
+        })?;
+        if !alike {
+            return Err(ParquetError::General("its rows are of another step".to_owned()));
+        }
         let first = rows.len();
         // Made one by one as ids are read, so that no count is trusted further than there are ids.
         self.column::<Int64Type>(record, 1, |_, ids| {

@@ -1,8 +1,14 @@
 use super::testing::{bodies, body, facts, record};
 use super::*;
 use atoll_core::Body;
+use parquet::column::writer::ColumnWriter;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::ColumnPath;
 use std::collections::BTreeMap;
 use std::fs;
+use std::sync::Arc;
 use tempfile::TempDir;
 
 fn folder() -> TempDir {
@@ -138,9 +144,6 @@ fn only_closed_segments_have_a_name_and_can_be_synced() {
     writer.write(&record).unwrap();
     drop(writer);
     assert_eq!(Trajectory::open(folder.path()).unwrap().steps(), [0]);
-    // Whoever goes on removes what was left.
-    TrajectoryWriter::new(rank.clone(), 0, 1, &facts(10)).unwrap();
-    assert_eq!(names(), ["steps-0000000000-0000000000.parquet"]);
 }
 
 #[test]
@@ -223,6 +226,12 @@ fn a_step_belongs_to_one_segment_of_each_rank_of_one_run() {
     record(runs.path(), &other, 2, (65..=70).step_by(5), bodies);
     let told = complaint(runs.path());
     assert!(told.contains("are of different runs: scene.seed is 7 in the one and 8 in the other"), "{told}");
+
+    let versions = recorded();
+    let other = RunFacts { version: "1.2.4\u{1b}[2J".to_owned(), ..facts(5) };
+    record(versions.path(), &other, 2, (65..=70).step_by(5), bodies);
+    let told = complaint(versions.path());
+    assert!(told.contains("version is 1.2.3 in the one and 1.2.4 [2J in the other"), "{told}");
 }
 
 #[test]
@@ -250,8 +259,8 @@ fn what_is_missing_is_named() {
     assert!(complaint(folder.path()).starts_with("DIR/rank-00000: the segment that holds step 50 is missing"));
     remove(&folder, 1, second);
     assert!(complaint(folder.path()).starts_with("DIR: the segment that holds step 50 is missing"));
-    told(r#"{"steps": "many"}"#);
-    assert!(complaint(folder.path()).starts_with("DIR/summary.json is no summary of a run: it does not say"));
+    told(r#"{"steps": "many\nand"}"#);
+    assert!(complaint(folder.path()).starts_with("DIR/summary.json is no summary of a run: invalid type: string"));
     told("{");
     assert!(complaint(folder.path()).starts_with("DIR/summary.json is no summary of a run: EOF"));
 }
@@ -335,4 +344,71 @@ fn flipped_bits_never_change_what_is_read() {
             }
         }
     }
+}
+
+/// A file whose rows say another step than everything else does, checksum and all.
+#[test]
+fn rows_of_another_step_are_refused() {
+    let folder = folder();
+    let step: u64 = 0x0102_0304;
+    record(folder.path(), &facts(1), 1, step..step + 1, bodies);
+    let path = rank_folder(folder.path(), 0).join(segment_name(step, step));
+    let mut rows = Vec::new();
+    Segment::open(&path).unwrap().read(step, &mut rows).unwrap();
+    assert_eq!(rows.len(), 20);
+
+    let mut bytes = fs::read(&path).unwrap();
+    let footer = bytes.len() - 8 - u32::from_le_bytes(bytes[bytes.len() - 8..][..4].try_into().unwrap()) as usize;
+    let entry = |bytes: &[u8]| format!("{step}:20:{:016x}", xxhash_rust::xxh3::xxh3_64(&bytes[4..footer]));
+    let find = |bytes: &[u8], what: &[u8]| bytes.windows(what.len()).position(|part| part == what).unwrap();
+    let place = find(&bytes, entry(&bytes).as_bytes());
+    let value = find(&bytes, &(step as u32).to_le_bytes());
+    assert!(value < footer);
+    bytes[value] ^= 1;
+    let forged = entry(&bytes);
+    bytes[place..place + forged.len()].copy_from_slice(forged.as_bytes());
+    fs::write(&path, bytes).unwrap();
+    let error = Segment::open(&path).unwrap().read(step, &mut rows).unwrap_err().to_string();
+    assert!(error.contains("step 16909060: its rows are of another step"), "{error}");
+}
+
+#[test]
+fn no_body_takes_less_than_a_byte() {
+    // As alike as bodies can be.
+    let alike = folder();
+    let count = 100_000;
+    record(alike.path(), &facts(1), 1, 0..1, |_| vec![body(1, 0); count]);
+    assert_eq!(read(&Trajectory::open(alike.path()).unwrap(), 0).len(), count);
+
+    // In an encoding for which a row is next to nothing.
+    let forged = folder();
+    let path = rank_folder(forged.path(), 0).join(segment_name(0, 0));
+    fs::create_dir(path.parent().unwrap()).unwrap();
+    let mut facts = facts(1).to_pairs();
+    let more = [("atoll.rank", "0"), ("atoll.ranks", "1"), ("atoll.steps", "0:100000:0123456789abcdef")];
+    facts.extend(more.map(|(key, text)| (key.to_owned(), text.to_owned())));
+    let facts = facts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
+    let mut properties = WriterProperties::builder().set_key_value_metadata(Some(facts));
+    for column in layout::schema().get_fields() {
+        let column = ColumnPath::from(column.name());
+        properties = properties.set_column_compression(column.clone(), layout::compression(&column));
+    }
+    let properties = Arc::new(properties.build());
+    let mut file = SerializedFileWriter::new(fs::File::create(&path).unwrap(), layout::schema(), properties).unwrap();
+    let mut group = file.next_row_group().unwrap();
+    while let Some(mut column) = group.next_column().unwrap() {
+        match column.untyped() {
+            ColumnWriter::Int32ColumnWriter(column) => column.write_batch(&vec![0; count], None, None),
+            ColumnWriter::Int64ColumnWriter(column) => column.write_batch(&vec![0; count], None, None),
+            ColumnWriter::FloatColumnWriter(column) => column.write_batch(&vec![0.0; count], None, None),
+            ColumnWriter::DoubleColumnWriter(column) => column.write_batch(&vec![0.0; count], None, None),
+            _ => unreachable!("no other types are in the schema"),
+        }
+        .unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    file.close().unwrap();
+    let told = complaint(forged.path());
+    assert!(told.contains("it has more rows than they have bytes"), "{told}");
 }

@@ -3,7 +3,8 @@
 use super::error::reason;
 use super::facts::RunFacts;
 use super::record::Record;
-use super::{RECORDS_PER_SEGMENT, TrajectoryError, is_open_segment, layout, open_segment_name, segment_name};
+use super::{RECORDS_PER_SEGMENT, TrajectoryError, layout, open_segment_name, segment_name};
+use crate::output::{sync_folder, sync_folder_of};
 use parquet::column::writer::ColumnWriterImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -29,25 +30,23 @@ pub struct TrajectoryWriter {
     schema: TypePtr,
     properties: WriterPropertiesPtr,
     open: Option<OpenSegment>,
-    /// Complete, and perhaps not on the disk yet.
-    closed: Vec<PathBuf>,
+    /// Whether there are complete segments whose names are perhaps not on the disk yet.
+    named: bool,
 }
 
 impl TrajectoryWriter {
-    /// Creates the folder, or goes on in one that is there. Removes segments that an earlier run left under way.
+    /// Creates the folder, or goes on in one that is there.
     ///
     /// # Errors
     /// If the folder cannot be had.
     pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &RunFacts) -> Result<Self, TrajectoryError> {
-        fs::create_dir_all(&folder)
-            .and_then(|()| remove_open_segments(&folder))
-            .map_err(|error| failed(&folder, &error))?;
+        fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
         let mut texts = facts.to_pairs();
         texts.push(("atoll.rank".to_owned(), rank.to_string()));
         texts.push(("atoll.ranks".to_owned(), ranks.to_string()));
         let texts = texts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
         let (schema, properties) = (layout::schema(), layout::properties(texts));
-        Ok(Self { folder, schema, properties, open: None, closed: Vec::new() })
+        Ok(Self { folder, schema, properties, open: None, named: false })
     }
 
     /// Adds a record, and closes the segment if that is its last.
@@ -67,7 +66,8 @@ impl TrajectoryWriter {
         if full { self.close_segment() } else { Ok(()) }
     }
 
-    /// Completes the segment under way, if there is one.
+    /// Completes the segment under way, if there is one, and waits until it is on the disk: some file systems only then
+    /// say that it is full.
     ///
     /// # Errors
     /// If it cannot be written. The segment is then given up.
@@ -78,25 +78,23 @@ impl TrajectoryWriter {
         if let Err(error) = finished {
             return Err(segment.give_up(&error));
         }
-        self.closed.push(path);
+        self.named = true;
         Ok(())
     }
 
-    /// Waits until all complete segments are on the disk.
+    /// Waits until the names of all complete segments are on the disk as well.
     ///
     /// # Errors
-    /// If the system does not say so. All of them are waited for again the next time.
+    /// If the system does not say so. They are waited for again the next time.
     pub fn sync(&mut self) -> Result<(), TrajectoryError> {
-        if self.closed.is_empty() {
+        if !self.named {
             return Ok(());
         }
         // Their names are in the folder, and the folder's in the one above.
-        let above = self.folder.parent().filter(|above| !above.as_os_str().is_empty());
-        let all = self.closed.iter().map(PathBuf::as_path).chain([self.folder.as_path()]).chain(above);
-        for path in all {
-            File::open(path).and_then(|file| file.sync_all()).map_err(|error| failed(path, &error))?;
-        }
-        self.closed.clear();
+        sync_folder(&self.folder)
+            .and_then(|()| sync_folder_of(&self.folder))
+            .map_err(|error| failed(&self.folder, &error))?;
+        self.named = false;
         Ok(())
     }
 
@@ -152,7 +150,8 @@ impl OpenSegment {
     fn finish(&mut self) -> Result<(), ParquetError> {
         let steps = mem::take(&mut self.steps);
         self.file.append_key_value_metadata(KeyValue::new("atoll.steps".to_owned(), steps));
-        self.file.finish().map(drop)
+        self.file.finish()?;
+        Ok(self.file.inner().file.sync_data()?)
     }
 
     /// Leaves nothing behind.
@@ -222,16 +221,6 @@ fn column<T: DataType>(
 
 fn write<T: DataType>(column: &mut ColumnWriterImpl<'_, T>, values: &[T::T]) -> Result<(), ParquetError> {
     column.write_batch(values, None, None).map(drop)
-}
-
-fn remove_open_segments(folder: &Path) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        if entry.file_name().to_str().is_some_and(is_open_segment) {
-            fs::remove_file(entry.path())?;
-        }
-    }
-    Ok(())
 }
 
 fn failed(path: &Path, error: &io::Error) -> TrajectoryError {

@@ -1,0 +1,61 @@
+//! What the summary in a run's folder says about how it ended.
+
+use super::TrajectoryError;
+use serde::Deserialize;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// A run that has come to its end, or was told to stop and did so in order.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+pub struct Ended {
+    /// Steps made.
+    pub steps: u64,
+    /// Whether it was to make more.
+    pub interrupted: bool,
+    /// Hash of its last state, as it was written.
+    pub state_hash: Option<String>,
+}
+
+impl Ended {
+    /// Reads the summary in the folder of a run. There is none until the run has ended.
+    ///
+    /// # Errors
+    /// If it cannot be read, or says something else.
+    pub fn read(folder: &Path) -> Result<Option<Self>, TrajectoryError> {
+        let path = folder.join("summary.json");
+        match fs::read(&path) {
+            Ok(text) => serde_json::from_slice(&text)
+                .map(Some)
+                .map_err(|error| TrajectoryError::BadSummary { path, reason: error.to_string() }),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(TrajectoryError::Read { path, reason: error.to_string() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_summary_is_there_or_not_or_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(Ended::read(folder.path()).unwrap(), None);
+        let read = |text: &str| {
+            fs::write(folder.path().join("summary.json"), text).unwrap();
+            Ended::read(folder.path()).map(Option::unwrap).map_err(|error| error.to_string())
+        };
+        let hash = Some("00ff".to_owned());
+        let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff"}"#;
+        assert_eq!(read(whole), Ok(Ended { steps: 7, interrupted: false, state_hash: hash }));
+        assert_eq!(
+            read(r#"{"steps": 8, "interrupted": true}"#),
+            Ok(Ended { steps: 8, interrupted: true, state_hash: None })
+        );
+        for damaged in ["", "{", "[]", r#"{"steps": 7}"#, r#"{"steps": -1, "interrupted": true}"#] {
+            let error = read(damaged).unwrap_err();
+            assert!(error.contains("summary.json is no summary of a run: ") && !error.contains('\n'), "{error}");
+        }
+    }
+}
