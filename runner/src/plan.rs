@@ -98,7 +98,7 @@ impl Plan {
         let scene = Scene::new(&config.scene);
         let tiles = tiles::tile_counts(config, &scene);
         folder.check_same_run(config, tiles)?;
-        let (steps, completed) = (config.run.steps, folder.completed());
+        let (steps, completed) = (config.run.steps, folder.completed()?);
         if completed == Some(steps) {
             return Err(RunError::Complete { summary: folder.summary(), steps });
         }

@@ -12,8 +12,8 @@ use crate::config::{Config, Difference, is_resolved, other_run};
 use crate::error::RunError;
 use crate::output::{is_temporary, write_durably};
 use crate::telemetry::complain;
+use crate::trajectory::{Ended, TrajectoryError};
 use crate::{snapshot, trajectory};
-use serde::Deserialize;
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
@@ -125,14 +125,11 @@ impl RunFolder {
     }
 
     /// How many steps the run here has made, if it has come to its end.
-    pub fn completed(&self) -> Option<u64> {
-        #[derive(Deserialize)]
-        struct Ended {
-            steps: u64,
-            interrupted: bool,
-        }
-        let summary = fs::read(self.summary()).ok().and_then(|text| serde_json::from_slice(&text).ok());
-        summary.filter(|ended: &Ended| !ended.interrupted).map(|ended| ended.steps)
+    ///
+    /// # Errors
+    /// If its summary cannot be understood.
+    pub fn completed(&self) -> Result<Option<u64>, TrajectoryError> {
+        Ok(Ended::read(&self.path)?.filter(|ended| !ended.interrupted).map(|ended| ended.steps))
     }
 
     /// That this folder cannot be used.
@@ -340,8 +337,8 @@ mod tests {
         assert!(told.contains("scene.seed = 1 there, and 4 here"), "{told}");
         let told = check(&[("record_every", "4")]).unwrap_err();
         assert!(told.contains("output.record_every = 5 there, and 4 here"), "{told}");
-        assert_eq!(run.completed(), None);
+        assert_eq!(run.completed().unwrap(), None);
         fs::write(run.summary(), "{\"steps\": 600, \"interrupted\": false}").unwrap();
-        assert_eq!(run.completed(), Some(600));
+        assert_eq!(run.completed().unwrap(), Some(600));
     }
 }

@@ -1,13 +1,12 @@
 //! `atoll info`: what the folder of a run, a snapshot or a segment of a recording holds.
 
 use crate::args::InfoArgs;
-use crate::config::Config;
+use crate::config::{Config, OneLine};
 use crate::error::{Exit, RunError};
 use crate::output;
 use crate::run_folder::RunFolder;
 use crate::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
-use crate::trajectory::{Segment, Trajectory, TrajectoryError};
-use serde_json::Value;
+use crate::trajectory::{Ended, Segment, Trajectory, TrajectoryError};
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -40,7 +39,7 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {} x {} tiles\n", tiles[0], tiles[1]);
     row(&mut text, "config hash", &config.hash(tiles));
-    row(&mut text, "state", &state(folder, config.run.steps));
+    row(&mut text, "state", &state(folder, config.run.steps)?);
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
     let found = snapshot::find(&folder.snapshots(), &config.identity(tiles))?;
     if found.snapshots.is_empty() {
@@ -61,15 +60,13 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
 }
 
 /// How far a run came.
-fn state(folder: &RunFolder, steps: u64) -> String {
-    let summary = fs::read(folder.summary()).ok().and_then(|text| serde_json::from_slice::<Value>(&text).ok());
-    let Some(summary) = summary else {
-        return format!("to make {steps} steps; under way, or ended before it could say how");
+fn state(folder: &RunFolder, steps: u64) -> Result<String, TrajectoryError> {
+    let Some(ended) = Ended::read(folder.path())? else {
+        return Ok(format!("to make {steps} steps; under way, or ended before it could say how"));
     };
-    let complete = summary["interrupted"] == false && summary["steps"] == steps;
-    let how = if complete { "complete," } else { "ended after" };
-    let hash = |name: &str| summary[name].as_str().unwrap_or("unknown").to_owned();
-    format!("{how} {} of {steps} steps: state hash {}", summary["steps"], hash("state_hash"))
+    let how = if !ended.interrupted && ended.steps == steps { "complete," } else { "ended after" };
+    let hash = ended.state_hash.unwrap_or_default();
+    Ok(format!("{how} {} of {steps} steps: state hash {}", ended.steps, OneLine(&hash)))
 }
 
 fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
@@ -121,7 +118,10 @@ fn of_segment(path: &Path) -> Result<String, TrajectoryError> {
     let (facts, records) = (&segment.facts, &segment.records);
     let mut text = format!(
         "recording of {}, seed {}: the part of rank {} of {}\n",
-        facts.scene, facts.seed, segment.rank, segment.ranks
+        OneLine(&facts.scene),
+        facts.seed,
+        segment.rank,
+        segment.ranks
     );
     let steps: Vec<String> = records.iter().map(|record| record.step.to_string()).collect();
     row(&mut text, "steps", &steps.join(" "));
