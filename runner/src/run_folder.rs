@@ -223,7 +223,8 @@ impl RunFolder {
         File::options().create(true).truncate(false).read(true).write(true).open(self.path.join(LOCK))
     }
 
-    fn not_writable(&self, error: &io::Error) -> RunError {
+    /// That nothing can be written or removed here.
+    pub fn not_writable(&self, error: &io::Error) -> RunError {
         self.refusal(format!("{error}; name a folder that can be written to"))
     }
 

@@ -17,7 +17,8 @@ use std::thread;
 use std::time::Duration;
 
 /// How long ranks wait for each other until they have agreed on a configuration, which says how long.
-const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(30);
+/// Longer than rank 0 may wait for an earlier run to let go of its folder.
+const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(150);
 
 /// What a process that finds itself alone leaves to the one that says so.
 const TIME_TO_SPEAK: Duration = Duration::from_secs(2);

@@ -4,7 +4,7 @@ use super::RankError;
 use crate::error::RunError;
 use crate::handshake::{self, Refusal};
 use crate::plan::Plan;
-use crate::snapshot::{Snapshot, SnapshotError};
+use crate::snapshot::{NO_OLDER, Snapshot, SnapshotError};
 use crate::telemetry::complain;
 use atoll_core::World;
 use atoll_transport::{Rank, Transport};
@@ -36,6 +36,9 @@ pub(super) fn build(plan: &Plan, rank: Rank, transport: &mut impl Transport) -> 
                     let step = snapshots.peek().map_or(0, |snapshot| snapshot.step());
                     complain(&format!("{error}; going on after step {step} instead"));
                 }
+            }
+            (Err(Refusal::Known(error)), _) => {
+                return Err(RankError::Agreed { text: format!("{error}; {NO_OLDER}"), exit: error.exit() });
             }
             (Err(refusal), _) => return Err(refusal.into()),
             (Ok(()), Err(_)) => unreachable!("all are well"),

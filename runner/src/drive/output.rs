@@ -20,14 +20,15 @@ pub(super) fn start<'a>(
     transport: &mut impl Transport,
 ) -> Result<Option<Recorder<'a>>, RankError> {
     let Some(output) = &plan.output else { return Ok(None) };
-    let claim = output.folder.share(&plan.config.hash(plan.tiles));
-    let mut ready = claim.as_ref().map(|_| ()).map_err(|error| error.to_string());
-    if rank == Rank(0) && ready.is_ok() {
-        ready = output.folder.remove_after(resumed).map_err(|error| error.to_string());
+    let mut claim = output.folder.share(&plan.config.hash(plan.tiles));
+    if rank == Rank(0)
+        && claim.is_ok()
+        && let Err(error) = output.folder.remove_after(resumed)
+    {
+        claim = Err(output.folder.not_writable(&error));
     }
     // Nobody writes before it is done.
-    let trouble = ready.err().map(|reason| output.folder.refusal(reason));
-    handshake::all_well(transport, trouble.as_ref())?;
+    handshake::all_well(transport, claim.as_ref().err())?;
     let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
     handshake::all_well(transport, recorder.as_ref().err())?;
     Ok(recorder.ok())

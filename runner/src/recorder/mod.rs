@@ -154,7 +154,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn ask(&self, job: Job) {
-        // A writer that is gone has panicked, which `finish` finds out.
+        // It goes on until it is told that no more will come.
         let _ = self.jobs.as_ref().expect("there until it is closed").send(job);
     }
 }

@@ -21,6 +21,9 @@ pub use store::{Found, find, remove_after, remove_before};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
+/// What to do where a damaged snapshot was the last hope.
+pub const NO_OLDER: &str = "no older snapshot is whole: begin anew with --out and --overwrite";
+
 /// Why a snapshot cannot be used, or found.
 #[derive(Debug, Error)]
 pub enum SnapshotError {
@@ -71,7 +74,7 @@ pub enum SnapshotError {
         expected: String,
     },
     /// Whatever was written is damaged.
-    #[error("{why}; no older snapshot is whole: begin anew with --out and --overwrite")]
+    #[error("{why}; {NO_OLDER}")]
     NoneWhole {
         /// What is wrong with the newest.
         why: Box<SnapshotError>,
