@@ -27,6 +27,18 @@ impl Hashes {
         Self { state: self.state.wrapping_add(other.state), contact: self.contact.wrapping_add(other.contact) }
     }
 
+    /// As words, for plain old data: the low and the high half of the state's, then of the contacts'.
+    pub fn to_words(self) -> [u64; 4] {
+        let [state, contact] = [self.state, self.contact].map(|hash| [hash as u64, (hash >> 64) as u64]);
+        [state[0], state[1], contact[0], contact[1]]
+    }
+
+    /// From [words](Self::to_words).
+    pub fn from_words([state, state_high, contact, contact_high]: [u64; 4]) -> Self {
+        let join = |low: u64, high: u64| u128::from(low) | u128::from(high) << 64;
+        Self { state: join(state, state_high), contact: join(contact, contact_high) }
+    }
+
     pub(crate) fn add_body(&mut self, body: &Body) {
         #[derive(Clone, Copy, Pod, Zeroable)]
         #[repr(C)]

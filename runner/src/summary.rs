@@ -14,10 +14,8 @@ const PHASES: usize = Phase::ALL.len();
 #[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct RankFacts {
-    /// Halves of the state hash, the low one first.
-    pub state_hash: [u64; 2],
-    /// Halves of the contact hash, the low one first.
-    pub contact_hash: [u64; 2],
+    /// Those of its tiles, as [`Hashes::to_words`].
+    pub hashes: [u64; 4],
     /// Steps made.
     pub steps: u64,
     /// Of those, the ones that were made before the run went on from a snapshot.
@@ -68,11 +66,8 @@ pub struct Gathered {
 impl RankFacts {
     /// What the world of a rank and its last step have to say.
     pub fn new(world: &World, last: &StepReport, scene: &Scene) -> Self {
-        let halves = |hash: u128| [hash as u64, (hash >> 64) as u64];
-        let hashes = world.hashes();
         Self {
-            state_hash: halves(hashes.state),
-            contact_hash: halves(hashes.contact),
+            hashes: world.hashes().to_words(),
             steps: world.step_count(),
             interrupted: u64::from(last.stopped),
             escaped: world.bodies().filter(|body| scene.has_escaped(body)).count() as u64,
@@ -101,11 +96,6 @@ impl RankFacts {
         phases.extend([("output", self.output_nanos), ("other", rest)]);
         let steps = self.steps - self.resumed_at;
         RankTimings { rank, threads, steps, wall_nanos: self.wall_nanos, phases }
-    }
-
-    fn hashes(&self) -> Hashes {
-        let join = |halves: [u64; 2]| u128::from(halves[0]) | u128::from(halves[1]) << 64;
-        Hashes { state: join(self.state_hash), contact: join(self.contact_hash) }
     }
 }
 
@@ -217,7 +207,7 @@ impl Summary {
         let sum = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).sum::<u64>();
         let most = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).max().unwrap_or(0);
         let facts = Facts::total(tiles);
-        let hashes = ranks.iter().map(RankFacts::hashes).fold(Hashes::default(), Hashes::merge);
+        let hashes = ranks.iter().map(|rank| Hashes::from_words(rank.hashes)).fold(Hashes::default(), Hashes::merge);
         let (steps, resumed_at) = (most(|rank| rank.steps), most(|rank| rank.resumed_at));
         let made = steps - resumed_at;
         let threads = plan.config.run.threads;

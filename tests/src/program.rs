@@ -142,6 +142,14 @@ pub fn run(command: &mut Command) -> Ended {
     Running::start(command).end()
 }
 
+/// Compares two recorded runs with `atoll diff`.
+///
+/// # Panics
+/// As [`run`].
+pub fn diff(a: &Path, b: &Path, options: &[&str]) -> Ended {
+    run(command().arg("diff").args([a, b]).args(options))
+}
+
 /// Runs a program to its end, which must be a good one, and reads the summary it was told to write.
 ///
 /// # Panics

@@ -1,6 +1,6 @@
 //! What `atoll diff` writes and refuses. What it finds in recordings is in `recording.rs`.
 
-use atoll_tests::program::{self, Ended};
+use atoll_tests::program::{self, diff};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,10 +14,6 @@ fn record(folder: &TempDir, name: &str, options: &[&str]) -> PathBuf {
     let ended = program::run(command.args(["--record-every", "4"]).args(options).arg("--out").arg(&path));
     assert_eq!(ended.code, Some(0), "{ended}");
     path
-}
-
-fn diff(a: &Path, b: &Path, options: &[&str]) -> Ended {
-    program::run(program::command().arg("diff").args([a, b]).args(options))
 }
 
 #[test]

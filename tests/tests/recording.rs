@@ -1,7 +1,7 @@
 //! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
 
 use atoll::trajectory::{Row, Trajectory};
-use atoll_tests::program::{self, Ended};
+use atoll_tests::program::{self, diff};
 use atoll_tests::ways::Way;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use serde_json::Value;
@@ -19,10 +19,6 @@ fn record(way: Way, ranks: usize, folder: &Path, options: &[&str]) {
     command.args(["--quiet", "--steps", "60", "--bodies", "4000", "--tiles", "4x3", "--record-every", "5"]);
     let ended = program::run(command.args(options).arg("--out").arg(folder));
     assert_eq!(ended.code, Some(0), "{way}: {ended}");
-}
-
-fn diff(a: &Path, b: &Path, options: &[&str]) -> Ended {
-    program::run(program::command().arg("diff").args([a, b]).args(options))
 }
 
 /// Copies a run, which then can be harmed.

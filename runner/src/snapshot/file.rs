@@ -56,10 +56,8 @@ pub struct Block {
     pub bodies: u64,
     /// Contacts it holds.
     pub contacts: u64,
-    /// Halves of its state hash, the low one first.
-    pub state_hash: [u64; 2],
-    /// Halves of its contact hash, the low one first.
-    pub contact_hash: [u64; 2],
+    /// Its fingerprints, as [`Hashes::to_words`].
+    pub hashes: [u64; 4],
 }
 
 impl Block {
@@ -69,14 +67,9 @@ impl Block {
             length: saved.length as u64,
             bodies: saved.bodies,
             contacts: saved.contacts,
-            state_hash: halves(saved.hashes.state),
-            contact_hash: halves(saved.hashes.contact),
+            hashes: saved.hashes.to_words(),
         }
     }
-}
-
-fn halves(hash: u128) -> [u64; 2] {
-    [hash as u64, (hash >> 64) as u64]
 }
 
 /// Writes the files of one rank.
@@ -200,9 +193,7 @@ impl SnapshotFile {
 
     /// Those of its tiles.
     pub fn hashes(&self) -> Hashes {
-        let join = |halves: [u64; 2]| u128::from(halves[0]) | u128::from(halves[1]) << 64;
-        let of = |block: &Block| Hashes { state: join(block.state_hash), contact: join(block.contact_hash) };
-        self.blocks.iter().map(of).fold(Hashes::default(), Hashes::merge)
+        self.blocks.iter().map(|block| Hashes::from_words(block.hashes)).fold(Hashes::default(), Hashes::merge)
     }
 
     /// Another version may have other facts as well, but none that tell the version otherwise.
