@@ -113,6 +113,7 @@ for exchange in alltoallv sparse; do
     # New hosts each time: one whose cable was put back may still take others for out of reach, which no launcher stands.
     remove_hosts
     make_hosts
+    : >"$work/said" # now, and not when the run comes to it: it holds steps of the run before
     on_the_cluster configs/quickstart.toml --steps 4000000000 --tiles 5x5 --peer-timeout 4 --set mpi_exchange="$exchange" \
         >"$work/said" 2>&1 &
     run=$!
