@@ -1,14 +1,16 @@
 //! Compares two recordings, step by step and body by body.
 //!
 //! At most one record of each is in memory. Bodies are the same if every bit of their recorded state is; how far those that
-//! are not have come apart is measured as well.
+//! are not have come apart is measured as well. What no record holds, the hashes of the last states tell.
 
+mod closing;
 mod deviation;
 mod plot;
 mod report;
 #[cfg(test)]
 mod tests;
 
+pub use closing::Closing;
 pub use deviation::{Bodies, Deviation, StepDeviation};
 pub use plot::svg;
 
@@ -24,7 +26,7 @@ use std::path::{Path, PathBuf};
 pub struct Comparison {
     /// Whether they are the same: within the tolerance, if there is one, else bit for bit. Never where steps were left out.
     pub same: bool,
-    /// Whether they are the same bit for bit. Never where steps were left out.
+    /// Whether they are the same bit for bit, the last states included. Never where steps were left out.
     pub identical: bool,
     /// Deviations up to this count as none.
     pub tolerance: Option<f64>,
@@ -34,6 +36,8 @@ pub struct Comparison {
     pub b: Side,
     /// Keys of the configurations with different values, of those that a result depends on.
     pub configuration: Vec<Key>,
+    /// Their last states, if both runs ended after the same step.
+    pub closing: Option<Closing>,
     /// Where they are first not the same: within the tolerance, if there is one, else bit for bit.
     pub first_difference: Option<Difference>,
     /// Steps that only the first recorded.
@@ -135,12 +139,26 @@ pub fn compare(
         compared(steps.len(), count);
     }
     let alike = only_in_a.is_empty() && only_in_b.is_empty() && a.incomplete() == 0 && b.incomplete() == 0;
-    let identical = alike && steps.iter().all(StepDeviation::is_none);
-    let same = alike && steps.iter().all(|step| step.is_same(tolerance));
+    let closing = Closing::read([a.folder(), b.folder()])?;
+    let identical =
+        alike && steps.iter().all(StepDeviation::is_none) && closing.as_ref().is_none_or(Closing::is_identical);
+    let same = if tolerance.is_some() { alike && steps.iter().all(|step| step.is_same(tolerance)) } else { identical };
     let keys = config::differences(&a.facts().canonical, &b.facts().canonical).into_iter();
     let configuration = keys.map(|one| Key { key: one.key, a: one.ours, b: one.theirs }).collect();
     let (a, b) = (Side::new(&a), Side::new(&b));
-    Ok(Comparison { same, identical, tolerance, a, b, configuration, first_difference, only_in_a, only_in_b, steps })
+    Ok(Comparison {
+        same,
+        identical,
+        tolerance,
+        a,
+        b,
+        configuration,
+        closing,
+        first_difference,
+        only_in_a,
+        only_in_b,
+        steps,
+    })
 }
 
 /// The rows of a record by the names of their bodies.

@@ -37,13 +37,20 @@ impl Display for Comparison {
         if let Some(first) = &self.first_difference {
             self.write_first(f, first)?;
         }
+        if let Some(closing) = &self.closing {
+            let steps = plural(closing.steps as usize, "step");
+            for (name, hashes) in closing.unlike() {
+                let [in_a, in_b] = hashes.each_ref().map(|hash| OneLine(hash));
+                writeln!(f, "the last states differ: after {steps} {name} is {in_a} in {a} and {in_b} in {b}")?;
+            }
+        }
         if self.steps.iter().any(|step| step.differing > 0) { self.write_table(f) } else { Ok(()) }
     }
 }
 
 impl Comparison {
     fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // What keeps them from being the same is then that steps were left out.
+        // What keeps them from being the same is then what was not recorded: steps that were left out, or the last states.
         let as_far = self.only_in_a.is_empty()
             && self.only_in_b.is_empty()
             && self.steps.iter().all(|step| step.is_same(self.tolerance));

@@ -234,6 +234,37 @@ fn configurations_are_compared_before_all_else() {
 }
 
 #[test]
+fn what_no_record_holds_is_told_by_the_hashes_of_the_last_states() {
+    let ended = |steps: u64, state: &str, contact: &str| {
+        let folder = run(10, unchanged);
+        let hashes = format!(r#""state_hash": "{state}", "contact_hash": "{contact}""#);
+        let summary = format!(r#"{{"steps": {steps}, "interrupted": false, {hashes}}}"#);
+        fs::write(folder.path().join("summary.json"), summary).unwrap();
+        folder
+    };
+    let a = ended(12, "aa", "c0");
+    let same = compared(&a, &ended(12, "aa", "c0"), None);
+    assert!(same.identical && same.closing.is_some_and(|closing| closing.steps == 12));
+
+    let b = ended(12, "aa", "c1");
+    let comparison = compared(&a, &b, None);
+    assert!(!comparison.same && !comparison.identical);
+    let expected = "the same as far as all ranks recorded: 3 records of 20 bodies, steps 0 to 10\n\
+                    the last states differ: after 12 steps contact_hash is c0 in A and c1 in B\n";
+    assert_eq!(told(&a, &b, &comparison), expected);
+    let within = compared(&a, &b, Some(0.5));
+    assert!(within.same && !within.identical);
+    assert!(told(&a, &b, &within).starts_with("the same within 0.5: 3 records"));
+    assert_eq!(compared(&a, &ended(12, "ab", "c1"), None).closing.unwrap().unlike().count(), 2);
+
+    // States after other steps, or that nobody knows, cannot be compared.
+    for other in [ended(14, "bb", "c2"), run(10, unchanged)] {
+        let comparison = compared(&a, &other, None);
+        assert!(comparison.identical && comparison.closing.is_none());
+    }
+}
+
+#[test]
 fn what_a_killed_run_lost_is_said() {
     let (a, b) = (run(60, unchanged), run(60, unchanged));
     fs::remove_file(b.path().join("rank-00001/steps-0000000050-0000000060.parquet")).unwrap();

@@ -15,6 +15,8 @@ pub struct Ended {
     pub interrupted: bool,
     /// Hash of its last state, as it was written.
     pub state_hash: Option<String>,
+    /// Hash of the contacts of its last state, as it was written.
+    pub contact_hash: Option<String>,
 }
 
 impl Ended {
@@ -46,13 +48,11 @@ mod tests {
             fs::write(folder.path().join("summary.json"), text).unwrap();
             Ended::read(folder.path()).map(Option::unwrap).map_err(|error| error.to_string())
         };
-        let hash = Some("00ff".to_owned());
-        let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff"}"#;
-        assert_eq!(read(whole), Ok(Ended { steps: 7, interrupted: false, state_hash: hash }));
-        assert_eq!(
-            read(r#"{"steps": 8, "interrupted": true}"#),
-            Ok(Ended { steps: 8, interrupted: true, state_hash: None })
-        );
+        let [state_hash, contact_hash] = ["00ff", "ff00"].map(|hash| Some(hash.to_owned()));
+        let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff", "contact_hash": "ff00"}"#;
+        assert_eq!(read(whole), Ok(Ended { steps: 7, interrupted: false, state_hash, contact_hash }));
+        let short = Ended { steps: 8, interrupted: true, state_hash: None, contact_hash: None };
+        assert_eq!(read(r#"{"steps": 8, "interrupted": true}"#), Ok(short));
         for damaged in ["", "{", "[]", r#"{"steps": 7}"#, r#"{"steps": -1, "interrupted": true}"#] {
             let error = read(damaged).unwrap_err();
             assert!(error.contains("summary.json is no summary of a run: ") && !error.contains('\n'), "{error}");
