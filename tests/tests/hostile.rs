@@ -1,6 +1,6 @@
-//! Hostile input: a million frames, fifty thousand saved tiles, ten thousand configurations and a few thousand command
-//! lines that nobody would write, against the targets of [`atoll_tests::fuzz`]. No panic, no error of two lines, and no
-//! more memory than the bytes that came can justify.
+//! Hostile input: a million frames, fifty thousand saved tiles, twenty thousand segments of recordings, ten thousand
+//! configurations and a few thousand command lines that nobody would write, against the targets of [`atoll_tests::fuzz`]. No
+//! panic, no error of two lines, and no more memory than the bytes that came can justify.
 
 use atoll::scene::SplitMix64;
 use atoll_core::{KindId, Message, TileId};
@@ -257,6 +257,68 @@ fn saved_tiles_that_were_changed() {
         assert!(asked <= allowed(bytes.len()), "round {round}: {asked} bytes for {}: {bytes:02x?}", bytes.len());
     }
     assert!(accepted > count / 50 && accepted < count / 2, "{accepted} of {count} accepted");
+}
+
+/// A segment that was changed in one of many ways, more often than not in its footer.
+fn segment(random: &mut SplitMix64, genuine: &[u8]) -> Vec<u8> {
+    let mut bytes = genuine.to_vec();
+    let footer = fuzz::footer(genuine).unwrap();
+    let start = [0, footer, footer][below(random, 3)];
+    let at = start + below(random, genuine.len() - start);
+    match below(random, 4) {
+        0 => bytes.truncate(at),
+        1 => drop(bytes.drain(at..(at + 1 + below(random, 8)).min(genuine.len()))),
+        2 => {
+            let few = 1 + below(random, 8);
+            bytes.splice(at..at, noise(random, few));
+        }
+        _ => {
+            for _ in 0..=below(random, 4) {
+                let at = start + below(random, genuine.len() - start);
+                bytes[at] = random.bits() as u8;
+            }
+        }
+    }
+    if random.coin() {
+        end_segment(&mut bytes, footer);
+    }
+    bytes
+}
+
+/// Writes where the footer is, if there is room for that, so that a longer or shorter one is found.
+fn end_segment(bytes: &mut [u8], footer: usize) {
+    if let Some(length) = bytes.len().checked_sub(footer + 8) {
+        let end = bytes.len() - 8;
+        bytes[end..].copy_from_slice(&[&(length as u32).to_le_bytes()[..], b"PAR1"].concat());
+    }
+}
+
+/// Gives a segment to the target. It is read twice, each time through buffers of a fixed size, and a small one costs no more.
+#[track_caller]
+fn read_segment(bytes: &[u8]) -> bool {
+    let before = ASKED.get();
+    let accepted = fuzz::segment(bytes);
+    let asked = ASKED.get() - before;
+    assert!(asked <= 1 << 20, "{asked} bytes for {}: {bytes:02x?}", bytes.len());
+    accepted
+}
+
+#[test]
+fn segments_that_were_changed() {
+    let mut random = SplitMix64::after(6, 0);
+    let genuine = fuzz::segment_file();
+    assert!(read_segment(&genuine));
+    let count = rounds(20_000);
+    let accepted = (0..count).filter(|_| read_segment(&segment(&mut random, &genuine))).count();
+    assert!(accepted > count / 50 && accepted < count / 2, "{accepted} of {count} accepted");
+    // Each small number of the footer as a huge one, of seven bits in a byte, the highest of which says that it goes on.
+    let footer = fuzz::footer(&genuine).unwrap();
+    for at in footer..genuine.len() - 8 {
+        let mut bytes = genuine.clone();
+        bytes.splice(at..=at, [0xfe, 0xff, 0xff, 0xff, 0x07]);
+        end_segment(&mut bytes, footer);
+        read_segment(&bytes);
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Reads one segment, and trusts nothing in it.
 //!
-//! The Parquet library takes a page's word for its length, and panics on some pages that no writer makes. So what the footer
-//! says is checked against itself and the file, and the bytes of a record against their checksum, before any page is looked
-//! at; and should a page be forged together with its checksum, the panic is caught.
+//! The Parquet library takes a footer's word for how many columns there are, a page's for its length, and panics on some pages
+//! that no writer makes. So the columns are those of [`layout`], whatever the footer says of them; what else it says is
+//! checked against itself and the file, and the bytes of a record against their checksum, before any page is looked at; and
+//! should a page be forged together with its checksum, the panic is caught.
 
 use super::error::reason;
 use super::facts::{RunFacts, parse};
@@ -11,8 +12,9 @@ use super::{TrajectoryError, layout, quiet, steps_of_segment};
 use parquet::column::reader::ColumnReaderImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::serialized_reader::SerializedPageReader;
+use parquet::schema::types::SchemaDescriptor;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -65,10 +67,10 @@ impl Segment {
         let failed = |error: io::Error| TrajectoryError::Read { path: path.to_owned(), reason: error.to_string() };
         let file = File::open(path).map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len();
-        let metadata = ParquetMetaDataReader::new().parse_and_finish(&file).map_err(|error| bad(reason(&error)))?;
-        if metadata.file_metadata().schema() != layout::schema().as_ref() {
-            return Err(bad("it has other columns".to_owned()));
-        }
+        let columns = Arc::new(SchemaDescriptor::new(layout::schema()));
+        let reader = ParquetMetaDataReader::new()
+            .with_metadata_options(Some(ParquetMetaDataOptions::new().with_schema(columns)));
+        let metadata = reader.parse_and_finish(&file).map_err(|error| bad(reason(&error)))?;
         let pairs = metadata.file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
         let text = |name: &str| {
             let pair = pairs.iter().find(|pair| pair.key.strip_prefix("atoll.") == Some(name));

@@ -1,5 +1,5 @@
-//! Bytes of any kind against everything that reads what others wrote: frames, saved tiles, configurations,
-//! command lines.
+//! Bytes of any kind against everything that reads what others wrote: frames, saved tiles, recordings,
+//! configurations, command lines.
 //!
 //! Each target takes bytes and panics where a promise is broken; whatever else it is given, it returns, and most say
 //! whether the bytes were accepted. The same functions are driven by `tests/hostile.rs` on stable Rust and by the fuzzer of `fuzz/`.
@@ -7,12 +7,14 @@
 mod arguments;
 mod codec;
 mod config;
+mod segment;
 mod snapshot;
 mod transport;
 
 pub use arguments::arguments;
 pub use codec::{TILES, codec, frame, receive};
 pub use config::config;
+pub use segment::{footer, segment, segment_file};
 pub use snapshot::{BLOCK_HEADER, block, fresh, seal, snapshot};
 pub use transport::transport;
 
