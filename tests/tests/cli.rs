@@ -1,6 +1,6 @@
-//! The program as its user meets it: what it refuses and in which words, exit codes, files, interrupts.
+//! The program as its user meets it: what it refuses and in which words, exit codes, files.
 
-use atoll_tests::program::{self, Ended, Running, run, watched};
+use atoll_tests::program::{self, Ended, run, watched};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -434,53 +434,6 @@ fn bodies_that_overlap_at_the_start_are_pushed_apart_gently() {
     }
     let last = after("60");
     assert!(value(&last, "max_penetration") < 0.05, "they still overlap: {last:#}");
-}
-
-/// Ctrl-C and a polite kill end all ranks after the same step, with the summary so far.
-#[cfg(unix)]
-#[test]
-fn an_interrupt_leaves_a_summary_and_exit_code_130() {
-    for signal in ["INT", "TERM"] {
-        for ranks in ["1", "3"] {
-            let desk = Desk::new(SMALL);
-            let options = ["--steps", "4000000000", "--ranks", ranks, "--json", "summary.json"];
-            let mut running = Running::start(&mut desk.atoll(options));
-            // The first line of progress: every rank is under way.
-            running.wait_for_line("step ");
-            running.signal(signal);
-            let ended = running.end();
-            assert_eq!(ended.code, Some(130), "SIG{signal}, {ranks} ranks: {ended}");
-            let told = ended.complaints().iter().filter(|line| line.starts_with("atoll: ")).count();
-            assert_eq!(told, 1, "{ended}");
-            assert!(ended.stdout.contains("interrupted"), "{ended}");
-            let json = program::summary(&desk.path().join("summary.json"));
-            let steps = json["steps"].as_u64().unwrap();
-            assert!(json["interrupted"] == true && (1..4_000_000_000).contains(&steps), "{json:#}");
-            assert_eq!((&json["bodies_lost"], &json["escaped"]), (&0.into(), &0.into()), "{json:#}");
-            assert_eq!(desk.files(), ["summary.json", "world.toml"]);
-        }
-    }
-}
-
-/// An interrupted run has gone exactly as far as it says.
-#[cfg(unix)]
-#[test]
-fn an_interrupted_run_is_the_beginning_of_the_whole_one() {
-    let desk = Desk::new(SMALL);
-    let (path, options) = (desk.path().join("summary.json"), ["--ranks", "3", "--json", "summary.json"]);
-    let mut running = Running::start(desk.atoll(options).args(["--bodies", "20000", "--steps", "4000000000"]));
-    running.wait_for_line("step ");
-    running.signal("INT");
-    assert_eq!(running.end().code, Some(130));
-    let cut = program::summary(&path);
-    let steps = cut["steps"].to_string();
-    let whole = program::run_to_summary(
-        desk.atoll(["--quiet"]).args(["--bodies", "20000", "--steps", &steps]),
-        &desk.path().join("whole.json"),
-    );
-    for key in ["steps", "state_hash", "contact_hash", "migrations"] {
-        assert_eq!(cut[key], whole[key], "{key}");
-    }
 }
 
 #[test]

@@ -115,6 +115,8 @@ mod iceoryx2 {
         ranks[1].signal("STOP");
         running.signal("INT");
         running.wait_for_line("atoll: stopping after this step");
+        // Sooner, it would be taken for the same interrupt.
+        std::thread::sleep(std::time::Duration::from_millis(600));
         running.signal("INT");
         let ended = running.end();
         assert_eq!(ended.code, Some(130), "{ended}");
