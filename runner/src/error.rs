@@ -235,6 +235,15 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// Whether a world of so many bodies ended with as many, if so many were lost.
+    ///
+    /// # Errors
+    /// If not.
+    pub fn check_bodies(expected: u64, lost: i64) -> Result<(), Self> {
+        let found = expected.wrapping_add_signed(lost.wrapping_neg());
+        if lost == 0 { Ok(()) } else { Err(Self::BodiesLost { expected, found }) }
+    }
+
     /// The exit code that tells of this error.
     pub fn exit(&self) -> Exit {
         match self {

@@ -40,6 +40,21 @@ impl WholeFile {
         }
     }
 
+    /// As [`check`](Self::check), for two options, if given, which must not name one file.
+    ///
+    /// # Errors
+    /// If a path cannot be written, or both are the same.
+    pub fn check_two(options: [(&'static str, Option<&Path>); 2]) -> Result<[Option<Self>; 2], RunError> {
+        let [(first, path), (option, other)] = options;
+        if let Some(path) = other.filter(|_| other == path) {
+            let reason = format!("{first} writes to the same file");
+            return Err(RunError::BadOutput { option, path: path.to_owned(), reason });
+        }
+        let check = |(option, path): (_, Option<&Path>)| path.map(|path| Self::check(option, path)).transpose();
+        let [first, second] = options.map(check);
+        Ok([first?, second?])
+    }
+
     /// A path that is sure to be writable when it is needed, or else to fail then.
     pub fn unchecked(path: &Path) -> Self {
         Self { path: path.to_owned() }
@@ -95,6 +110,17 @@ pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()
     });
     let renamed = written.and_then(|()| fs::rename(&temporary, path)).and_then(|()| sync_folder_of(path));
     renamed.inspect_err(|_| drop(fs::remove_file(&temporary)))
+}
+
+/// Makes a folder, and those above it that are not there, and makes all of them durable.
+///
+/// # Errors
+/// What the system says.
+pub fn create_folder_durably(path: &Path) -> io::Result<()> {
+    let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+    let missing: Vec<&Path> = path.ancestors().take_while(is_missing).collect();
+    fs::create_dir_all(path)?;
+    missing.into_iter().try_for_each(sync_folder_of)
 }
 
 /// Makes it durable that there is something of that name, where folders can be made durable.

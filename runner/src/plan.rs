@@ -7,6 +7,7 @@ use crate::run_folder::{Claim, RunFolder};
 use crate::scene::Scene;
 use crate::snapshot::{self, Found, Snapshot};
 use crate::tiles;
+use crate::trajectory::Ended;
 use atoll_core::{Blueprint, TileGrid, World};
 use std::thread;
 
@@ -72,13 +73,19 @@ fn check_memory(bodies: u64, tiles: u64, ranks: u64, here: u64, output: Option<&
     }
 }
 
+fn scene_and_tiles(config: &Config) -> (Scene, [u32; 2]) {
+    let scene = Scene::new(&config.scene);
+    let tiles = tiles::tile_counts(config, &scene);
+    (scene, tiles)
+}
+
 impl Plan {
     /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks. Nothing is written.
     ///
     /// # Errors
     /// If no world can be made of it.
     pub fn new(config: &Config) -> Result<Self, RunError> {
-        Self::from_found(config, Found::default(), None)
+        Self::begin(config, None)
     }
 
     /// A run that begins in a folder and writes there.
@@ -86,7 +93,12 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn beginning(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
-        Self::from_found(config, Found::default(), Some((folder, true)))
+        Self::begin(config, Some(folder))
+    }
+
+    fn begin(config: &Config, folder: Option<RunFolder>) -> Result<Self, RunError> {
+        let (scene, tiles) = scene_and_tiles(config);
+        Self::from_found(config, scene, tiles, Found::default(), folder.map(|folder| (folder, true)))
     }
 
     /// A run that goes on in a folder, from the newest snapshot that is whole; from the start if none was complete when
@@ -95,34 +107,39 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new), and if what the folder holds is another run, or cannot be gone on with.
     pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
-        let scene = Scene::new(&config.scene);
-        let tiles = tiles::tile_counts(config, &scene);
+        let (scene, tiles) = scene_and_tiles(config);
         folder.check_same_run(config, tiles)?;
-        let (steps, completed) = (config.run.steps, folder.completed()?);
-        if completed == Some(steps) {
+        let (steps, ended) = (config.run.steps, Ended::read(folder.path())?);
+        if let Some(ended) = ended.as_ref().filter(|ended| !ended.interrupted && ended.steps == steps) {
+            RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
             return Err(RunError::Complete { summary: folder.summary(), steps });
         }
-        let mut found = snapshot::find(&folder.snapshots(), &config.identity(tiles))?;
+        let ended = ended.map(|ended| ended.steps);
+        let mut found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
         let newest = found.snapshots.first().map(Snapshot::step);
-        if found.snapshots.len() > 1 && newest == Some(steps) {
-            // So that there is a step to make, of which the summary tells.
-            found.snapshots.remove(0);
+        if newest == Some(steps) {
+            // So that there is a step to make, of which the summary tells. If the others are damaged, there is none.
+            found.snapshots.rotate_left(1);
         }
-        if let Some(made) = newest.max(completed).filter(|&made| made > steps) {
+        if let Some(made) = newest.max(ended).filter(|&made| made > steps) {
             let reason = format!("{made} steps are made there already, and {steps} asked for");
             return Err(folder.refusal(format!("{reason}; give --steps as many or more")));
         }
-        if let (Some(made), None) = (completed, newest) {
-            let reason = format!("all {made} steps of this run are made, and there is no snapshot to go on from");
+        if let (Some(made), None) = (ended, newest) {
+            let reason = format!("{made} steps of this run are made, and there is no snapshot to go on from");
             return Err(folder.refusal(format!("{reason}; begin another run with --out")));
         }
-        Self::from_found(config, found, Some((folder, false)))
+        Self::from_found(config, scene, tiles, found, Some((folder, false)))
     }
 
     /// `folder` is written to, and says whether the run begins there.
-    fn from_found(config: &Config, found: Found, folder: Option<(RunFolder, bool)>) -> Result<Self, RunError> {
-        let scene = Scene::new(&config.scene);
-        let tiles = tiles::tile_counts(config, &scene);
+    fn from_found(
+        config: &Config,
+        scene: Scene,
+        tiles: [u32; 2],
+        found: Found,
+        folder: Option<(RunFolder, bool)>,
+    ) -> Result<Self, RunError> {
         let transport = config.transport();
         let ranks = config.run.ranks as u64;
         // Of an MPI job the others may be anywhere.
@@ -161,7 +178,7 @@ impl Plan {
 
     /// What the user may want to know before it starts, a sentence each.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.found.damaged.iter().map(|error| error.to_string()).collect();
+        let mut notes: Vec<String> = self.found.unusable.iter().map(|error| error.to_string()).collect();
         let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.grid.tiles());
         if idle > 0 {
             let ranks = self.assignment.ranks();
@@ -202,6 +219,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Exit;
 
     const ROOMS: &str = "[scene]\nkind = \"rooms\"\nbodies = 2000\n";
 
@@ -224,6 +242,31 @@ mod tests {
         let error = Plan::new(&config(&[("sleep", "true"), ("tiles", "2x3")])).unwrap_err();
         assert!(error.to_string().contains("sleep = true on 6 tiles"), "{error}");
         assert_eq!(plan(&[("sleep", "true"), ("bodies", "50000")]).tiles, [1, 1]);
+    }
+
+    #[test]
+    fn what_a_run_made_is_never_taken_for_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = RunFolder::new("--resume", folder.path());
+        let config = |steps| Config::from_toml_str("test", ROOMS, &[("tiles", "2x2"), ("steps", steps)]).unwrap();
+        std::fs::write(run.configuration(), config("60").to_toml([2, 2])).unwrap();
+        let on = |steps, summary: &str| {
+            std::fs::write(run.summary(), summary).unwrap();
+            Plan::going_on(&config(steps), run.clone()).unwrap_err()
+        };
+        // It has left a snapshot, wherever that is now.
+        let interrupted = r#"{"steps": 40, "interrupted": true}"#;
+        let told = on("60", interrupted).to_string();
+        assert!(told.contains("40 steps of this run are made, and there is no snapshot to go on from"), "{told}");
+        let told = on("30", interrupted).to_string();
+        assert!(told.contains("40 steps are made there already, and 30 asked for"), "{told}");
+        let failed = on("60", r#"{"steps": 60, "interrupted": false, "bodies": 2000, "bodies_lost": 3}"#);
+        assert_eq!(failed.exit(), Exit::Physics, "{failed}");
+        assert!(failed.to_string().contains("1997 bodies at the end of a world of 2000"), "{failed}");
+        let complete = on("60", r#"{"steps": 60, "interrupted": false, "bodies": 2000, "bodies_lost": 0}"#);
+        assert_eq!(complete.exit(), Exit::Done, "{complete}");
+        std::fs::remove_file(run.summary()).unwrap();
+        Plan::going_on(&config("60"), run).unwrap();
     }
 
     #[test]

@@ -10,23 +10,20 @@
 
 use crate::config::{Config, Difference, is_resolved, other_run};
 use crate::error::RunError;
-use crate::output::{is_temporary, write_durably};
+use crate::output::{create_folder_durably, is_temporary, write_durably};
 use crate::telemetry::complain;
-use crate::trajectory::{Ended, TrajectoryError};
 use crate::{snapshot, trajectory};
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::process;
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Ranks of a run whose launcher was killed end by themselves, and file systems of a network free the locks of a lost
 /// host after a while; so long they are given.
 const LINGERING: Duration = Duration::from_secs(100);
-
-/// Hosts of a cluster may see a new file a little later than the one that wrote it.
-const UNSEEN: Duration = Duration::from_secs(10);
 
 /// What every process of a run holds.
 const LOCK: &str = "lock";
@@ -109,27 +106,26 @@ impl RunFolder {
         [self.configuration(), self.summary()].iter().any(|path| is_temporary(name, path))
     }
 
+    /// Refuses a folder in which no run was begun.
+    ///
+    /// # Errors
+    /// If none was.
+    pub fn check_begun(&self) -> Result<(), RunError> {
+        let begin = "no run was begun there; begin one with `atoll run CONFIG --out DIR`";
+        if self.holds_run() { Ok(()) } else { Err(self.refusal(begin)) }
+    }
+
     /// Refuses to go on with a run that is configured otherwise than the one here. More steps, or fewer, are no other run.
     ///
     /// # Errors
     /// Naming the first key that differs; or if no run was begun here.
     pub fn check_same_run(&self, config: &Config, tiles: [u32; 2]) -> Result<(), RunError> {
-        if !self.holds_run() {
-            return Err(self.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"));
-        }
+        self.check_begun()?;
         let begun = Config::load_begun(&self.configuration())?;
         other_run(&config.identity(tiles), &begun.identity(tiles_of(&begun))).map_or(Ok(()), |difference| {
             let Difference { key, ours, theirs } = difference;
             Err(self.refusal(format!("{key} = {theirs} there, and {ours} here; only how a run is spread can change")))
         })
-    }
-
-    /// How many steps the run here has made, if it has come to its end.
-    ///
-    /// # Errors
-    /// If its summary cannot be understood.
-    pub fn completed(&self) -> Result<Option<u64>, TrajectoryError> {
-        Ok(Ended::read(&self.path)?.filter(|ended| !ended.interrupted).map(|ended| ended.steps))
     }
 
     /// That this folder cannot be used.
@@ -143,7 +139,8 @@ impl RunFolder {
     /// # Errors
     /// If another run writes here, or nobody can.
     pub fn hold(&self, waits: bool) -> Result<Option<Claim>, RunError> {
-        if !self.path.is_dir() {
+        // What is no run, and cannot become one, is left as it is.
+        if !self.path.is_dir() || !self.holds_run() && self.check_free(false).is_err() {
             return Ok(None);
         }
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
@@ -180,7 +177,7 @@ impl RunFolder {
         let claim = match held {
             Some(claim) => claim,
             None => {
-                fs::create_dir_all(&self.path).map_err(failed)?;
+                create_folder_durably(&self.path).map_err(failed)?;
                 let claim = self.hold(false)?;
                 self.check_free(false)?;
                 claim.ok_or_else(|| self.refusal("it was removed while the run began; try again"))?
@@ -191,23 +188,34 @@ impl RunFolder {
         }
         let write = |file: &mut File| file.write_all(configuration.as_bytes());
         write_durably(&self.configuration(), write).map_err(failed)?;
+        // Nobody else has ever written this.
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        fs::write(self.path.join(LOCK), format!("{} {now}\n", process::id())).map_err(failed)?;
         Ok(claim)
     }
 
-    /// Takes part in a claim that another process of this run made. A folder of another run is not that of this one: hosts of
-    /// a cluster must see the same files. `hash` is that of the run's configuration.
+    /// What tells the folder from any other, once a run has claimed it.
     ///
     /// # Errors
-    /// If it is not there, or that of another run.
-    pub fn share(&self, hash: &str) -> Result<Claim, RunError> {
-        let deadline = Instant::now() + UNSEEN;
+    /// What the system says.
+    pub fn token(&self) -> io::Result<Vec<u8>> {
+        fs::read(self.path.join(LOCK))
+    }
+
+    /// Takes part in a claim that another process of this run made, which told the token. Waits for that to be seen here, but
+    /// no longer than `patience`.
+    ///
+    /// # Errors
+    /// If the folder here is another one: hosts of a cluster must see the same files.
+    pub fn share(&self, token: &[u8], patience: Duration) -> Result<Claim, RunError> {
+        let deadline = Instant::now() + patience;
         let reason = loop {
-            let reason = match Config::load_begun(&self.configuration()) {
-                Ok(found) if found.hash(tiles_of(&found)) == hash => {
+            let reason = match self.token() {
+                Ok(found) if found == token && !token.is_empty() => {
                     let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
                     return Ok(Claim { _lock: lock });
                 }
-                Ok(_) => "another run is in it".to_owned(),
+                Ok(_) => "it is not the folder that rank 0 writes to".to_owned(),
                 Err(error) => error.to_string(),
             };
             if Instant::now() > deadline {
@@ -308,7 +316,16 @@ mod tests {
         let run = RunFolder::new("--out", &folder.path().join("new"));
         assert!(run.hold(false).unwrap().is_none());
         let claim = run.claim(None, true, &config(&[]).to_toml([2, 2])).unwrap();
-        let shared = run.share(&config(&[]).hash([2, 2])).unwrap();
+        let token = run.token().unwrap();
+        let shared = run.share(&token, Duration::ZERO).unwrap();
+        // A folder of the same name on another host has another, and a broken one none.
+        for other in [&b"7 7\n"[..], b""] {
+            let told = run.share(other, Duration::ZERO).unwrap_err().to_string();
+            assert!(
+                told.contains("it is not the folder that rank 0 writes to; every process of a run must see"),
+                "{told}"
+            );
+        }
         let told = run.hold(false).unwrap_err().to_string();
         assert!(told.contains("another run is writing there"), "{told}");
         drop(claim);
@@ -338,8 +355,5 @@ mod tests {
         assert!(told.contains("scene.seed = 1 there, and 4 here"), "{told}");
         let told = check(&[("record_every", "4")]).unwrap_err();
         assert!(told.contains("output.record_every = 5 there, and 4 here"), "{told}");
-        assert_eq!(run.completed().unwrap(), None);
-        fs::write(run.summary(), "{\"steps\": 600, \"interrupted\": false}").unwrap();
-        assert_eq!(run.completed().unwrap(), Some(600));
     }
 }

@@ -69,7 +69,6 @@ impl RankFacts {
         Self {
             hashes: world.hashes().to_words(),
             steps: world.step_count(),
-            interrupted: u64::from(last.stopped),
             escaped: world.bodies().filter(|body| scene.has_escaped(body)).count() as u64,
             ghosts: last.ghosts,
             islands: last.islands,

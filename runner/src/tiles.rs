@@ -1,7 +1,7 @@
 //! The default tile grid: a function of the scene and the physics alone, so that any number of ranks and threads
 //! computes the same world.
 
-use crate::config::Config;
+use crate::config::{Config, MOST_TILES};
 use crate::scene::Scene;
 use atoll_core::{Kind, Params};
 use glam::DVec2;
@@ -12,9 +12,6 @@ const BODIES_PER_TILE: f64 = 5000.0;
 
 /// A tile of the default grid is at least this many halo widths wide; below, most of a tile's work would be ghosts.
 const HALOS_PER_TILE: f64 = 4.0;
-
-/// Most tiles along an axis of the default grid.
-const MOST: f64 = 65_535.0;
 
 /// Columns and rows of tiles: those given, else the default for the scene.
 pub fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
@@ -37,7 +34,7 @@ fn default_counts(bodies: u64, size: DVec2, halo_width: f64) -> [u32; 2] {
     let tiles = bodies as f64 / BODIES_PER_TILE;
     let count = |along: f64, across: f64| {
         let square = (tiles * (along / across)).sqrt().round();
-        let most = (along / (HALOS_PER_TILE * halo_width)).floor().clamp(1.0, MOST);
+        let most = (along / (HALOS_PER_TILE * halo_width)).floor().clamp(1.0, MOST_TILES.into());
         square.clamp(1.0, most) as u32
     };
     [count(size.x, size.y), count(size.y, size.x)]

@@ -115,7 +115,6 @@ fn whole(folder: &Path) -> PathBuf {
 #[test]
 fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
     let folder = tempdir().unwrap();
-    let whole = whole(folder.path());
     for way in Way::all() {
         let ranks = if way.supports(3) { 3 } else { 1 };
         let run_folder = folder.path().join("run");
@@ -150,11 +149,21 @@ fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
         fs::remove_dir_all(&run_folder).unwrap();
         fs::remove_dir_all(&expected).unwrap();
     }
-    // What is complete is not made once more.
-    let before = fs::metadata(whole.join("summary.json")).unwrap().modified().unwrap();
-    let again = run(&mut Way::Channel.resume(1, &whole));
-    assert!(again.stderr.contains("all 120 steps of this run are made already"), "{again}");
-    assert_eq!(fs::metadata(whole.join("summary.json")).unwrap().modified().unwrap(), before);
+}
+
+#[test]
+fn what_is_complete_is_not_made_once_more() {
+    let folder = tempdir().unwrap();
+    let whole = whole(folder.path());
+    let (summary, json) = (whole.join("summary.json"), folder.path().join("summary.json"));
+    let before = fs::metadata(&summary).unwrap().modified().unwrap();
+    for way in Way::all() {
+        let ended = run(way.resume(1, &whole).arg("--json").arg(&json));
+        assert!(ended.stderr.contains("all 120 steps of this run are made already"), "{way}: {ended}");
+        assert_eq!(fs::metadata(&summary).unwrap().modified().unwrap(), before, "{way}");
+        assert_eq!(fs::read(&summary).unwrap(), fs::read(&json).unwrap(), "{way}");
+        fs::remove_file(&json).unwrap();
+    }
 }
 
 #[test]
@@ -229,7 +238,7 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
     }
     let ended = program::run(&mut Way::Channel.resume(3, &whole));
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
-    assert!(ended.stderr.contains("no older snapshot is whole"), "{ended}");
+    assert!(ended.stderr.contains("no other snapshot is whole"), "{ended}");
     assert!(whole.join("rank-00000").exists());
 }
 
@@ -244,6 +253,15 @@ fn a_run_that_was_killed_at_its_very_end_tells_all_there_is_to_tell() {
     for key in ["state_hash", "contact_hash", "ghosts", "islands", "colors", "constraint_violation", "contacts"] {
         assert_eq!(found[key], expected[key], "{key}");
     }
+    // From the last snapshot, if it has to be.
+    fs::remove_file(whole.join("summary.json")).unwrap();
+    let older = "snapshots/step-0000000100/rank-00000-of-00002.atoll";
+    let mut bytes = fs::read(whole.join(older)).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(whole.join(older), bytes).unwrap();
+    let ended = run(Way::Channel.resume(2, &whole).arg("--quiet"));
+    assert!(ended.stderr.contains(older) && ended.stderr.contains("going on after step 120 instead"), "{ended}");
+    assert_eq!(summary(&whole)["state_hash"], expected["state_hash"]);
     // Without any snapshot a finished run is left as it is.
     fs::remove_dir_all(whole.join("snapshots")).unwrap();
     let ended = program::run(Way::Channel.resume(3, &whole).args(["--steps", "200"]));
@@ -282,6 +300,7 @@ fn another_run_is_refused_by_the_key_that_differs() {
     let ended = program::run(command.args(["--overwrite", "--out"]).arg(&other));
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
     assert_eq!(fs::read_to_string(other.join("thesis.tex")).unwrap(), "precious");
+    assert_eq!(fs::read_dir(&other).unwrap().count(), 1, "something was left there");
 }
 
 #[test]

@@ -6,19 +6,14 @@ use crate::error::{Exit, RunError};
 use crate::output::{self, WholeFile};
 use crate::progress::{Progress, Show};
 use std::io::{self, IsTerminal};
-use std::path::Path;
 
 /// Does it.
 ///
 /// # Errors
 /// Whatever keeps it from an answer, or the answer from being written.
 pub fn run(args: &DiffArgs) -> Result<Exit, RunError> {
-    let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
-    let (json, plot) = (check("--json", args.json.as_deref())?, check("--plot", args.plot.as_deref())?);
-    if let Some(path) = args.plot.as_ref().filter(|_| args.json == args.plot) {
-        let reason = "--json writes to the same file".to_owned();
-        return Err(RunError::BadOutput { option: "--plot", path: path.clone(), reason });
-    }
+    let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
+    let [json, plot] = WholeFile::check_two(options)?;
 
     // On a terminal only: it takes seconds, and a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };

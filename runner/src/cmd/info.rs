@@ -41,7 +41,7 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps)?);
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
-    let found = snapshot::find(&folder.snapshots(), &config.identity(tiles))?;
+    let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
     if found.snapshots.is_empty() {
         row(&mut text, "snapshots", "none");
     }
@@ -53,7 +53,7 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
         };
         row(&mut text, "snapshot", &format!("after step {}: {told}", snapshot.step()));
     }
-    for error in found.damaged {
+    for error in found.unusable {
         row(&mut text, "snapshot", &error.to_string());
     }
     Ok(text)

@@ -15,7 +15,7 @@ use crate::run_folder::{Claim, RunFolder};
 use crate::summary::Summary;
 use crate::telemetry::complain;
 use crate::timings;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::{fs, io};
 
 /// Does it, with everything that can be refused refused before anything heavy starts.
@@ -38,10 +38,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, RunError> {
     // First of all: what is in a folder may change while another run writes there.
     let held = hold(args)?;
     let outputs = Outputs::check(args)?;
-    let first = match plan(args, &config, false) {
-        Err(error @ RunError::Complete { .. }) => return outputs.copy_summary(error),
-        plan => plan?,
-    };
+    let first = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
     tell(&first);
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
@@ -95,12 +92,10 @@ fn configuration(args: &RunArgs, goes_on: bool) -> PathBuf {
 }
 
 fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
-    match folder(args) {
-        Some(folder) if args.config.is_none() && !folder.holds_run() => {
-            Err(folder.refusal("no run was begun there; begin one with `atoll run CONFIG --out DIR`"))
-        }
-        _ => Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?),
+    if let (None, Some(folder)) = (&args.config, folder(args)) {
+        folder.check_begun()?;
     }
+    Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?)
 }
 
 /// Works out what the arguments ask for; `goes_on` says that the run was begun before, with these arguments.
@@ -157,9 +152,10 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
             let reason = "with transport mpi, start again with --resume, as configs/slurm/ does".to_owned();
             return Err(RunError::Ranks(format!("--restarts {}: {reason}", args.restarts)));
         }
-        let plan = plan(args, &job.adapt(config)?, false)?;
+        let config = job.adapt(config)?;
         // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
+        let plan = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
         Ok((plan, outputs))
     });
     let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
@@ -187,10 +183,7 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     let shown = output::show(summary);
     folder.and(json).and(timings).and(shown)?;
 
-    if summary.bodies_lost != 0 {
-        let found = summary.bodies.wrapping_add_signed(-summary.bodies_lost);
-        return Err(RunError::BodiesLost { expected: summary.bodies, found });
-    }
+    RunError::check_bodies(summary.bodies, summary.bodies_lost)?;
     Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
@@ -204,27 +197,25 @@ struct Outputs {
 }
 
 impl Outputs {
-    /// Of a run that is complete: its summary goes where this one's was to go.
-    fn copy_summary(&self, complete: RunError) -> Result<Exit, RunError> {
-        if let (RunError::Complete { summary, .. }, Some(json)) = (&complete, &self.json) {
+    /// Where an error says that a run is complete, its summary goes where this one's was to go. What is left to say then.
+    fn copy_summary(&self, error: RunError) -> RunError {
+        if let (RunError::Complete { summary, .. }, Some(json)) = (&error, &self.json) {
             let failed = |error: io::Error| RunError::Output { path: summary.clone(), reason: error.to_string() };
-            json.write(&fs::read(summary).map_err(failed)?)?;
+            if let Err(error) = fs::read(summary).map_err(failed).and_then(|bytes| json.write(&bytes)) {
+                return error;
+            }
         }
-        Err(complete)
+        error
     }
 
     /// Where the summary and the timings are to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
-        let check = |option, path: Option<&Path>| path.map(|path| WholeFile::check(option, path)).transpose();
-        let (json, timings) = (args.json.as_deref(), args.timings.as_deref());
-        if let Some(path) = timings.filter(|_| json == timings) {
-            let reason = "--json writes to the same file".to_owned();
-            return Err(RunError::BadOutput { option: "--timings", path: path.to_owned(), reason });
-        }
         if let Some(folder) = folder(args).filter(|folder| args.out.is_some() || !folder.holds_run()) {
             folder.check_free(args.overwrite)?;
         }
         let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        Ok(Self { json: check("--json", json)?, timings: check("--timings", timings)?, folder })
+        let options = [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())];
+        let [json, timings] = WholeFile::check_two(options)?;
+        Ok(Self { json, timings, folder })
     }
 }

@@ -25,7 +25,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// More tiles along an axis cannot be named in 32 bits for both.
-const MOST_TILES: u32 = 65_535;
+pub(crate) const MOST_TILES: u32 = 65_535;
 
 /// Everything a run depends on.
 #[derive(Clone, PartialEq, Debug)]

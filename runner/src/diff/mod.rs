@@ -3,22 +3,20 @@
 //! At most one record of each is in memory. Bodies are the same if every bit of their recorded state is; how far those that
 //! are not have come apart is measured as well. What no record holds, the hashes of the last states tell.
 
-mod closing;
 mod deviation;
 mod plot;
 mod report;
 #[cfg(test)]
 mod tests;
 
-pub use closing::Closing;
 pub use deviation::{Bodies, Deviation, StepDeviation};
 pub use plot::svg;
 
 use crate::config;
-use crate::trajectory::{Row, Trajectory, TrajectoryError};
+use crate::trajectory::{Ended, Row, Trajectory, TrajectoryError};
 use atoll_core::TileGrid;
 use glam::DVec2;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 
 /// How two recordings compare. The fields are the keys of the JSON file, in its order.
@@ -26,7 +24,8 @@ use std::path::{Path, PathBuf};
 pub struct Comparison {
     /// Whether they are the same: within the tolerance, if there is one, else bit for bit. Never where steps were left out.
     pub same: bool,
-    /// Whether they are the same bit for bit, the last states included. Never where steps were left out.
+    /// Whether they are the same bit for bit; the last states as well, if both runs have ended. Never where steps were left
+    /// out.
     pub identical: bool,
     /// Deviations up to this count as none.
     pub tolerance: Option<f64>,
@@ -36,8 +35,6 @@ pub struct Comparison {
     pub b: Side,
     /// Keys of the configurations with different values, of those that a result depends on.
     pub configuration: Vec<Key>,
-    /// Their last states, if both runs ended after the same step.
-    pub closing: Option<Closing>,
     /// Where they are first not the same: within the tolerance, if there is one, else bit for bit.
     pub first_difference: Option<Difference>,
     /// Steps that only the first recorded.
@@ -52,6 +49,7 @@ pub struct Comparison {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Side {
     /// Its folder.
+    #[serde(serialize_with = "in_letters")]
     pub folder: PathBuf,
     /// Version of the program that recorded it.
     pub version: String,
@@ -59,6 +57,8 @@ pub struct Side {
     pub records: usize,
     /// Steps after the last record that not all ranks had written when the run was killed. They are left out.
     pub incomplete: usize,
+    /// What its summary says, once it has ended.
+    pub ended: Option<Ended>,
 }
 
 /// A key of the configurations.
@@ -138,27 +138,18 @@ pub fn compare(
         }
         compared(steps.len(), count);
     }
-    let alike = only_in_a.is_empty() && only_in_b.is_empty() && a.incomplete() == 0 && b.incomplete() == 0;
-    let closing = Closing::read([a.folder(), b.folder()])?;
-    let identical =
-        alike && steps.iter().all(StepDeviation::is_none) && closing.as_ref().is_none_or(Closing::is_identical);
+    let sides = [Side::new(&a)?, Side::new(&b)?];
+    let made = sides.each_ref().map(|side| side.ended.as_ref().map(|ended| ended.steps));
+    let alike = only_in_a.is_empty()
+        && only_in_b.is_empty()
+        && sides.iter().all(|side| side.incomplete == 0)
+        && (made[0] == made[1] || made.contains(&None));
+    let identical = alike && steps.iter().all(StepDeviation::is_none) && unlike_ends(sides.each_ref()).is_empty();
     let same = if tolerance.is_some() { alike && steps.iter().all(|step| step.is_same(tolerance)) } else { identical };
     let keys = config::differences(&a.facts().canonical, &b.facts().canonical).into_iter();
     let configuration = keys.map(|one| Key { key: one.key, a: one.ours, b: one.theirs }).collect();
-    let (a, b) = (Side::new(&a), Side::new(&b));
-    Ok(Comparison {
-        same,
-        identical,
-        tolerance,
-        a,
-        b,
-        configuration,
-        closing,
-        first_difference,
-        only_in_a,
-        only_in_b,
-        steps,
-    })
+    let [a, b] = sides;
+    Ok(Comparison { same, identical, tolerance, a, b, configuration, first_difference, only_in_a, only_in_b, steps })
 }
 
 /// The rows of a record by the names of their bodies.
@@ -178,14 +169,32 @@ impl Comparison {
 }
 
 impl Side {
-    fn new(trajectory: &Trajectory) -> Self {
-        Self {
+    fn new(trajectory: &Trajectory) -> Result<Self, TrajectoryError> {
+        Ok(Self {
             folder: trajectory.folder().to_owned(),
             version: trajectory.facts().version.clone(),
             records: trajectory.steps().len(),
             incomplete: trajectory.incomplete(),
-        }
+            ended: Ended::read(trajectory.folder())?,
+        })
     }
+}
+
+/// What the summaries of two runs say of their ends that is not the same, with both values: steps, or else hashes of the last
+/// states. Those cover what no record does: steps after the last one, the rotation in full, contacts and their impulses.
+fn unlike_ends([a, b]: [&Side; 2]) -> Vec<(&'static str, [String; 2])> {
+    let Some((a, b)) = a.ended.as_ref().zip(b.ended.as_ref()) else { return Vec::new() };
+    if a.steps != b.steps {
+        return vec![("steps", [a, b].map(|ended| ended.steps.to_string()))];
+    }
+    let hashes = [("state_hash", &a.state_hash, &b.state_hash), ("contact_hash", &a.contact_hash, &b.contact_hash)];
+    let known = hashes.into_iter().filter_map(|(what, a, b)| Some((what, [a.clone()?, b.clone()?])));
+    known.filter(|(_, [a, b])| a != b).collect()
+}
+
+/// A path as it is shown: JSON has no place for bytes that are no letters.
+fn in_letters<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 impl Difference {

@@ -1,6 +1,6 @@
 //! A comparison as people read it.
 
-use super::{Bodies, Comparison, Difference, Side, State, StepDeviation};
+use super::{Bodies, Comparison, Difference, Side, State, StepDeviation, unlike_ends};
 use crate::config::OneLine;
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
@@ -25,6 +25,13 @@ impl Display for Comparison {
                 };
                 writeln!(f, "{folder}: the {steps} held by some ranks only, and left out")?;
             }
+            if side.ended.is_none() {
+                writeln!(
+                    f,
+                    "{}: the run is under way or was killed, so how it ends is not compared",
+                    side.folder.display()
+                )?;
+            }
         }
         self.write_verdict(f)?;
         for (side, only) in [(&self.a, &self.only_in_a), (&self.b, &self.only_in_b)] {
@@ -37,12 +44,9 @@ impl Display for Comparison {
         if let Some(first) = &self.first_difference {
             self.write_first(f, first)?;
         }
-        if let Some(closing) = &self.closing {
-            let steps = plural(closing.steps as usize, "step");
-            for (name, hashes) in closing.unlike() {
-                let [in_a, in_b] = hashes.each_ref().map(|hash| OneLine(hash));
-                writeln!(f, "the last states differ: after {steps} {name} is {in_a} in {a} and {in_b} in {b}")?;
-            }
+        for (what, values) in unlike_ends([&self.a, &self.b]) {
+            let [in_a, in_b] = values.each_ref().map(|value| OneLine(value));
+            writeln!(f, "the ends differ: {what} is {in_a} in {a} and {in_b} in {b}")?;
         }
         if self.steps.iter().any(|step| step.differing > 0) { self.write_table(f) } else { Ok(()) }
     }
@@ -50,7 +54,7 @@ impl Display for Comparison {
 
 impl Comparison {
     fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // What keeps them from being the same is then what was not recorded: steps that were left out, or the last states.
+        // What keeps them from being the same is then what was not recorded: steps that were left out, or the ends.
         let as_far = self.only_in_a.is_empty()
             && self.only_in_b.is_empty()
             && self.steps.iter().all(|step| step.is_same(self.tolerance));

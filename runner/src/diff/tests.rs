@@ -18,12 +18,25 @@ fn run_of(
     change: impl Fn(u64, &mut Vec<Body>),
 ) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    record(folder.path(), facts, ranks, steps, |step| {
+    record(folder.path(), facts, ranks, steps.clone(), |step| {
         let mut bodies = bodies(step);
         change(step, &mut bodies);
         bodies
     });
+    end(&folder, steps.last().unwrap(), ["00", "00"]);
     folder
+}
+
+/// Writes the summary of a run.
+fn end(folder: &TempDir, steps: u64, [state, contact]: [&str; 2]) {
+    let hashes = format!(r#""state_hash": "{state}", "contact_hash": "{contact}""#);
+    let summary = format!(r#"{{"steps": {steps}, "interrupted": false, {hashes}}}"#);
+    fs::write(folder.path().join("summary.json"), summary).unwrap();
+}
+
+/// Removes it, as if the run had been killed.
+fn kill(folder: &TempDir) {
+    fs::remove_file(folder.path().join("summary.json")).unwrap();
 }
 
 fn unchanged(_: u64, _: &mut Vec<Body>) {}
@@ -207,7 +220,9 @@ fn one_run_may_have_recorded_longer_or_more_often() {
     assert!(!comparison.same && !comparison.identical);
     assert_eq!((comparison.only_in_a.len(), comparison.only_in_b.as_slice()), (0, &[35, 40, 45, 50, 55, 60][..]));
     let text = told(&short, &long, &comparison);
-    let expected = "differ: 7 records of 20 bodies, steps 0 to 30\nonly B has 6 records of steps 35 to 60\n";
+    let expected = "differ: 7 records of 20 bodies, steps 0 to 30\n\
+                    only B has 6 records of steps 35 to 60\n\
+                    the ends differ: steps is 30 in A and 60 in B\n";
     assert_eq!(text, expected);
 
     let often = run_of(1, &facts(3), (0..=30).step_by(3), unchanged);
@@ -234,45 +249,54 @@ fn configurations_are_compared_before_all_else() {
 }
 
 #[test]
-fn what_no_record_holds_is_told_by_the_hashes_of_the_last_states() {
-    let ended = |steps: u64, state: &str, contact: &str| {
+fn how_runs_end_is_compared_beyond_what_was_recorded() {
+    let ended = |steps, hashes| {
         let folder = run(10, unchanged);
-        let hashes = format!(r#""state_hash": "{state}", "contact_hash": "{contact}""#);
-        let summary = format!(r#"{{"steps": {steps}, "interrupted": false, {hashes}}}"#);
-        fs::write(folder.path().join("summary.json"), summary).unwrap();
+        end(&folder, steps, hashes);
         folder
     };
-    let a = ended(12, "aa", "c0");
-    let same = compared(&a, &ended(12, "aa", "c0"), None);
-    assert!(same.identical && same.closing.is_some_and(|closing| closing.steps == 12));
+    let a = ended(12, ["aa", "c0"]);
+    assert!(compared(&a, &ended(12, ["aa", "c0"]), None).identical);
 
-    let b = ended(12, "aa", "c1");
+    let b = ended(12, ["aa", "c1"]);
     let comparison = compared(&a, &b, None);
     assert!(!comparison.same && !comparison.identical);
     let expected = "the same as far as all ranks recorded: 3 records of 20 bodies, steps 0 to 10\n\
-                    the last states differ: after 12 steps contact_hash is c0 in A and c1 in B\n";
+                    the ends differ: contact_hash is c0 in A and c1 in B\n";
     assert_eq!(told(&a, &b, &comparison), expected);
     let within = compared(&a, &b, Some(0.5));
     assert!(within.same && !within.identical);
     assert!(told(&a, &b, &within).starts_with("the same within 0.5: 3 records"));
-    assert_eq!(compared(&a, &ended(12, "ab", "c1"), None).closing.unwrap().unlike().count(), 2);
 
-    // States after other steps, or that nobody knows, cannot be compared.
-    for other in [ended(14, "bb", "c2"), run(10, unchanged)] {
-        let comparison = compared(&a, &other, None);
-        assert!(comparison.identical && comparison.closing.is_none());
+    // One made more steps, whatever the tolerance.
+    let b = ended(14, ["bb", "c2"]);
+    for tolerance in [None, Some(0.5)] {
+        let comparison = compared(&a, &b, tolerance);
+        assert!(!comparison.same && !comparison.identical);
+        let text = told(&a, &b, &comparison);
+        assert!(text.ends_with("steps 0 to 10\nthe ends differ: steps is 12 in A and 14 in B\n"), "{text}");
     }
+
+    // What nobody knows is said to be unknown.
+    kill(&b);
+    let comparison = compared(&a, &b, None);
+    assert!(comparison.identical);
+    let expected = "B: the run is under way or was killed, so how it ends is not compared\n\
+                    identical: 3 records of 20 bodies, steps 0 to 10\n";
+    assert_eq!(told(&a, &b, &comparison), expected);
 }
 
 #[test]
 fn what_a_killed_run_lost_is_said() {
     let (a, b) = (run(60, unchanged), run(60, unchanged));
+    kill(&b);
     fs::remove_file(b.path().join("rank-00001/steps-0000000050-0000000060.parquet")).unwrap();
     let comparison = compared(&a, &b, None);
     assert_eq!((comparison.only_in_a.len(), comparison.b.incomplete, comparison.b.records), (3, 3, 10));
     let text = told(&a, &b, &comparison);
-    assert!(text.starts_with("B: the last 3 steps are held by some ranks only, and left out\ndiffer:"), "{text}");
+    assert!(text.starts_with("B: the last 3 steps are held by some ranks only, and left out\n"), "{text}");
     // What was left out could be anything.
+    kill(&a);
     fs::remove_file(a.path().join("rank-00000/steps-0000000050-0000000060.parquet")).unwrap();
     for tolerance in [None, Some(0.5)] {
         let comparison = compared(&a, &b, tolerance);
@@ -280,7 +304,9 @@ fn what_a_killed_run_lost_is_said() {
         let within = if tolerance.is_some() { "within 0.5 " } else { "" };
         let expected = format!(
             "A: the last 3 steps are held by some ranks only, and left out\n\
+             A: the run is under way or was killed, so how it ends is not compared\n\
              B: the last 3 steps are held by some ranks only, and left out\n\
+             B: the run is under way or was killed, so how it ends is not compared\n\
              the same {within}as far as all ranks recorded: 10 records of 20 bodies, steps 0 to 45\n"
         );
         assert_eq!(told(&a, &b, &comparison), expected);

@@ -4,7 +4,7 @@ use super::RankError;
 use crate::error::RunError;
 use crate::handshake::{self, Refusal};
 use crate::plan::Plan;
-use crate::snapshot::{NO_OLDER, Snapshot, SnapshotError};
+use crate::snapshot::{NO_OTHER, Snapshot, SnapshotError};
 use crate::telemetry::complain;
 use atoll_core::World;
 use atoll_transport::{Rank, Transport};
@@ -21,27 +21,20 @@ pub(super) struct Beginning {
 pub(super) fn build(plan: &Plan, rank: Rank, transport: &mut impl Transport) -> Result<Beginning, RankError> {
     let mut snapshots = plan.found.snapshots.iter().peekable();
     while let Some(snapshot) = snapshots.next() {
-        let restored = restore(plan, rank, snapshot)?;
+        let restored = restore(plan, rank, snapshot)?.map_err(RunError::Snapshot);
+        let is_damage = |error: &&RunError| matches!(error, RunError::Snapshot(error) if error.is_damage());
         // What cannot be read just now is no reason to give it up.
-        let (unreadable, restored) = match restored {
-            Err(error) if !error.is_damage() => (Some(RunError::Snapshot(error)), None),
-            restored => (None, Some(restored.map_err(RunError::Snapshot))),
-        };
-        handshake::all_well(transport, unreadable.as_ref())?;
-        let Some(restored) = restored else { unreachable!("all can read it") };
-        match (handshake::all_well(transport, restored.as_ref().err()), restored) {
+        handshake::all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
+        let error = match (handshake::all_well(transport, restored.as_ref().err()), restored) {
             (Ok(()), Ok(world)) => return Ok(Beginning { world, resumed: Some(snapshot.step()) }),
-            (Err(Refusal::Known(error)), _) if snapshots.peek().is_some() => {
-                if rank == Rank(0) {
-                    let step = snapshots.peek().map_or(0, |snapshot| snapshot.step());
-                    complain(&format!("{error}; going on after step {step} instead"));
-                }
-            }
-            (Err(Refusal::Known(error)), _) => {
-                return Err(RankError::Agreed { text: format!("{error}; {NO_OLDER}"), exit: error.exit() });
-            }
+            (Ok(()), Err(error)) | (Err(Refusal::Known(error)), _) => error,
             (Err(refusal), _) => return Err(refusal.into()),
-            (Ok(()), Err(_)) => unreachable!("all are well"),
+        };
+        let Some(next) = snapshots.peek().map(|next| next.step()) else {
+            return Err(RankError::Agreed { text: format!("{error}; {NO_OTHER}"), exit: error.exit() });
+        };
+        if rank == Rank(0) {
+            complain(&format!("{error}; going on after step {next} instead"));
         }
     }
     Ok(Beginning { world: scene(plan, rank)?, resumed: None })

@@ -169,8 +169,10 @@ fn run<T: Transport>(
         progress.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
+    // Whoever asks while the last step is made gets all of them.
+    let interrupted = last.stopped && *complete < steps;
     let output_time = match recorder {
-        Some(recorder) => output::finish(recorder, &world, last.stopped, plan, halo.transport())?,
+        Some(recorder) => output::finish(recorder, &world, interrupted, plan, halo.transport())?,
         None => Duration::ZERO,
     };
     progress.finish();
@@ -178,6 +180,7 @@ fn run<T: Transport>(
 
     let sent = halo.transport().stats().since(&before);
     let mut facts = RankFacts::new(&world, &last, &plan.scene);
+    facts.interrupted = interrupted.into();
     facts.migrations = migrations;
     facts.resumed_at = resumed.unwrap_or(0);
     (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);

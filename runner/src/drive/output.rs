@@ -5,11 +5,18 @@ use crate::error::RunError;
 use crate::handshake;
 use crate::plan::{Output, Plan};
 use crate::recorder::Recorder;
+use crate::run_folder::RunFolder;
 use crate::snapshot;
 use crate::telemetry::complain;
 use atoll_core::World;
 use atoll_transport::{Collective, Rank, Transport};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Hosts of a cluster may see a new file a little later than the one that wrote it.
+const UNSEEN: Duration = Duration::from_secs(10);
+
+/// A user may wonder after so long.
+const SILENCE: Duration = Duration::from_secs(10);
 
 /// Starts to write, on all ranks or none. What an earlier attempt left after the step from which the run goes on is removed
 /// first.
@@ -20,7 +27,10 @@ pub(super) fn start<'a>(
     transport: &mut impl Transport,
 ) -> Result<Option<Recorder<'a>>, RankError> {
     let Some(output) = &plan.output else { return Ok(None) };
-    let mut claim = output.folder.share(&plan.config.hash(plan.tiles));
+    let token = if rank == Rank(0) { output.folder.token().unwrap_or_default() } else { Vec::new() };
+    let token = transport.all_gather(&token).map_err(RankError::Transport)?.swap_remove(0);
+    // Others wait for the one that waits.
+    let mut claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2));
     if rank == Rank(0)
         && claim.is_ok()
         && let Err(error) = output.folder.remove_after(resumed)
@@ -44,16 +54,13 @@ pub(super) fn finish(
     transport: &mut impl Transport,
 ) -> Result<Duration, RankError> {
     let Output { folder, every, .. } = recorder.output();
+    let patience = plan.config.run.peer_timeout / 4;
+    together(transport, folder, || recorder.has_room(patience))?;
     if stopped || every.checkpoint_every.is_some() {
         recorder.snapshot(world);
     }
     let kept = recorder.snapshot_before();
-    // However slow the disk of one is, the others hear of it.
-    let mut done = false;
-    while !done {
-        let own = [u8::from(recorder.close(plan.config.run.peer_timeout / 4))];
-        done = transport.all_gather(&own).map_err(RankError::Transport)?.iter().all(|rank| rank == &[1]);
-    }
+    together(transport, folder, || recorder.close(patience))?;
     let time = recorder.time();
     let trouble = recorder.failure().map(|why| RunError::StoppedWriting {
         why: why.to_string(),
@@ -68,4 +75,19 @@ pub(super) fn finish(
         complain(&format!("old snapshots stay in {}: {error}", folder.snapshots().display()));
     }
     Ok(time)
+}
+
+/// Waits until `done` says so on all ranks: however slow the disk of one is, the others hear of it.
+fn together(
+    transport: &mut impl Transport,
+    folder: &RunFolder,
+    mut done: impl FnMut() -> bool,
+) -> Result<(), RankError> {
+    let (start, mut told) = (Instant::now(), false);
+    while !transport.all_gather(&[u8::from(done())]).map_err(RankError::Transport)?.iter().all(|rank| rank == &[1]) {
+        if transport.rank() == Rank(0) && start.elapsed() > SILENCE && !std::mem::replace(&mut told, true) {
+            complain(&format!("waiting for what is written to {}", folder.path().display()));
+        }
+    }
+    Ok(())
 }

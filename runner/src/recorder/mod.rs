@@ -107,6 +107,15 @@ impl<'a> Recorder<'a> {
         self.time += start.elapsed();
     }
 
+    /// Waits until a snapshot can be taken without waiting for the disk, but no longer than `patience`, and says whether it
+    /// can.
+    pub fn has_room(&mut self, patience: Duration) -> bool {
+        let start = Instant::now();
+        let room = self.saves.wait(patience);
+        self.time += start.elapsed();
+        room
+    }
+
     /// Takes a snapshot unless the last one is of this step.
     pub fn snapshot(&mut self, world: &World) {
         let step = world.step_count();

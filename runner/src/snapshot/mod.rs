@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// What to do where a damaged snapshot was the last hope.
-pub const NO_OLDER: &str = "no older snapshot is whole: begin anew with --out and --overwrite";
+pub const NO_OTHER: &str = "no other snapshot is whole: begin anew with --out and --overwrite";
 
 /// Why a snapshot cannot be used, or found.
 #[derive(Debug, Error)]
@@ -74,7 +74,7 @@ pub enum SnapshotError {
         expected: String,
     },
     /// Whatever was written is damaged.
-    #[error("{why}; {NO_OLDER}")]
+    #[error("{why}; {NO_OTHER}")]
     NoneWhole {
         /// What is wrong with the newest.
         why: Box<SnapshotError>,

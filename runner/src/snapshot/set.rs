@@ -72,6 +72,11 @@ impl Snapshot {
         self.files[0].facts.step
     }
 
+    /// Columns and rows of tiles.
+    pub fn tiles(&self) -> [u32; 2] {
+        self.files[0].facts.tiles
+    }
+
     /// Bodies of each tile.
     pub fn weights(&self) -> Vec<u64> {
         self.places.iter().map(|&(file, place)| self.files[file as usize].blocks[place as usize].bodies).collect()

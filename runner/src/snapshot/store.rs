@@ -64,35 +64,39 @@ fn folders(snapshots: &Path) -> io::Result<BTreeMap<u64, PathBuf>> {
 pub struct Found {
     /// Snapshots whose index is whole, the newest first.
     pub snapshots: Vec<Snapshot>,
-    /// What is wrong with those that are newer than the oldest of them.
-    pub damaged: Vec<SnapshotError>,
+    /// What is wrong with others.
+    pub unusable: Vec<SnapshotError>,
 }
 
-/// Finds the snapshots of a run. Those that were not complete when the run ended are passed over.
+/// Finds the snapshots of a run with this identity and these tiles. Those that were not complete when the run ended are passed
+/// over.
 ///
 /// # Errors
-/// If there are some and all are damaged, or one cannot be read, or is of another version or
-/// run than that of this identity.
-pub fn find(snapshots: &Path, identity: &str) -> Result<Found, SnapshotError> {
+/// If there are some and all are damaged, or the newest that is not cannot be read, or is of another version or run.
+pub fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, SnapshotError> {
     let mut found = Found::default();
     let folders = folders(snapshots).map_err(|error| SnapshotError::read(snapshots, &error))?;
     for (&step, folder) in folders.iter().rev() {
-        match Snapshot::open(folder) {
-            Ok(Some(snapshot)) if snapshot.step() == step => {
-                snapshot.check_identity(identity)?;
-                found.snapshots.push(snapshot);
-            }
-            Ok(Some(snapshot)) => {
-                let reason = format!("it is of step {}", snapshot.step());
-                found.damaged.push(SnapshotError::damaged(folder, reason));
-            }
+        let opened = Snapshot::open(folder).and_then(|snapshot| {
+            let Some(snapshot) = snapshot else { return Ok(None) };
+            snapshot.check_identity(identity)?;
+            let reason = match (snapshot.step(), snapshot.tiles()) {
+                (found, _) if found != step => format!("it is of step {found}"),
+                (_, found) if found != tiles => format!("it is of {} x {} tiles", found[0], found[1]),
+                _ => return Ok(Some(snapshot)),
+            };
+            Err(SnapshotError::damaged(folder, reason))
+        });
+        match opened {
+            Ok(Some(snapshot)) => found.snapshots.push(snapshot),
             Ok(None) => {}
-            Err(error) if error.is_damage() => found.damaged.push(error),
+            // Where there is a newer one, nobody may ever want this.
+            Err(error) if error.is_damage() || !found.snapshots.is_empty() => found.unusable.push(error),
             Err(error) => return Err(error),
         }
     }
-    if found.snapshots.is_empty() && !found.damaged.is_empty() {
-        return Err(SnapshotError::NoneWhole { why: Box::new(found.damaged.swap_remove(0)) });
+    if found.snapshots.is_empty() && !found.unusable.is_empty() {
+        return Err(SnapshotError::NoneWhole { why: Box::new(found.unusable.swap_remove(0)) });
     }
     Ok(found)
 }

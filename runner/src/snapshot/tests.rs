@@ -53,8 +53,8 @@ fn file(folder: &TempDir, step: u64, rank: u32) -> PathBuf {
 
 /// Goes on from the newest snapshot that can be restored, on one rank, and says from which step; or what is wrong.
 fn go_on(plan: &Plan, folder: &TempDir, expected: Hashes) -> Result<(u64, Vec<String>), SnapshotError> {
-    let found = find(folder.path(), &identity(plan))?;
-    let mut passed_over: Vec<String> = found.damaged.iter().map(ToString::to_string).collect();
+    let found = find(folder.path(), &identity(plan), plan.tiles)?;
+    let mut passed_over: Vec<String> = found.unusable.iter().map(ToString::to_string).collect();
     for snapshot in &found.snapshots {
         let mut world = World::new(&plan.blueprint, &[0, 1, 2, 3].map(TileId)).unwrap();
         match snapshot.restore(&mut world) {
@@ -74,7 +74,7 @@ fn the_newest_is_used() {
     let plan = plan(&[]);
     let (folder, hashes) = two(&plan);
     assert_eq!(go_on(&plan, &folder, hashes).unwrap(), (8, vec![]));
-    let found = find(folder.path(), &identity(&plan)).unwrap();
+    let found = find(folder.path(), &identity(&plan), plan.tiles).unwrap();
     assert_eq!(found.snapshots[0].weights().iter().sum::<u64>(), 12);
     found.snapshots[0].check().unwrap();
 }
@@ -91,8 +91,8 @@ fn no_changed_byte_goes_unnoticed() {
         let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
         assert_eq!((step, passed_over.len()), (4, 1), "{what}: {passed_over:?}");
         assert!(passed_over[0].starts_with(&name), "{what}: {passed_over:?}");
-        let found = find(folder.path(), &identity(&plan)).unwrap();
-        assert!(found.damaged.len() == 1 || found.snapshots[0].check().is_err(), "{what}");
+        let found = find(folder.path(), &identity(&plan), plan.tiles).unwrap();
+        assert!(found.unusable.len() == 1 || found.snapshots[0].check().is_err(), "{what}");
     };
     for place in 0..bytes.len() {
         let mut changed = bytes.clone();
@@ -128,12 +128,12 @@ fn what_was_not_complete_is_passed_over_and_what_is_all_damaged_is_told() {
     fs::write(file(&folder, 4, 0), "not what was written").unwrap();
     let error = go_on(&plan, &folder, hashes).unwrap_err().to_string();
     assert!(
-        error.contains(&file(&folder, 4, 0).display().to_string()) && error.contains("no older snapshot"),
+        error.contains(&file(&folder, 4, 0).display().to_string()) && error.contains("no other snapshot"),
         "{error}"
     );
     fs::remove_file(file(&folder, 4, 0)).unwrap();
-    assert!(find(folder.path(), &identity(&plan)).unwrap().snapshots.is_empty());
-    assert!(find(&folder.path().join("none"), &identity(&plan)).unwrap().snapshots.is_empty());
+    assert!(find(folder.path(), &identity(&plan), plan.tiles).unwrap().snapshots.is_empty());
+    assert!(find(&folder.path().join("none"), &identity(&plan), plan.tiles).unwrap().snapshots.is_empty());
 }
 
 #[test]
@@ -183,13 +183,34 @@ fn an_index_that_was_forged_with_its_checksum_is_no_use() {
     }
     let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
     assert!(step == 4 && passed_over[0].ends_with("not those of its grid"), "{passed_over:?}");
+    // As many tiles, and not those of the run.
+    for rank in [0, 1] {
+        let path = file(&folder, 8, rank);
+        let bytes = fs::read(&path).unwrap();
+        file::tests::rewrite_facts(&path, &bytes, |facts| facts.replace("[4294967295,4294967295]", "[4,1]"));
+    }
+    let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
+    assert!(step == 4 && passed_over[0].ends_with("it is of 4 x 1 tiles"), "{passed_over:?}");
     // Wherever it lies, it is a snapshot; but not that of another step.
     let elsewhere = folder.path().join("copy");
     fs::rename(folder.path().join(store::folder_name(4)), &elsewhere).unwrap();
     Snapshot::open(&elsewhere).unwrap().unwrap().check().unwrap();
     fs::rename(elsewhere, folder.path().join(store::folder_name(6))).unwrap();
-    let error = find(folder.path(), &identity(&plan)).unwrap_err().to_string();
-    assert!(error.contains("no older snapshot is whole"), "{error}");
+    let error = find(folder.path(), &identity(&plan), plan.tiles).unwrap_err().to_string();
+    assert!(error.contains("no other snapshot is whole"), "{error}");
+}
+
+#[test]
+fn nobody_wants_what_is_older_than_a_whole_one() {
+    let plan = plan(&[]);
+    let (folder, hashes) = two(&plan);
+    let old = folder.path().join(store::folder_name(4));
+    fs::remove_dir_all(&old).unwrap();
+    fs::write(&old, "no folder, which is no damage").unwrap();
+    let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
+    assert!(step == 8 && passed_over[0].starts_with(&old.display().to_string()), "{passed_over:?}");
+    fs::remove_dir_all(folder.path().join(store::folder_name(8))).unwrap();
+    assert!(!go_on(&plan, &folder, hashes).unwrap_err().is_damage());
 }
 
 #[test]
@@ -201,7 +222,7 @@ fn snapshots_are_removed_by_step() {
     }
     fs::create_dir(folder.path().join("mine")).unwrap();
     let steps = || {
-        let found = find(folder.path(), &identity(&plan)).unwrap();
+        let found = find(folder.path(), &identity(&plan), plan.tiles).unwrap();
         found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>()
     };
     remove_before(folder.path(), 4).unwrap();

@@ -1,13 +1,13 @@
 //! What the summary in a run's folder says about how it ended.
 
 use super::TrajectoryError;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
 /// A run that has come to its end, or was told to stop and did so in order.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, Serialize)]
 pub struct Ended {
     /// Steps made.
     pub steps: u64,
@@ -17,6 +17,12 @@ pub struct Ended {
     pub state_hash: Option<String>,
     /// Hash of the contacts of its last state, as it was written.
     pub contact_hash: Option<String>,
+    /// Bodies it began with.
+    #[serde(default)]
+    pub bodies: u64,
+    /// How many of them were missing at its end.
+    #[serde(default)]
+    pub bodies_lost: i64,
 }
 
 impl Ended {
@@ -49,9 +55,11 @@ mod tests {
             Ended::read(folder.path()).map(Option::unwrap).map_err(|error| error.to_string())
         };
         let [state_hash, contact_hash] = ["00ff", "ff00"].map(|hash| Some(hash.to_owned()));
-        let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff", "contact_hash": "ff00"}"#;
-        assert_eq!(read(whole), Ok(Ended { steps: 7, interrupted: false, state_hash, contact_hash }));
-        let short = Ended { steps: 8, interrupted: true, state_hash: None, contact_hash: None };
+        let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff", "contact_hash": "ff00",
+            "bodies": 9, "bodies_lost": -1}"#;
+        let expected = Ended { steps: 7, interrupted: false, state_hash, contact_hash, bodies: 9, bodies_lost: -1 };
+        assert_eq!(read(whole), Ok(expected));
+        let short = Ended { steps: 8, interrupted: true, ..Ended::default() };
         assert_eq!(read(r#"{"steps": 8, "interrupted": true}"#), Ok(short));
         for damaged in ["", "{", "[]", r#"{"steps": 7}"#, r#"{"steps": -1, "interrupted": true}"#] {
             let error = read(damaged).unwrap_err();

@@ -53,7 +53,9 @@ pub struct RecordEntry {
     pub rows: u64,
     /// Its row group, if it has any rows.
     group: usize,
-    /// Of the bytes of its row group.
+    /// Where that lies in the file.
+    bytes: Range<u64>,
+    /// Of those bytes.
     checksum: u64,
 }
 
@@ -80,13 +82,13 @@ impl Segment {
         let (rank, ranks) = (parse(text, "rank").map_err(bad)?, parse(text, "ranks").map_err(bad)?);
         let steps: String = parse(text, "steps").map_err(bad)?;
         let records = entries(&steps).ok_or("atoll.steps is unreadable").map_err(|text| bad(text.to_owned()))?;
-        let segment = Self { path: path.to_owned(), facts, rank, ranks, records, file: Arc::new(file), metadata };
+        let mut segment = Self { path: path.to_owned(), facts, rank, ranks, records, file: Arc::new(file), metadata };
         segment.check(length).map_err(|reason| bad(reason.to_owned()))?;
         Ok(segment)
     }
 
-    /// Whether all that the metadata says can be.
-    fn check(&self, length: u64) -> Result<(), &'static str> {
+    /// Whether all that the metadata says can be. Finds where the records lie.
+    fn check(&mut self, length: u64) -> Result<(), &'static str> {
         let (first, last) = self.records.first().zip(self.records.last()).ok_or("it holds no record")?;
         let name = self.path.file_name().and_then(|name| name.to_str());
         if name.and_then(steps_of_segment) != Some((first.step, last.step)) {
@@ -101,20 +103,21 @@ impl Segment {
         if self.records.iter().any(|record| record.step % self.facts.record_every != 0) {
             return Err("it holds a step that was not to be recorded");
         }
-        let rows = self.records.iter().map(|record| record.rows).filter(|rows| *rows > 0);
         let groups = self.metadata.row_groups();
-        if !rows.clone().eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
+        let rows = self.records.iter().map(|record| record.rows).filter(|rows| *rows > 0);
+        if !rows.eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
             return Err("it holds other row groups than it says");
         }
         let mut at = START;
-        for (group, rows) in groups.iter().zip(rows) {
+        for (group, record) in groups.iter().zip(self.records.iter_mut().filter(|record| record.rows > 0)) {
             let range = range(group, at).filter(|range| range.end <= length);
             let range = range.ok_or("its columns do not lie as written")?;
             // However alike its bodies are, a row takes at least 1.5 bytes: no small file can ask for much memory.
-            if rows > range.end - range.start {
+            if record.rows > range.end - range.start {
                 return Err("it has more rows than they have bytes");
             }
             at = range.end;
+            record.bytes = range;
         }
         Ok(())
     }
@@ -127,7 +130,7 @@ impl Segment {
         if record.rows == 0 {
             return Ok(());
         }
-        let checksum = self.checksum(record.group);
+        let checksum = self.checksum(record);
         let checksum =
             checksum.map_err(|error| TrajectoryError::Read { path: self.path.clone(), reason: error.to_string() })?;
         if checksum != record.checksum {
@@ -140,14 +143,12 @@ impl Segment {
         }
     }
 
-    /// Of the bytes of a row group.
-    fn checksum(&self, group: usize) -> io::Result<u64> {
-        let groups = self.metadata.row_groups();
-        let end = |at, group| range(group, at).map_or(at, |range| range.end);
-        let start = groups[..group].iter().fold(START, end);
+    /// Of the bytes of a record.
+    fn checksum(&self, record: &RecordEntry) -> io::Result<u64> {
+        let Range { start, end } = record.bytes;
         let mut file = self.file.as_ref();
         file.seek(SeekFrom::Start(start))?;
-        let mut bytes = file.take(end(start, &groups[group]) - start);
+        let mut bytes = file.take(end - start);
         let mut hash = Xxh3Default::new();
         let mut buffer = vec![0; 1 << 16];
         loop {
@@ -227,7 +228,7 @@ fn entries(text: &str) -> Option<Vec<RecordEntry>> {
         let step: u32 = parts.next()?.parse().ok()?;
         let rows = parts.next()?.parse().ok()?;
         let checksum = u64::from_str_radix(parts.next()?, 16).ok()?;
-        let entry = RecordEntry { step: step.into(), rows, group, checksum };
+        let entry = RecordEntry { step: step.into(), rows, group, bytes: START..START, checksum };
         group += usize::from(rows > 0);
         parts.next().is_none().then_some(entry)
     });
