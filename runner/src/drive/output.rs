@@ -30,15 +30,12 @@ pub(super) fn start<'a>(
     let token = if rank == Rank(0) { output.folder.token().unwrap_or_default() } else { Vec::new() };
     let token = transport.all_gather(&token).map_err(RankError::Transport)?.swap_remove(0);
     // Others wait for the one that waits.
-    let mut claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2));
-    if rank == Rank(0)
-        && claim.is_ok()
-        && let Err(error) = output.folder.remove_after(resumed)
-    {
-        claim = Err(output.folder.not_writable(&error));
-    }
-    // Nobody writes before it is done.
+    let claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2));
     handshake::all_well(transport, claim.as_ref().err())?;
+    let removed = if rank == Rank(0) { output.folder.remove_after(resumed) } else { Ok(()) };
+    // Nobody writes before it is done.
+    let trouble = removed.err().map(|error| output.folder.not_writable(&error));
+    handshake::all_well(transport, trouble.as_ref())?;
     let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
     handshake::all_well(transport, recorder.as_ref().err())?;
     Ok(recorder.ok())
