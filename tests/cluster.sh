@@ -70,8 +70,9 @@ make_hosts() {
         ip -n "$tag-$host" link set eth0 up
         ip -n "$tag-$host" link set lo up
         # How often a host sends again what is not acknowledged. By default it goes on for a quarter of an hour, and for so
-        # long mpirun waits for a host that is cut off.
-        ip netns exec "$tag-$host" sh -c 'echo 4 >/proc/sys/net/ipv4/tcp_retries2' || skip 'a /proc/sys that can be written'
+        # long mpirun waits for a host that is cut off. Now it gives up after 12 seconds at the earliest, when the ranks
+        # have long ended; an error of TCP that came first would end the run another way.
+        ip netns exec "$tag-$host" sh -c 'echo 5 >/proc/sys/net/ipv4/tcp_retries2' || skip 'a /proc/sys that can be written'
     done
 }
 
@@ -114,7 +115,7 @@ for exchange in alltoallv sparse; do
     remove_hosts
     make_hosts
     : >"$work/said" # now, and not when the run comes to it: it holds steps of the run before
-    on_the_cluster configs/quickstart.toml --steps 4000000000 --tiles 5x5 --peer-timeout 4 --set mpi_exchange="$exchange" \
+    on_the_cluster configs/quickstart.toml --steps 4000000000 --tiles 5x5 --peer-timeout 2 --set mpi_exchange="$exchange" \
         >"$work/said" 2>&1 &
     run=$!
     for ((i = 0; i < 600; i++)); do

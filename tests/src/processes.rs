@@ -7,6 +7,10 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+/// How the names begin of what the program and its libraries have in shared memory: the program itself, iceoryx2, Open MPI
+/// and MPICH.
+const OURS: [&str; 4] = ["atoll-", "iox2_", "vader_segment.", "mpich_"];
+
 /// What launchers tell each rank in its environment.
 const RANK_VARIABLES: [&str; 3] = ["ATOLL_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK"];
 
@@ -98,14 +102,14 @@ pub fn launcher_names(_: &Ended, _: &RankProcess) -> bool {
     false
 }
 
-/// What is in shared memory, by name, and the folders of runs in theirs.
+/// What runs have in shared memory, by name, and the folders of runs in theirs. Other programs may come and go as they like.
 pub fn shared_memory() -> BTreeSet<String> {
     let names = |folder: &str| {
         let entries = fs::read_dir(folder).into_iter().flatten().flatten();
         entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect::<Vec<_>>()
     };
     let mut all = BTreeSet::new();
-    for name in names("/dev/shm") {
+    for name in names("/dev/shm").into_iter().filter(|name| OURS.iter().any(|start| name.starts_with(start))) {
         let within = names(&format!("/dev/shm/{name}"));
         // A lock, without any run, is one that is just being taken.
         all.extend(within.iter().filter(|run| *run != "lock").map(|run| format!("{name}/{run}")));

@@ -23,6 +23,11 @@ fn rank_program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_ipc_rank"))
 }
 
+/// With a grace that no slow machine makes ranks miss which end by themselves.
+fn options() -> LaunchOptions {
+    LaunchOptions { grace: LIMIT / 2, ..LaunchOptions::default() }
+}
+
 /// Runs `test` on a thread and fails if it does not end. (Its processes end with this one.)
 fn watched<R: Send + 'static>(test: impl FnOnce() -> R + Send + 'static) -> R {
     program::watched("processes that share memory", test)
@@ -53,7 +58,7 @@ impl Processes {
         let path = folder.path().to_str().expect("a UTF-8 path").to_owned();
         let names = cases.iter().map(|case| case.name);
         let arguments: Vec<&str> = ["cases", &path].into_iter().chain(names).collect();
-        let options = LaunchOptions { peer_timeout: cases[0].peer_timeout, ..LaunchOptions::default() };
+        let options = LaunchOptions { peer_timeout: cases[0].peer_timeout, ..options() };
         // What deliberate panics say goes to standard error; the outcomes have it as well.
         let exits = run(size, options, &arguments);
         let outcome = |case: &Case, exit: &RankExit| {
@@ -156,7 +161,7 @@ fn start_rounds(size: usize, count: u64) -> (TempDir, thread::JoinHandle<Vec<Ran
     let arguments = ["rounds".to_owned(), path, count.to_string()];
     let thread = thread::spawn(move || {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        run(size, LaunchOptions::default(), &arguments)
+        run(size, options(), &arguments)
     });
     (folder, thread)
 }
@@ -208,7 +213,7 @@ fn a_rank_that_does_not_join_is_blamed_by_all() {
                 };
                 command
             };
-            let exits = launch(3, LaunchOptions::default(), &|| Control::Run, command).expect("the run starts");
+            let exits = launch(3, options(), &|| Control::Run, command).expect("the run starts");
             for exit in exits.iter().filter(|exit| exit.rank != Rank(1)) {
                 let text = String::from_utf8_lossy(&exit.stdout);
                 assert!(text.starts_with(&format!("lost rank 1: {reason};")), "rank {}: {text}", exit.rank);
@@ -272,7 +277,7 @@ fn ranks_that_are_told_to_stop_agree_where() {
             command.arg("rounds").arg(&path).arg(u64::MAX.to_string());
             command
         };
-        let exits = launch(SIZE, LaunchOptions::default(), &control, command).expect("the run starts");
+        let exits = launch(SIZE, options(), &control, command).expect("the run starts");
         for exit in &exits {
             assert!(exit.status.success(), "{exit:?}");
             assert_eq!(exit.stdout, exits[0].stdout, "ranks stopped in different rounds");
@@ -282,7 +287,7 @@ fn ranks_that_are_told_to_stop_agree_where() {
 
 #[test]
 fn what_does_not_fit_this_machine_is_refused() {
-    let refused = launch(MAX_RANKS + 1, LaunchOptions::default(), &|| Control::Run, |_| rank_program());
+    let refused = launch(MAX_RANKS + 1, options(), &|| Control::Run, |_| rank_program());
     let error = refused.expect_err("too many ranks");
     assert!(matches!(error, LaunchError::Limits(_)));
     assert!(error.to_string().starts_with("65 ranks asked for"), "{error}");
@@ -291,7 +296,7 @@ fn what_does_not_fit_this_machine_is_refused() {
 #[test]
 fn messages_that_do_not_fit_this_machine_end_the_run() {
     watched(|| {
-        let exits = run(3, LaunchOptions::default(), &["grow", &(1_u64 << 50).to_string(), &u64::MAX.to_string()]);
+        let exits = run(3, options(), &["grow", &(1_u64 << 50).to_string(), &u64::MAX.to_string()]);
         for exit in &exits {
             let text = String::from_utf8_lossy(&exit.stdout);
             assert!(
@@ -308,7 +313,7 @@ fn messages_that_do_not_fit_this_machine_end_the_run() {
 fn messages_grow_many_times() {
     watched(|| {
         let grow = |to: &str, rounds: &str| {
-            for exit in run(4, LaunchOptions::default(), &["grow", "1250", to]) {
+            for exit in run(4, options(), &["grow", "1250", to]) {
                 assert_eq!(String::from_utf8_lossy(&exit.stdout), rounds, "rank {}: {}", exit.rank, exit.status);
             }
         };

@@ -74,6 +74,10 @@ fn killed_runs_go_on_elsewhere() {
             let killed = folder.path().join(format!("killed-{w}-{time}"));
             let mut command = way.command(1 + number(0, 4), CONFIG);
             options(&mut command);
+            // Nobody removes what MPI has for a job that is killed with its launcher, so that lies here as well.
+            for variable in ["TMPDIR", "OMPI_MCA_btl_vader_backing_directory"] {
+                command.env(variable, folder.path());
+            }
             // Where nothing is there yet, this begins; so the very same command may be given again.
             let running = Running::start(command.arg("--resume").arg(&killed));
             sleep(Duration::from_secs_f64(duration * noise(100 * w + time, 1)));
@@ -192,18 +196,24 @@ fn a_killed_rank_is_made_good_by_restarts() {
     let mut command = Way::Iceoryx2.command(3, CONFIG);
     command.args(OPTIONS).args(["--steps", "600", "--restarts", "5", "--out"]).arg(&run_folder);
     let running = Running::start(&mut command);
-    for rank in [1, 0] {
-        let ranks = processes::ranks_of(&running, 3);
-        sleep(Duration::from_millis(300));
-        if ranks[rank].lives() {
-            ranks[rank].signal("KILL");
-        }
-        while ranks.iter().any(processes::RankProcess::lives) {
+    let wait_until = |what: &str, holds: &dyn Fn() -> bool| {
+        let deadline = Instant::now() + program::LIMIT;
+        while !holds() {
+            assert!(Instant::now() < deadline, "{what}");
             sleep(Duration::from_millis(2));
         }
+    };
+    for rank in [1, 0] {
+        let newest = || snapshots(&run_folder).last().copied();
+        let (ranks, before) = (processes::ranks_of(&running, 3), newest());
+        // Each time with something new to go on from, and long before the end.
+        wait_until("no new snapshot", &|| newest() > before);
+        ranks[rank].signal("KILL");
+        wait_until("ranks live on", &|| !ranks.iter().any(processes::RankProcess::lives));
     }
     let ended = running.end();
     assert_eq!(ended.code, Some(0), "{ended}");
+    assert!(ended.stderr.contains("starting again (2 of 5 times)"), "{ended}");
     assert_same_end(&run_folder, &whole, "two ranks killed");
 }
 

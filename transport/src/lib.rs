@@ -89,6 +89,7 @@ pub mod local;
 #[cfg(feature = "mpi")]
 pub mod mpi;
 mod origin;
+mod patience;
 mod rank;
 mod stats;
 

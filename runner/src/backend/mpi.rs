@@ -21,7 +21,7 @@ use std::time::Duration;
 const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(150);
 
 /// What a process that finds itself alone leaves to the one that says so.
-const TIME_TO_SPEAK: Duration = Duration::from_secs(2);
+const TIME_TO_SPEAK: Duration = Duration::from_secs(5);
 
 /// This process as a rank of an MPI job.
 ///

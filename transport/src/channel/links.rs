@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, TryRecvError, bounded};
 
 use crate::origin::{Origin, left_early};
+use crate::patience::Patience;
 use crate::{Incoming, Outgoing, Rank, TransportError};
 
 /// Messages that a channel holds. Lockstep leaves at most two unread, so a send never waits. (With none, a
@@ -142,17 +143,17 @@ impl Links {
         for (awaited, receiver) in self.awaited.iter_mut().zip(&self.receivers) {
             *awaited = receiver.is_some();
         }
+        let mut patience = Patience::new();
         for from in Rank::all(self.size()) {
             while self.awaited[from.index()] {
-                let left = self.peer_timeout.saturating_sub(started.elapsed());
+                let left = self.peer_timeout.saturating_sub(patience.waited());
                 match self.receiver(from).recv_timeout(left.min(SLICE)) {
                     Ok(frame) => self.accept(from, frame, incoming),
                     Err(RecvTimeoutError::Disconnected) => return Err(left_early(from)),
                     Err(RecvTimeoutError::Timeout) => {
                         self.sweep(incoming)?;
-                        let waited = started.elapsed();
-                        if self.awaited[from.index()] && waited >= self.peer_timeout {
-                            return Err(TransportError::Timeout { rank: from, waited });
+                        if self.awaited[from.index()] && patience.waited() >= self.peer_timeout {
+                            return Err(TransportError::Timeout { rank: from, waited: started.elapsed() });
                         }
                     }
                 }

@@ -5,16 +5,18 @@ use std::time::{Duration, Instant};
 
 use super::rounds::round;
 use super::{LONG, victim};
+use crate::patience::Patience;
 use crate::{Incoming, Transport, TransportError};
 
 /// What the victim says when it panics or aborts, as a panic text or a reason.
 pub(super) const DELIBERATE: &str = "lost on purpose";
 
 /// The peer timeout of the case that reaches it.
-pub(super) const SILENT_PEER_TIMEOUT: Duration = Duration::from_millis(600);
+pub(super) const SILENT_PEER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long the silent rank is silent. The others have by far the most of it to notice.
-const SILENCE: Duration = Duration::from_secs(4);
+/// How long the silent rank is silent. The others have by far the most of it to notice, also where they take a second
+/// more to ask each other.
+const SILENCE: Duration = Duration::from_secs(5);
 
 /// Rounds that all ranks complete before the loss.
 const GOOD_ROUNDS: u64 = 3;
@@ -82,7 +84,11 @@ pub(super) fn peer_aborts(transport: &mut dyn Transport) {
 
 pub(super) fn silent_peer(transport: &mut dyn Transport) {
     if good_rounds(transport) {
-        sleep(SILENCE);
+        // By the clock of those who wait for it: a machine that stops stops both.
+        let mut patience = Patience::new();
+        while patience.waited() < SILENCE {
+            sleep(Duration::from_millis(10));
+        }
         let error = round(transport, &mut Incoming::default(), GOOD_ROUNDS, |_, _| 8).expect_err("the others gave up");
         assert_ne!(error.blamed(), Some(transport.rank()), "a rank is not lost to itself: {error}");
     } else {

@@ -14,6 +14,7 @@ use super::record::Record;
 use crate::error::Aborted;
 use crate::frame::{Header, LoanedFrame, Message};
 use crate::origin::{LEFT_EARLY, Origin};
+use crate::patience::Patience;
 use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
 
 /// How long a rank sleeps before it looks for itself whether all is well. It is woken for everything it should know.
@@ -172,6 +173,7 @@ impl Iceoryx2 {
     /// Receives one message from every other rank.
     fn receive(&mut self, incoming: &mut Incoming, started: Instant) -> Result<(), TransportError> {
         let rank = self.standing.rank;
+        let mut patience = Patience::new();
         let mut missing = self.standing.size as u32 - 1;
         for from in self.standing.others() {
             self.awaited[from.index()] = true;
@@ -199,10 +201,10 @@ impl Iceoryx2 {
                 return Ok(());
             }
             self.standing.check_launcher()?;
-            let (waited, timeout) = (started.elapsed(), self.standing.timeout);
+            let (waited, timeout) = (patience.waited(), self.standing.timeout);
             if waited >= timeout {
                 let silent = self.awaited.iter().position(|&awaited| awaited).unwrap_or_default();
-                return Err(TransportError::Timeout { rank: Rank::from_index(silent), waited });
+                return Err(TransportError::Timeout { rank: Rank::from_index(silent), waited: started.elapsed() });
             }
             self.standing.board.wait(rank, rung, missing, SLICE.min(timeout - waited), self.standing.spin);
         }

@@ -347,12 +347,18 @@ mod tests {
 
     #[test]
     fn the_others_hear_of_an_end_and_are_killed_after_the_grace() {
-        let options = LaunchOptions { grace: Duration::from_millis(200), ..LaunchOptions::default() };
-        let script = |rank: Rank| if rank == Rank(1) { "kill -9 $$" } else { "read line; echo $line; sleep 1000" };
-        let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();
-        assert_eq!((exits[1].status.signal(), exits[1].killed), (Some(9), false));
-        assert_eq!((exits[0].status.signal(), exits[0].killed), (Some(9), true));
-        assert_eq!(exits[0].stdout, b"ended 1 it was killed by signal 9\n");
+        let exits = |grace, other: &str| {
+            let options = LaunchOptions { grace, ..LaunchOptions::default() };
+            let script = |rank: Rank| if rank == Rank(1) { "kill -9 $$" } else { other };
+            let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();
+            assert_eq!((exits[1].status.signal(), exits[1].killed), (Some(9), false));
+            exits
+        };
+        let heard = exits(Duration::from_secs(60), "read line; echo $line");
+        assert_eq!((heard[0].status.code(), heard[0].killed), (Some(0), false));
+        assert_eq!(heard[0].stdout, b"ended 1 it was killed by signal 9\n");
+        let killed = exits(Duration::from_millis(200), "sleep 1000");
+        assert_eq!((killed[0].status.signal(), killed[0].killed), (Some(9), true));
     }
 
     #[test]
@@ -362,8 +368,9 @@ mod tests {
             looks.set(looks.get() + 1);
             if looks.get() > 5 { Control::Stop } else { Control::Run }
         };
-        // It listens for much longer than the launcher takes to look again.
-        let exits = launch(1, LaunchOptions::default(), &control, |_| shell("timeout 0.5 cat")).unwrap();
+        // It listens on for much longer than the launcher takes to look again.
+        let script = "read line; echo $line; timeout 0.5 cat";
+        let exits = launch(1, LaunchOptions::default(), &control, |_| shell(script)).unwrap();
         assert_eq!(exits[0].stdout, b"stop\n", "{exits:?}");
 
         let exits = launch(2, LaunchOptions::default(), &|| Control::Quit, |_| shell("sleep 1000")).unwrap();

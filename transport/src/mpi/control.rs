@@ -8,6 +8,7 @@ use super::notice::Notice;
 use super::pause::{awake, pause};
 use super::raw::{Communicator, Pending};
 use crate::origin::left_early;
+use crate::patience::Patience;
 use crate::{Rank, TransportError};
 
 /// The only tag of notices.
@@ -20,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(1);
 const ANSWER: Duration = Duration::from_secs(1);
 
 /// How much longer a rank waits for the verdict of a lower one that lives, so that one of them speaks for all.
-const DEFERENCE: Duration = Duration::from_secs(1);
+const DEFERENCE: Duration = Duration::from_secs(2);
 
 /// Ranks that end within so short a time do not tell each other.
 const TELL_AFTER: Duration = Duration::from_millis(20);
@@ -228,21 +229,25 @@ impl Watch {
 
     /// Asks all others for a sign of life and blames one, unless everything is found after all.
     fn inquire(&mut self, started: Instant, find: &mut impl FnMut() -> Found) -> Result<(), TransportError> {
-        let asked = Instant::now();
         self.inquiry += 1;
         self.answers.fill(None);
         self.answers[self.communicator.rank().index()] = Some(self.rounds);
         self.tell_all(&Notice::Ping { number: self.inquiry });
         let own = self.communicator.rank();
-        let lower_lives = |answers: &[Option<u64>]| answers[..own.index()].iter().any(Option::is_some);
-        while asked.elapsed() < ANSWER || lower_lives(&self.answers) && asked.elapsed() < ANSWER + DEFERENCE {
+        let mut patience = Patience::new();
+        loop {
+            let waited = patience.waited();
             if find() == Found::All {
                 return Ok(());
             }
             self.look()?;
+            let lower_lives = self.answers[..own.index()].iter().any(Option::is_some);
+            // Judged by what was found since: an answer or a verdict may have come while this rank was stopped.
+            if waited >= if lower_lives { ANSWER + DEFERENCE } else { ANSWER } {
+                return Err(blame(own, &self.answers, self.rounds, started.elapsed()));
+            }
             thread::sleep(LOOK);
         }
-        Err(blame(own, &self.answers, self.rounds, started.elapsed()))
     }
 
     fn tell(&mut self, rank: Rank, notice: &Notice) {
