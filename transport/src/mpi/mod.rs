@@ -63,12 +63,8 @@ const ABORT_LIMIT: Duration = Duration::from_secs(3);
 /// How long a rank stays that ends the job, because some launchers lose what was printed just before.
 const LAST_WORDS: Duration = Duration::from_millis(100);
 
-/// The longest that it stays before that, until the launcher has read what was printed, or, where another rank has told
-/// this one why the run is over, until that one has said so and ends the job itself.
+/// How long a rank stays that another has told why the run is over: that one says so, and ends the job itself.
 const HEARING: Duration = Duration::from_secs(3);
-
-/// Between two looks at whether it was read.
-const HEARING_POLL: Duration = Duration::from_millis(1);
 
 /// How a round is exchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -249,12 +245,10 @@ impl Mpi {
     }
 
     /// Ends all processes of the job, with this exit code, and says nothing. Once the endpoint is closed, this process
-    /// alone. Before that it gives the launcher time to read what was printed, and the rank that has told this one why the
-    /// run is over the time to say so.
+    /// alone.
     pub fn abort_with(&mut self, code: i32) -> ! {
-        let started = Instant::now();
-        while (self.told_by_other || raw::errors_unread()) && started.elapsed() < HEARING {
-            thread::sleep(HEARING_POLL);
+        if self.told_by_other {
+            thread::sleep(HEARING);
         }
         // If no thread can be had, there is still the library.
         let _ = thread::Builder::new().spawn(move || {

@@ -6,12 +6,8 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{c_int, c_void};
-use std::fs::File;
-use std::io::stderr;
 use std::mem::{ManuallyDrop, MaybeUninit, forget, take};
 use std::ops::Range;
-use std::os::fd::{AsFd, AsRawFd};
-use std::os::unix::fs::FileTypeExt;
 
 use ::mpi::Threading;
 use ::mpi::environment::Universe;
@@ -55,18 +51,6 @@ pub(super) fn abort_job(code: i32) {
 pub(super) fn exit_at_once(code: i32) -> ! {
     // SAFETY: takes no memory and does not return.
     unsafe { libc::_exit(code) }
-}
-
-/// Whether this process's standard error is a pipe in which something waits to be read.
-pub(super) fn errors_unread() -> bool {
-    let errors = stderr().as_fd().try_clone_to_owned().map(File::from);
-    let Ok(pipe) = errors.and_then(|file| Ok(file.metadata()?.file_type().is_fifo().then_some(file))) else {
-        return false;
-    };
-    let mut unread: c_int = 0;
-    // SAFETY: writes the number of bytes to that memory, or nothing.
-    pipe.is_some_and(|pipe| unsafe { libc::ioctl(pipe.as_raw_fd(), libc::FIONREAD, &raw mut unread) } == 0)
-        && unread > 0
 }
 
 /// A number of bytes as the library counts them.
