@@ -138,7 +138,7 @@ pub fn compare(
         }
         compared(steps.len(), count);
     }
-    let sides = [Side::new(&a)?, Side::new(&b)?];
+    let sides = [Side::new(&a), Side::new(&b)];
     let made = sides.each_ref().map(|side| side.ended.as_ref().map(|ended| ended.steps));
     let alike = only_in_a.is_empty()
         && only_in_b.is_empty()
@@ -169,14 +169,14 @@ impl Comparison {
 }
 
 impl Side {
-    fn new(trajectory: &Trajectory) -> Result<Self, TrajectoryError> {
-        Ok(Self {
+    fn new(trajectory: &Trajectory) -> Self {
+        Self {
             folder: trajectory.folder().to_owned(),
             version: trajectory.facts().version.clone(),
             records: trajectory.steps().len(),
             incomplete: trajectory.incomplete(),
-            ended: Ended::read(trajectory.folder())?,
-        })
+            ended: trajectory.ended().cloned(),
+        }
     }
 }
 

@@ -176,19 +176,18 @@ fn another_version_is_refused_and_no_damage() {
 fn an_index_that_was_forged_with_its_checksum_is_no_use() {
     let plan = plan(&[]);
     let (folder, hashes) = two(&plan);
-    for rank in [0, 1] {
-        let path = file(&folder, 8, rank);
-        let bytes = fs::read(&path).unwrap();
-        file::tests::rewrite_facts(&path, &bytes, |facts| facts.replace("[2,2]", "[4294967295,4294967295]"));
-    }
+    let forge = |from: &str, to: &str| {
+        for rank in [0, 1] {
+            let path = file(&folder, 8, rank);
+            let bytes = fs::read(&path).unwrap();
+            file::tests::rewrite_facts(&path, &bytes, |facts| facts.replace(from, to));
+        }
+    };
+    forge("[2,2]", "[4294967295,4294967295]");
     let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
     assert!(step == 4 && passed_over[0].ends_with("not those of its grid"), "{passed_over:?}");
     // As many tiles, and not those of the run.
-    for rank in [0, 1] {
-        let path = file(&folder, 8, rank);
-        let bytes = fs::read(&path).unwrap();
-        file::tests::rewrite_facts(&path, &bytes, |facts| facts.replace("[4294967295,4294967295]", "[4,1]"));
-    }
+    forge("[4294967295,4294967295]", "[4,1]");
     let (step, passed_over) = go_on(&plan, &folder, hashes).unwrap();
     assert!(step == 4 && passed_over[0].ends_with("it is of 4 x 1 tiles"), "{passed_over:?}");
     // Wherever it lies, it is a snapshot; but not that of another step.

@@ -19,6 +19,7 @@ pub struct Trajectory {
     parts: Vec<Part>,
     steps: Vec<u64>,
     incomplete: usize,
+    ended: Option<Ended>,
 }
 
 /// What one rank recorded of one step.
@@ -66,7 +67,8 @@ impl Trajectory {
         let nothing = || TrajectoryError::Nothing { path: folder.to_owned() };
         let (_, facts) = last.ok_or_else(nothing)?;
         parts.sort_by_key(|part| (part.step, part.rank));
-        let mut trajectory = Self { folder: folder.to_owned(), facts, files, parts, steps: Vec::new(), incomplete: 0 };
+        let (folder, ended) = (folder.to_owned(), Ended::read(folder)?);
+        let mut trajectory = Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended };
         (trajectory.steps, trajectory.incomplete) = trajectory.find_complete()?;
         if trajectory.steps.is_empty() { Err(nothing()) } else { Ok(trajectory) }
     }
@@ -94,6 +96,11 @@ impl Trajectory {
     /// Steps after the last record that only some ranks hold: the run was killed before all had written them.
     pub fn incomplete(&self) -> usize {
         self.incomplete
+    }
+
+    /// What the run's summary says, once it has ended.
+    pub fn ended(&self) -> Option<&Ended> {
+        self.ended.as_ref()
     }
 
     /// Replaces `rows` with the bodies of one record: those of each rank in turn, in the order of its tiles.
@@ -136,7 +143,7 @@ impl Trajectory {
             }
         }
         let every = self.facts.record_every;
-        let told = Ended::read(&self.folder)?.map(|ended| ended.steps - ended.steps % every);
+        let told = self.ended.as_ref().map(|ended| ended.steps - ended.steps % every);
         let last = complete.last().copied().max(told);
         let unbroken = complete.iter().zip(0..).take_while(|(step, count)| **step == count * every).count();
         let missing = unbroken as u64 * every;
