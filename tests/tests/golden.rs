@@ -1,0 +1,186 @@
+//! Results by which all builds and machines are judged: the hashes in `golden.txt`, of every configuration in `configs/`,
+//! made small, and of every choice that changes bits.
+//!
+//! Other tests compare Atoll with itself as it is; these compare it with what it was. So a change of compiler, of a
+//! library, of one constant shows. Where results change on purpose,
+//!
+//! ```sh
+//! ATOLL_GOLDEN=renew cargo test --release -p atoll-tests --test golden
+//! ```
+//!
+//! writes the file anew, and CHANGELOG.md says **results**.
+
+use atoll::Config;
+use atoll_core::{Exchange, Hashes, Rot};
+use atoll_tests::program::{self, watched};
+use atoll_tests::scenes;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Keys and values, as after `--set`.
+type Overrides = &'static [(&'static str, &'static str)];
+
+/// Every configuration, small.
+const CONFIGS: &[(&str, Overrides)] = &[
+    ("normal", &[("bodies", "4000"), ("steps", "120")]),
+    ("pile", &[("bodies", "1500"), ("steps", "120")]),
+    ("pyramids", &[("bodies", "1100"), ("steps", "100")]),
+    ("quickstart", &[("bodies", "3000"), ("steps", "120")]),
+    ("report", &[("bodies", "3000"), ("steps", "120"), ("tiles", "4x4")]),
+    ("single_island", &[("bodies", "2500"), ("steps", "60")]),
+    ("skewed", &[("bodies", "4000"), ("steps", "120")]),
+    ("slope", &[("bodies", "20"), ("steps", "120"), ("tiles", "2x2")]),
+    ("sparse", &[("bodies", "4000"), ("steps", "100")]),
+    ("stack", &[("steps", "120"), ("tiles", "2x2")]),
+];
+
+/// What changes bits, on scenes where it does: first bodies that meet in flight, then bodies that rest.
+const CHOICES: &[(&str, Overrides)] = &[
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "1x1")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "8x8")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2"), ("seed", "2")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2"), ("exchange", "substep")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2"), ("ghosts", "frozen")]),
+    ("quickstart", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2"), ("solver", "pgs")]),
+    (
+        "quickstart",
+        &[
+            ("bodies", "2000"),
+            ("steps", "100"),
+            ("tiles", "3x2"),
+            ("gravity", "[1.5, -4]"),
+            ("linear_damping", "0.1"),
+            ("angular_damping", "0.2"),
+            ("max_linear_speed", "12"),
+            ("max_angular_speed", "9"),
+            ("recycle_distance", "0"),
+            ("sort_interval", "7"),
+            ("hertz", "75"),
+            ("substeps", "3"),
+        ],
+    ),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "1x1")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "8x8")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("seed", "2")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("exchange", "step")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("exchange", "step"), ("ghosts", "frozen")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("solver", "pgs")]),
+    ("pyramids", &[("bodies", "550"), ("steps", "120"), ("tiles", "1x1"), ("sleep", "true")]),
+];
+
+/// Worlds of the library, by name.
+const BOUNCING: [(&str, Exchange); 2] =
+    [("bouncing exchange=step", Exchange::Step), ("bouncing exchange=substep", Exchange::Substep)];
+
+/// A case by name, as the golden file has it: the configuration, and what is set in it.
+fn name(config: &str, overrides: Overrides) -> String {
+    let set: Vec<String> = overrides.iter().map(|(key, value)| format!("{key}={}", value.replace(' ', ""))).collect();
+    format!("{config} {}", set.join(" "))
+}
+
+fn cases() -> impl Iterator<Item = (&'static str, Overrides)> {
+    CONFIGS.iter().chain(CHOICES).copied()
+}
+
+fn file() -> PathBuf {
+    program::root().join("tests/golden.txt")
+}
+
+/// Hashes of states and of contacts by case.
+type Results = BTreeMap<String, [String; 2]>;
+
+fn golden() -> Results {
+    let text = std::fs::read_to_string(file()).unwrap();
+    let entry = |line: &str| {
+        let [case, state, contacts] = line.split('|').map(str::trim).collect::<Vec<_>>()[..] else {
+            panic!("golden.txt: not a case and two hashes: {line}");
+        };
+        (case.to_owned(), [state.to_owned(), contacts.to_owned()])
+    };
+    text.lines().filter(|line| !line.starts_with('#')).map(entry).collect()
+}
+
+fn renew(results: &Results) {
+    let mut text =
+        "# Hashes of states and contacts, of runs with these settings. See tests/tests/golden.rs.\n".to_owned();
+    let names = cases().map(|(config, overrides)| name(config, overrides));
+    for case in names.chain(BOUNCING.map(|(case, _)| case.to_owned())) {
+        let [state, contacts] = &results[&case];
+        writeln!(text, "{case} | {state} | {contacts}").unwrap();
+    }
+    std::fs::write(file(), text).unwrap();
+}
+
+/// What no configuration has yet: bodies that bounce, and walls that stand aslant.
+fn bouncing(exchange: Exchange) -> [String; 2] {
+    let mut scene = scenes::room(12, 5);
+    scene.kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.7);
+    scene.statics.iter_mut().for_each(|wall| wall.rotation = Rot::from_angle(0.03));
+    let mut sim = scene.start_on((3, 2), exchange);
+    sim.run(120);
+    let Hashes { state, contact } = sim.world.hashes();
+    [format!("{state:032x}"), format!("{contact:032x}")]
+}
+
+/// The hashes of every case, by runs in this process with some more settings.
+fn results(how: Overrides) -> Results {
+    let run = |(config, overrides): (&str, Overrides)| {
+        let path = format!("configs/{config}.toml");
+        let text = std::fs::read_to_string(program::root().join(&path)).unwrap();
+        let all: Vec<_> = overrides.iter().chain(how).copied().collect();
+        let config_read = Config::from_toml_str(&path, &text, &all).unwrap();
+        let case = name(config, overrides);
+        let summary =
+            watched(&case, move || atoll::run(&config_read)).unwrap_or_else(|error| panic!("{case}: {error}"));
+        (case, [summary.state_hash, summary.contact_hash])
+    };
+    let worlds = BOUNCING.iter().map(|&(case, exchange)| (case.to_owned(), bouncing(exchange)));
+    cases().map(run).chain(worlds).collect()
+}
+
+/// Compares, and says what to do.
+fn judge(results: &Results, what: &str) {
+    let golden = golden();
+    let differs = |(case, hashes): &(&String, &[String; 2])| golden.get(*case) != Some(hashes);
+    let other: Vec<&String> = results.iter().filter(differs).map(|(case, _)| case).collect();
+    assert!(
+        other.is_empty() && golden.len() == results.len(),
+        "{what}: {} of {} results are not those of tests/golden.txt:\n  {}\nIf nothing was meant to change, this is a bug: \
+         find the change that did it. If results change on purpose, renew the file with\n  ATOLL_GOLDEN=renew cargo test \
+         --release -p atoll-tests --test golden\nand say **results** in CHANGELOG.md, with the reason.",
+        other.len().max(golden.len().abs_diff(results.len())),
+        results.len(),
+        other.iter().map(|case| case.as_str()).collect::<Vec<_>>().join("\n  ")
+    );
+}
+
+#[test]
+fn results_are_golden() {
+    let results = results(&[]);
+    if std::env::var_os("ATOLL_GOLDEN").is_some_and(|wish| wish == "renew") {
+        renew(&results);
+    }
+    judge(&results, "this build");
+}
+
+/// A choice that changed nothing would guard nothing.
+#[test]
+fn every_case_differs() {
+    let golden = golden();
+    let states: std::collections::BTreeSet<&String> = golden.values().map(|[state, _]| state).collect();
+    assert_eq!(states.len(), cases().count() + BOUNCING.len(), "two cases of golden.txt have one state");
+}
+
+#[test]
+fn every_configuration_is_among_them() {
+    let files = std::fs::read_dir(program::root().join("configs")).unwrap();
+    let files =
+        files.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|end| end == "toml"));
+    let mut names: Vec<String> = files.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+    names.sort();
+    let known: Vec<&str> = CONFIGS.iter().map(|(config, _)| *config).collect();
+    assert_eq!(names, known, "give every file in configs/ a line in CONFIGS of tests/golden.rs, and renew golden.txt");
+}
