@@ -65,53 +65,35 @@
 
 #![deny(unsafe_code)]
 
-mod body;
-mod border;
-mod broad_phase;
-mod codec;
-mod contact;
-mod error;
-mod facts;
-mod halo;
-mod hash;
-mod id;
-pub mod island;
-mod manifold;
-mod math;
-mod migrate;
-mod narrow_phase;
-mod params;
-mod partition;
-mod phase;
-mod setup;
-mod shape;
-mod sleep;
-mod snapshot;
+mod collide;
+mod exchange;
+pub mod islands;
+mod model;
+mod parallel;
 mod solver;
+mod state;
 mod step;
-mod team;
 #[cfg(test)]
 mod testing;
-mod tile;
-mod violation;
+mod tiling;
 mod world;
 
-pub use body::{Bodies, Body, StaticBody};
-pub use codec::{FORMAT, Frames};
-pub use contact::{Contact, ContactPoint};
-pub use error::{CodecError, SetupError, StepError};
-pub use facts::{Facts, TileFacts};
-pub use halo::{
+pub use exchange::codec::{FORMAT, Frames};
+pub use exchange::message::{
     BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Halo, Inbox, Message, Outbox, Unseen, Verdict,
 };
-pub use hash::Hashes;
-pub use id::{GlobalId, KindId, TileId};
-pub use math::Rot;
-pub use params::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
-pub use partition::{Region, TileGrid};
-pub use phase::{Phase, Timings};
-pub use setup::Blueprint;
-pub use shape::{Kind, Material, Shape};
-pub use snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
+pub use model::blueprint::Blueprint;
+pub use model::body::{Bodies, Body, StaticBody};
+pub use model::contact::{Contact, ContactPoint};
+pub use model::error::{CodecError, SetupError, StepError};
+pub use model::id::{GlobalId, KindId, TileId};
+pub use model::math::Rot;
+pub use model::params::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
+pub use model::shape::{Kind, Material, Shape};
+pub use state::facts::{Facts, TileFacts};
+pub use state::hash::Hashes;
+pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
+pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, step};
+pub use tiling::partition::{Region, TileGrid};
 pub use world::World;

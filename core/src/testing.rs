@@ -1,8 +1,8 @@
 //! What this crate's own tests share.
 
-use crate::halo::{Halo, Inbox, Outbox};
-use crate::math::Rot;
-use crate::shape::{Kind, Material, Shape};
+use crate::exchange::message::{Halo, Inbox, Outbox};
+use crate::model::math::Rot;
+use crate::model::shape::{Kind, Material, Shape};
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use std::convert::Infallible;

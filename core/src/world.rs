@@ -1,23 +1,17 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
-use crate::body::Body;
-use crate::border::Border;
-use crate::broad_phase::grid::Grid;
-use crate::broad_phase::{Pair, Proxies};
-use crate::error::{SetupError, StepError};
-use crate::halo::{Halo, Inbox, Mailbag, Outbox, Verdict};
-use crate::hash::Hashes;
-use crate::id::TileId;
-use crate::island::Islands;
-use crate::math::float_mode_is_default;
-use crate::migrate::MigrateWork;
-use crate::narrow_phase::{Contacts, NarrowPhase};
-use crate::params::Exchange;
-use crate::phase::{Phase, Stopwatch, Timings};
-use crate::setup::{Blueprint, Setup};
-use crate::solver::Solver;
-use crate::team::Team;
-use crate::tile::{Fault, Tile};
+use crate::exchange::message::{Halo, Inbox, Mailbag, Outbox, Verdict};
+use crate::model::blueprint::{Blueprint, Setup};
+use crate::model::body::Body;
+use crate::model::error::{SetupError, StepError};
+use crate::model::id::TileId;
+use crate::model::math::float_mode_is_default;
+use crate::model::params::Exchange;
+use crate::parallel::team::Team;
+use crate::state::hash::Hashes;
+use crate::step::phase::{Phase, Stopwatch, Timings};
+use crate::step::stage::{Bench, Work};
+use crate::tiling::tile::{Fault, Tile};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -38,47 +32,6 @@ pub struct World {
     pub(crate) measures: bool,
     /// Whether it was said that bodies outrun their tiles.
     warned_of_leaps: bool,
-}
-
-/// Everything a step needs beyond a tile's own state. With one sync point a step, a tile is stepped in one go and a
-/// thread's tiles share one of these, so that little more than the bodies streams through memory; with several, every
-/// tile keeps its own between them.
-#[derive(Default, Debug)]
-pub(crate) struct Work {
-    pub(crate) migrate: MigrateWork,
-    pub(crate) proxies: Proxies,
-    pub(crate) grid: Grid,
-    pub(crate) pairs: Vec<Pair>,
-    pub(crate) narrow_phase: NarrowPhase,
-    pub(crate) contacts: Contacts,
-    pub(crate) islands: Islands,
-    pub(crate) solver: Solver,
-    pub(crate) border: Border,
-    pub(crate) timings: Timings,
-}
-
-/// One tile with all it needs for a stage.
-pub(crate) struct Bench<'a> {
-    pub(crate) tile: &'a mut Tile,
-    pub(crate) work: &'a mut Work,
-    pub(crate) outgoing: &'a mut Mailbag,
-    pub(crate) incoming: &'a Mailbag,
-    pub(crate) setup: &'a Setup,
-    pub(crate) step: u64,
-    /// Who works on this tile.
-    pub(crate) team: Team,
-    /// Whether this step measures how well its contacts are solved.
-    pub(crate) measures: bool,
-}
-
-impl Bench<'_> {
-    /// Runs one stage and books its time.
-    pub(crate) fn stage(&mut self, phase: Phase, stage: impl FnOnce(&mut Self)) {
-        let _span = tracing::trace_span!("stage", name = phase.name(), tile = self.tile.id.0).entered();
-        let mut watch = Stopwatch::start();
-        stage(self);
-        watch.lap(phase, &mut self.work.timings);
-    }
 }
 
 /// Whether every thread works on tiles of its own. Where there are fewer tiles than threads, all work on one tile after

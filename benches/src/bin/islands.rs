@@ -12,7 +12,7 @@
 
 use atoll_benches::{arguments, median};
 use atoll_core::IslandSearch;
-use atoll_core::island::{IslandSizes, Islands};
+use atoll_core::islands::{IslandSizes, Islands};
 use rayon::ThreadPoolBuilder;
 use std::process::ExitCode;
 use std::time::Instant;

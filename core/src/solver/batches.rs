@@ -3,11 +3,11 @@
 //! A batch is one or several whole islands. Within an island the order of constraints follows from its contacts alone
 //! (see [`super::coloring`]), so how islands are put into batches changes no bit.
 
-use super::lanes::LANES;
 use super::place::{NOT_SOLVED, STATIC};
-use crate::broad_phase::Pair;
-use crate::params::Parallel;
-use crate::team::Team;
+use crate::collide::broad_phase::Pair;
+use crate::model::params::Parallel;
+use crate::parallel::lanes::LANES;
+use crate::parallel::team::Team;
 use std::ops::Range;
 
 /// Contacts in a batch of small islands, at least: enough to fill most lanes, few enough to stay in a core's cache.
@@ -17,25 +17,25 @@ const SMALL: u32 = 1024;
 const LARGE: u32 = 4096;
 
 /// Most pieces that contacts of one color are cut into, and so most threads that solve one island.
-pub(super) const MOST_SLICES: u32 = 32;
+pub(crate) const MOST_SLICES: u32 = 32;
 
 /// Groups of eight in a piece, at least: less is not worth waiting for another thread.
 const GROUPS_PER_SLICE: u32 = 16;
 
 /// One batch. Ranges are of the solver's buffers, where those of one batch lie together, in the order of batches.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Batch {
+pub(crate) struct Batch {
     /// Contacts, as places in [`Batches::contacts`].
-    pub(super) contacts: Range<usize>,
+    pub(crate) contacts: Range<usize>,
     /// Solver bodies: first some that stand for all statics, a padding to whole blocks of eight at the end.
-    pub(super) bodies: Range<usize>,
+    pub(crate) bodies: Range<usize>,
     /// How many stand for statics: one for each slice, so that no two threads write to the same.
-    pub(super) statics: u32,
+    pub(crate) statics: u32,
     /// Whether several threads are to solve it together.
-    pub(super) large: bool,
-    pub(super) colors: Range<usize>,
-    pub(super) singles: Range<usize>,
-    pub(super) doubles: Range<usize>,
+    pub(crate) large: bool,
+    pub(crate) colors: Range<usize>,
+    pub(crate) singles: Range<usize>,
+    pub(crate) doubles: Range<usize>,
 }
 
 impl Batch {
@@ -44,32 +44,32 @@ impl Batch {
     }
 
     /// Into how many pieces to cut so many groups of one color.
-    pub(super) fn slices(&self, groups: usize) -> u32 {
+    pub(crate) fn slices(&self, groups: usize) -> u32 {
         (groups as u32 / GROUPS_PER_SLICE).clamp(1, self.statics)
     }
 }
 
 /// The contacts of a tile and their islands.
 #[derive(Clone, Copy)]
-pub(super) struct Graph<'a> {
-    pub(super) contacts: &'a [Pair],
+pub(crate) struct Graph<'a> {
+    pub(crate) contacts: &'a [Pair],
     /// For each node, a body with contacts, the lowest of its island.
-    pub(super) roots: &'a [u32],
+    pub(crate) roots: &'a [u32],
     /// Nodes in the largest island.
-    pub(super) largest: u64,
+    pub(crate) largest: u64,
     /// Nodes from here on are ghosts that are heard of within the step. Islands with such, and islands without, are not
     /// mixed: these need not wait for word.
-    pub(super) first_ghost: usize,
+    pub(crate) first_ghost: usize,
     /// For each root whether its island sleeps. None where nobody may.
-    pub(super) sleeps: Option<&'a [bool]>,
+    pub(crate) sleeps: Option<&'a [bool]>,
 }
 
 /// How a tile's contacts are put into batches.
 #[derive(Default, Debug)]
-pub(super) struct Batches {
-    pub(super) all: Vec<Batch>,
+pub(crate) struct Batches {
+    pub(crate) all: Vec<Batch>,
     /// Contacts by batch, and in canonical order within each.
-    pub(super) contacts: Vec<u32>,
+    pub(crate) contacts: Vec<u32>,
     /// For each island, named by its lowest node, how many contacts it has, and then its batch.
     of_island: Vec<u32>,
     /// For each island whether it has a ghost that is heard of within the step.
@@ -88,7 +88,7 @@ const NO_BATCH: u32 = u32::MAX;
 impl Batches {
     /// Puts islands into batches, but those that sleep. `place` gives for each body of the tile its node plus one,
     /// [`STATIC`] or [`NOT_SOLVED`]; afterwards, its place among the solver's bodies.
-    pub(super) fn divide(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, team: Team) {
+    pub(crate) fn divide(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, team: Team) {
         let Graph { contacts, roots, largest, sleeps, .. } = graph;
         self.crews = !team.is_alone();
         self.all.clear();
@@ -227,8 +227,8 @@ impl Batches {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::island::Islands;
-    use crate::params::IslandSearch;
+    use crate::islands::Islands;
+    use crate::model::params::IslandSearch;
     use proptest::prelude::*;
 
     /// Any contacts among bodies, the first two of which are statics.

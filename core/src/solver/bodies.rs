@@ -1,13 +1,13 @@
 //! The bodies a solver works on: those with contacts, compacted.
 
 use super::batches::Batches;
-use super::lanes::Quad;
 use super::place::{NOT_SOLVED, STATIC};
-use crate::broad_phase::Pair;
-use crate::halo::{GhostRefresh, Unseen};
-use crate::params::Ghosts;
-use crate::setup::Setup;
-use crate::tile::Tile;
+use crate::collide::broad_phase::Pair;
+use crate::exchange::message::{GhostRefresh, Unseen};
+use crate::model::blueprint::Setup;
+use crate::model::params::Ghosts;
+use crate::parallel::lanes::Quad;
+use crate::tiling::tile::Tile;
 
 /// The root of how much heavier a frozen ghost is made than it is. With mass-weighted velocities infinity cannot be
 /// written down; this leaves 1e-12 of what an impulse would do, and that is taken back in every substep.
@@ -17,40 +17,40 @@ const FROZEN: f32 = 1_048_576.0;
 #[derive(Default, Debug)]
 pub(crate) struct SolverBodies {
     /// Velocity x, y and angular velocity, mass-weighted; one unused.
-    pub(super) velocity: Vec<Quad>,
+    pub(crate) velocity: Vec<Quad>,
     /// Displacement x, y of the step so far, mass-weighted; of its rotation the cosine less one, and the sine times the
     /// root of the inertia.
-    pub(super) pose: Vec<Quad>,
+    pub(crate) pose: Vec<Quad>,
     /// Velocity in this substep before any impulse of a contact: what contacts did is the difference, and the next
     /// substep's warm start.
-    pub(super) start: Vec<Quad>,
+    pub(crate) start: Vec<Quad>,
     /// Roots of mass, inertia, inverse inertia, inverse mass.
-    pub(super) weight: Vec<Quad>,
+    pub(crate) weight: Vec<Quad>,
     /// Ghosts, by place.
-    pub(super) ghosts: Vec<Ghost>,
+    pub(crate) ghosts: Vec<Ghost>,
     /// For each body of the tile its place here.
     place: Vec<u32>,
     /// Contacts between bodies that move, as nodes: bodies with contacts, in the order of the tile.
     links: Vec<Pair>,
     nodes: usize,
     /// The first node that is a ghost.
-    pub(super) first_ghost: usize,
-    pub(super) frozen: bool,
+    pub(crate) first_ghost: usize,
+    pub(crate) frozen: bool,
 }
 
 /// A ghost among the solver's bodies.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ghost {
-    pub(super) place: u32,
+pub(crate) struct Ghost {
+    pub(crate) place: u32,
     /// What it is given in every substep, mass-weighted; its velocity, if it is frozen.
-    pub(super) given: [f32; 3],
+    pub(crate) given: [f32; 3],
 }
 
 const ZERO: Quad = [0.0; 4];
 
 impl SolverBodies {
     /// Numbers the bodies that have contacts: the nodes of the contact graph.
-    pub(super) fn number(&mut self, tile: &Tile, contacts: &[Pair]) {
+    pub(crate) fn number(&mut self, tile: &Tile, contacts: &[Pair]) {
         let dynamic = tile.owned + tile.ghosts();
         self.place.clear();
         self.place.resize(tile.bodies.len(), NOT_SOLVED);
@@ -78,22 +78,22 @@ impl SolverBodies {
     }
 
     /// As [`places`](Self::places); until bodies are loaded, of each body with contacts its node plus one.
-    pub(super) fn places_mut(&mut self) -> &mut [u32] {
+    pub(crate) fn places_mut(&mut self) -> &mut [u32] {
         &mut self.place
     }
 
     /// How many bodies have contacts, and which of them touch.
-    pub(super) fn graph(&self) -> (usize, &[Pair]) {
+    pub(crate) fn graph(&self) -> (usize, &[Pair]) {
         (self.nodes, &self.links)
     }
 
     /// For each body of the tile its place, [`STATIC`] or [`NOT_SOLVED`].
-    pub(super) fn places(&self) -> &[u32] {
+    pub(crate) fn places(&self) -> &[u32] {
         &self.place
     }
 
     /// Takes the bodies in at their places.
-    pub(super) fn load(&mut self, tile: &Tile, batches: &Batches, setup: &Setup) {
+    pub(crate) fn load(&mut self, tile: &Tile, batches: &Batches, setup: &Setup) {
         let total = batches.all.last().map_or(0, |batch| batch.bodies.end);
         for column in [&mut self.velocity, &mut self.pose, &mut self.start, &mut self.weight] {
             column.clear();
@@ -125,7 +125,7 @@ impl SolverBodies {
 
     /// What the roots of a body's masses are multiplied by.
     #[inline(always)]
-    pub(super) fn weight_scale(&self, tile: &Tile, body: u32) -> f32 {
+    pub(crate) fn weight_scale(&self, tile: &Tile, body: u32) -> f32 {
         let body = body as usize;
         if self.frozen && body >= tile.owned && body < tile.owned + tile.ghosts() { FROZEN } else { 1.0 }
     }
@@ -162,7 +162,7 @@ impl SolverBodies {
 
     /// The place of a body of the tile: [`STATIC`], or [`NOT_SOLVED`] if it has no contact.
     #[inline(always)]
-    pub(super) fn place_of(&self, body: u32) -> u32 {
+    pub(crate) fn place_of(&self, body: u32) -> u32 {
         self.place[body as usize]
     }
 }

@@ -2,19 +2,19 @@
 
 use super::batches::Batches;
 use super::place::STATIC;
-use crate::broad_phase::Pair;
-use crate::team::Team;
+use crate::collide::broad_phase::Pair;
+use crate::parallel::team::Team;
 
 /// Colors that are told apart by a bit of a mask. The contacts beyond, of a body with more contacts than this, are the
 /// overflow: each is a color of its own.
-pub(super) const COLORS: usize = 64;
+pub(crate) const COLORS: usize = 64;
 
 /// The color of each contact, `COLORS` for the overflow. An island's colors are a function of its contacts and their
 /// canonical order alone, whatever batch it is in.
 #[derive(Default, Debug)]
-pub(super) struct Coloring {
+pub(crate) struct Coloring {
     /// In the order of [`Batches::contacts`].
-    pub(super) color: Vec<u8>,
+    pub(crate) color: Vec<u8>,
     /// For each solver body the colors its contacts have.
     taken: Vec<u64>,
 }
@@ -22,7 +22,7 @@ pub(super) struct Coloring {
 impl Coloring {
     /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet. `place` gives for
     /// each body of the tile its place among the solver's.
-    pub(super) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[u32], team: Team) {
+    pub(crate) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[u32], team: Team) {
         self.taken.clear();
         self.taken.resize(batches.all.last().map_or(0, |batch| batch.bodies.end), 0);
         self.color.clear();

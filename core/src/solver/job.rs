@@ -1,12 +1,12 @@
 //! A batch with its part of the solver's buffers, for one thread or a crew of them.
 
 use super::bodies::Ghost;
-use super::crew::Member;
-use super::groups::{Color, Group};
-use super::kernels::{Pass, Table};
-use super::lanes::{LANES, Lanes, Quad};
+use super::constraint::groups::{Color, Group};
+use super::constraint::kernels::{Pass, Table};
 use super::motion::{Motion, turn_on};
-use super::shared::Shared;
+use crate::parallel::crew::Member;
+use crate::parallel::lanes::{LANES, Lanes, Quad};
+use crate::parallel::shared::Shared;
 use std::ops::Range;
 
 /// Bodies in a piece of a stage.
@@ -16,32 +16,32 @@ const BODIES_PER_PIECE: usize = 64 * LANES;
 ///
 /// It is run either by one thread alone, or by the members of one crew, which get different pieces of every stage and
 /// meet between stages.
-pub(super) struct Job<'a> {
-    pub(super) velocity: Shared<'a, Quad>,
-    pub(super) pose: Shared<'a, Quad>,
-    pub(super) start: Shared<'a, Quad>,
-    pub(super) weight: &'a [Quad],
-    pub(super) singles: Shared<'a, Group<1>>,
-    pub(super) doubles: Shared<'a, Group<2>>,
-    pub(super) colors: &'a [Color],
+pub(crate) struct Job<'a> {
+    pub(crate) velocity: Shared<'a, Quad>,
+    pub(crate) pose: Shared<'a, Quad>,
+    pub(crate) start: Shared<'a, Quad>,
+    pub(crate) weight: &'a [Quad],
+    pub(crate) singles: Shared<'a, Group<1>>,
+    pub(crate) doubles: Shared<'a, Group<2>>,
+    pub(crate) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
-    pub(super) ghosts: &'a [Ghost],
-    pub(super) base: u32,
-    pub(super) frozen: bool,
+    pub(crate) ghosts: &'a [Ghost],
+    pub(crate) base: u32,
+    pub(crate) frozen: bool,
     /// Whether it is worth a crew.
-    pub(super) large: bool,
+    pub(crate) large: bool,
 }
 
 impl<'a> Job<'a> {
     /// Whether other tiles' bodies take part.
-    pub(super) fn has_ghosts(&self) -> bool {
+    pub(crate) fn has_ghosts(&self) -> bool {
         !self.ghosts.is_empty()
     }
 
     /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
     /// member: meeting costs more than they do.
     #[inline(always)]
-    pub(super) fn each_color<V: Lanes>(&self, member: &Member<'a>, pass: impl Pass) {
+    pub(crate) fn each_color<V: Lanes>(&self, member: &Member<'a>, pass: impl Pass) {
         let mut colors = self.colors;
         while let Some(first) = colors.first() {
             let small = colors.iter().take_while(|color| color.slices == 1).count();
@@ -86,7 +86,7 @@ impl<'a> Job<'a> {
     /// What moves bodies but contacts; then last substep's impulses once more, unless this is the first, and what ghosts
     /// are given.
     #[inline(always)]
-    pub(super) fn integrate_velocities<V: Lanes>(&self, member: &Member<'a>, motion: &Motion, first: bool) {
+    pub(crate) fn integrate_velocities<V: Lanes>(&self, member: &Member<'a>, motion: &Motion, first: bool) {
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocities, starts) = unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
@@ -131,7 +131,7 @@ impl<'a> Job<'a> {
 
     /// Moves bodies by their velocities.
     #[inline(always)]
-    pub(super) fn integrate_positions<V: Lanes>(&self, member: &Member<'a>, h: f32) {
+    pub(crate) fn integrate_positions<V: Lanes>(&self, member: &Member<'a>, h: f32) {
         let (h, one) = (V::splat(h), V::splat(1.0));
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.

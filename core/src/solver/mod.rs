@@ -16,20 +16,13 @@
 mod batches;
 mod bodies;
 mod coloring;
-mod crew;
-mod groups;
+mod constraint;
 #[allow(unsafe_code)]
 mod job;
-mod kernels;
-#[allow(unsafe_code)]
-pub(crate) mod lanes;
 mod motion;
 mod pgs;
 pub(crate) mod place;
-mod rows;
 mod run;
-#[allow(unsafe_code)]
-mod shared;
 mod soft_step;
 pub(crate) mod softness;
 mod write_back;
@@ -37,22 +30,22 @@ mod write_back;
 pub(crate) use bodies::SolverBodies;
 pub(crate) use write_back::write_back;
 
-use crate::broad_phase::Pair;
-use crate::narrow_phase::Contacts;
-use crate::params::{Exchange, Parallel};
-use crate::setup::Setup;
-use crate::team::Team;
-use crate::tile::Tile;
-use crate::violation::Violation;
+use crate::collide::broad_phase::Pair;
+use crate::collide::narrow_phase::Contacts;
+use crate::model::blueprint::Setup;
+use crate::model::params::{Exchange, Parallel};
+use crate::parallel::crew::{Crew, Member};
+use crate::parallel::lanes::{LANES, dispatch};
+use crate::parallel::shared::Shared;
+use crate::parallel::team::Team;
+use crate::state::violation::Violation;
+use crate::tiling::tile::Tile;
 use batches::{Batches, Graph};
 use coloring::Coloring;
-use crew::{Crew, Member};
-use groups::Groups;
+use constraint::groups::{Group, Groups};
+use constraint::rows::Source;
 use job::Job;
-use lanes::{LANES, dispatch};
-use rows::Source;
 use run::Run;
-use shared::Shared;
 use std::ops::Range;
 
 /// Buffers of the solver, shared by all tiles of a thread.
@@ -71,7 +64,7 @@ impl Solver {
         self.bodies.graph()
     }
 
-    /// Puts the islands into batches, leaves those out that sleep (see [`crate::sleep`]), and takes their bodies in.
+    /// Puts the islands into batches, leaves those out that sleep (see [`crate::islands::sleep`]), and takes their bodies in.
     /// `roots` gives for each node the lowest of its island, `largest` how many nodes the largest island has.
     pub(crate) fn gather(
         &mut self,
@@ -166,7 +159,7 @@ impl Solver {
 
     /// Copies the impulses of the last substep back to the contacts.
     pub(crate) fn store_impulses(&self, contacts: &mut Contacts) {
-        fn copy<const N: usize>(groups: &[groups::Group<N>], members: &[[u32; LANES]], contacts: &mut Contacts) {
+        fn copy<const N: usize>(groups: &[Group<N>], members: &[[u32; LANES]], contacts: &mut Contacts) {
             for (group, members) in groups.iter().zip(members) {
                 for (lane, &contact) in members.iter().enumerate() {
                     let Some(contact) = contacts.cache.contacts.get_mut(contact as usize) else { continue };

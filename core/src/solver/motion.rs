@@ -1,13 +1,13 @@
 //! How bodies move within a substep: gravity, damping, speed limits, and positions by velocities.
 
-use super::lanes::Lanes;
-use crate::setup::Setup;
+use crate::model::blueprint::Setup;
+use crate::parallel::lanes::Lanes;
 use glam::Vec2;
 
 /// What moves a body in a substep, but contacts.
 #[derive(Clone, Copy)]
-pub(super) struct Motion {
-    pub(super) h: f32,
+pub(crate) struct Motion {
+    pub(crate) h: f32,
     /// Velocity gained.
     gravity: Vec2,
     linear_damping: f32,
@@ -17,7 +17,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    pub(super) fn new(setup: &Setup) -> Self {
+    pub(crate) fn new(setup: &Setup) -> Self {
         let (h, params) = (setup.h, &setup.params);
         Self {
             h,
@@ -31,7 +31,7 @@ impl Motion {
 
     /// The velocities after the substep's outer forces. The roots of mass and inertia weigh them; ones do not.
     #[inline(always)]
-    pub(super) fn accelerate<V: Lanes>(&self, [vx, vy, w]: [V; 3], root_mass: V, root_inertia: V) -> [V; 3] {
+    pub(crate) fn accelerate<V: Lanes>(&self, [vx, vy, w]: [V; 3], root_mass: V, root_inertia: V) -> [V; 3] {
         let one = V::splat(1.0);
         let damping = V::splat(self.linear_damping);
         let mut vx = vx.add(root_mass.mul(V::splat(self.gravity.x))).mul(damping);
@@ -53,7 +53,7 @@ impl Motion {
 
 /// A rotation turned on by a small angle, at length one again.
 #[inline(always)]
-pub(super) fn turn_on<V: Lanes>(c: V, s: V, angle: V) -> (V, V) {
+pub(crate) fn turn_on<V: Lanes>(c: V, s: V, angle: V) -> (V, V) {
     let turned_c = c.sub(angle.mul(s));
     let turned_s = s.add(angle.mul(c));
     let scale = V::splat(1.0).div(turned_c.mul(turned_c).add(turned_s.mul(turned_s)).sqrt());

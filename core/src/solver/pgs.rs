@@ -11,17 +11,17 @@
 //! faster than `push_out_speed`. The push goes through the velocities, so it adds energy; `soft-step` does not have that
 //! fault. Contacts still apart may close their gap within the step, no more.
 
-use super::crew::Member;
-use super::groups::Group;
+use super::constraint::groups::Group;
+use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
-use super::kernels::{Normals, Pass, Table, WarmStart, accumulate};
-use super::lanes::Lanes;
 use super::motion::Motion;
-use crate::setup::Setup;
+use crate::model::blueprint::Setup;
+use crate::parallel::crew::Member;
+use crate::parallel::lanes::Lanes;
 
 /// The whole step of a batch.
 #[inline(always)]
-pub(super) fn step<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, setup: &Setup) {
+pub(crate) fn step<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, setup: &Setup) {
     job.integrate_velocities::<V>(member, &Motion::new(setup), true);
     job.each_color::<V>(member, WarmStart);
     for _ in 0..setup.params.iterations {

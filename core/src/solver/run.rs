@@ -1,19 +1,19 @@
 //! Substeps by the solver that was chosen.
 
-use super::crew::Member;
 use super::job::Job;
-use super::lanes::{Kernel, Lanes};
 use super::{pgs, soft_step};
-use crate::params::Solver;
-use crate::setup::Setup;
+use crate::model::blueprint::Setup;
+use crate::model::params::Solver;
+use crate::parallel::crew::Member;
+use crate::parallel::lanes::{Kernel, Lanes};
 use std::ops::Range;
 
 /// Some substeps of a job, as one member of its crew, or alone.
-pub(super) struct Run<'a> {
-    pub(super) job: &'a Job<'a>,
-    pub(super) member: Member<'a>,
-    pub(super) substeps: Range<u32>,
-    pub(super) setup: &'a Setup,
+pub(crate) struct Run<'a> {
+    pub(crate) job: &'a Job<'a>,
+    pub(crate) member: Member<'a>,
+    pub(crate) substeps: Range<u32>,
+    pub(crate) setup: &'a Setup,
 }
 
 impl Kernel for Run<'_> {

@@ -4,18 +4,18 @@
 //! (warm starting), solves with soft contacts that push overlap out, integrates positions, and solves once more without
 //! the push ("relax"), so that the push adds no energy.
 
-use super::crew::Member;
-use super::groups::Group;
+use super::constraint::groups::Group;
+use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
-use super::kernels::{Normals, Pass, Table, WarmStart, accumulate};
-use super::lanes::Lanes;
 use super::motion::Motion;
 use super::softness::Softness;
-use crate::setup::Setup;
+use crate::model::blueprint::Setup;
+use crate::parallel::crew::Member;
+use crate::parallel::lanes::Lanes;
 
 /// One substep of a batch.
 #[inline(always)]
-pub(super) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep: u32, setup: &Setup) {
+pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep: u32, setup: &Setup) {
     job.integrate_velocities::<V>(member, &Motion::new(setup), substep == 0);
     if substep == 0 {
         job.each_color::<V>(member, WarmStart);

@@ -3,7 +3,7 @@
 //! Source: E. Catto, "Soft Constraints", GDC 2011, and Box2D v3's solver. For angular frequency w, damping ratio z and
 //! substep h, the implicit Euler step of the spring gives the three coefficients below.
 
-use crate::params::Params;
+use crate::model::params::Params;
 
 /// The coefficients of a soft constraint over one substep.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +38,6 @@ impl Softness {
 
     /// A spring faster than a quarter of the substep rate cannot be followed.
     fn hertz(params: &Params) -> f32 {
-        crate::math::min(params.contact_hertz, 0.25 / params.substep())
+        crate::model::math::min(params.contact_hertz, 0.25 / params.substep())
     }
 }

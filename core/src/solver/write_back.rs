@@ -1,14 +1,14 @@
 //! Every owned body's new state, solved or flown, written back to the tile.
 
 use super::bodies::SolverBodies;
-use super::lanes::{Kernel, LANES, Lanes, Row, dispatch};
 use super::motion::{Motion, turn_on};
 use super::place::NOT_SOLVED;
-use crate::id::GlobalId;
-use crate::math::Rot;
-use crate::setup::Setup;
-use crate::team::Team;
-use crate::tile::Tile;
+use crate::model::blueprint::Setup;
+use crate::model::id::GlobalId;
+use crate::model::math::Rot;
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Row, dispatch};
+use crate::parallel::team::Team;
+use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 
 /// Bodies in a piece of work, at least.

@@ -1,0 +1,309 @@
+//! The grid, and the quadtree, against trying every pair.
+
+use super::Pair;
+use super::grid::Grid;
+use super::quadtree::Quadtree;
+use crate::collide::proxies::Proxies;
+use crate::exchange::message::Unseen;
+use crate::model::blueprint::{Blueprint, Setup};
+use crate::model::body::{Body, StaticBody};
+use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::math::Rot;
+use crate::model::params::Params;
+use crate::model::shape::{Kind, Shape};
+use crate::parallel::team::Team;
+use crate::testing::{any_kind, any_rotation, cases, circle, distance, rectangle};
+use crate::tiling::partition::TileGrid;
+use crate::tiling::tile::Tile;
+use glam::{DVec2, Vec2};
+use proptest::prelude::*;
+use std::cell::Cell;
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+
+thread_local! {
+    /// Makes the search of this thread do without AVX2.
+    pub(super) static PORTABLE: Cell<bool> = const { Cell::new(false) };
+}
+
+fn portable<R>(work: impl FnOnce() -> R) -> R {
+    PORTABLE.set(true);
+    let result = work();
+    PORTABLE.set(false);
+    result
+}
+
+/// A tile, stuffed by hand, and its setup.
+pub(super) struct Stuffed {
+    setup: Setup,
+    pub(super) tile: Tile,
+    pub(super) proxies: Proxies,
+}
+
+impl Stuffed {
+    /// Of the given bodies the first `owned` part is owned, the others are ghosts. They are named in this order.
+    pub(super) fn new(
+        size: Vec2,
+        kinds: Vec<Kind>,
+        mut bodies: Vec<Body>,
+        owned: f64,
+        statics: Vec<StaticBody>,
+    ) -> Self {
+        (1_000..).zip(&mut bodies).for_each(|(id, body)| body.id = GlobalId(id));
+        let owned = (owned * bodies.len() as f64) as usize;
+        Self::named(size, kinds, &bodies, owned, statics)
+    }
+
+    /// Of the given bodies so many are owned, the others are ghosts. Nothing asks where they are: a tile may hold any
+    /// body anywhere.
+    pub(super) fn named(size: Vec2, kinds: Vec<Kind>, bodies: &[Body], owned: usize, statics: Vec<StaticBody>) -> Self {
+        let grid = TileGrid::new(DVec2::ZERO, 3.0 * size.as_dvec2(), 3, 3).unwrap();
+        let blueprint = Blueprint { params: Params::default(), grid, kinds, statics };
+        let setup = Setup::new(&blueprint).unwrap();
+        let mut tile = Tile::new(TileId(4), &setup);
+        tile.owned = owned;
+        for &body in bodies {
+            tile.bodies.push(Body { position: body.position + tile.corner, ..body });
+        }
+        tile.unseen.resize(bodies.len() - tile.owned, Unseen::default());
+        tile.ghost_owners.resize(bodies.len() - tile.owned, TileId(5));
+        for body in &setup.statics {
+            tile.bodies.push(*body);
+        }
+        let mut proxies = Proxies::default();
+        proxies.load(&tile.bodies, [tile.owned, tile.ghosts()], tile.corner, &setup, Team::ALONE);
+        Self { setup, tile, proxies }
+    }
+
+    fn offset(&self, [a, b]: Pair) -> Vec2 {
+        (self.tile.bodies.position[b as usize] - self.tile.bodies.position[a as usize]).as_vec2()
+    }
+
+    fn is_pair(&self, pair: Pair) -> bool {
+        self.proxies.is_pair(self.offset(pair), pair)
+    }
+
+    /// Every two bodies of which one is owned, the lower first.
+    fn twos(&self) -> impl Iterator<Item = Pair> {
+        let bodies = self.tile.bodies.len() as u32;
+        (0..self.tile.owned as u32).flat_map(move |a| (a + 1..bodies).map(move |b| [a, b]))
+    }
+
+    pub(super) fn brute_force(&self) -> BTreeSet<Pair> {
+        self.twos().filter(|&pair| self.is_pair(pair)).collect()
+    }
+
+    /// What the grid finds, whatever it found before.
+    fn by_grid(&self, grid: &mut Grid) -> BTreeSet<Pair> {
+        let mut found = Vec::new();
+        grid.find_pairs(&self.proxies, Team::ALONE, &mut found);
+        self.pairs_among(found)
+    }
+
+    /// What a quadtree finds, whatever bodies it held before.
+    pub(super) fn by_quadtree(&self, quadtree: &mut Quadtree) -> BTreeSet<Pair> {
+        quadtree.flush(&self.proxies, &self.tile.bodies.id);
+        quadtree.check();
+        let mut found = Vec::new();
+        quadtree.find_pairs(&self.proxies, Team::ALONE, &mut found);
+        let mut shared = Vec::new();
+        threads().install(|| quadtree.find_pairs(&self.proxies, Team::of_pool(), &mut shared));
+        assert_eq!(shared, found, "three threads found something else");
+        self.pairs_among(found)
+    }
+
+    pub(super) fn new_quadtree(&self) -> Quadtree {
+        Quadtree::new(self.proxies.size)
+    }
+
+    /// What was found, less the pairs that are none; refuses one found twice.
+    fn pairs_among(&self, found: Vec<Pair>) -> BTreeSet<Pair> {
+        let all: BTreeSet<Pair> = found.iter().copied().collect();
+        assert_eq!(all.len(), found.len(), "a pair was found twice");
+        for &[low, high] in &all {
+            assert!(low < high && (low as usize) < self.tile.owned, "{low}, {high} is no pair of an owned body");
+        }
+        all.into_iter().filter(|&pair| self.is_pair(pair)).collect()
+    }
+
+    /// What everybody finds; refuses if they disagree.
+    fn by_each(&self) -> BTreeSet<Pair> {
+        let pairs = self.by_grid(&mut Grid::default());
+        assert_eq!(self.by_quadtree(&mut self.new_quadtree()), pairs, "the quadtree disagrees with the grid");
+        pairs
+    }
+}
+
+/// Three threads.
+fn threads() -> &'static rayon::ThreadPool {
+    static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();
+    POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap())
+}
+
+pub(super) fn body(kind: usize, position: DVec2) -> Body {
+    Body {
+        id: GlobalId(0),
+        position,
+        rotation: Rot::IDENTITY,
+        velocity: Vec2::ZERO,
+        angular_velocity: 0.0,
+        kind: KindId(kind as u32),
+    }
+}
+
+/// Bodies in a tile of the unit square, to be stretched later: evenly, in a heap, or far outside.
+pub(super) fn any_body() -> impl Strategy<Value = (prop::sample::Index, DVec2, Rot, Vec2, f32)> {
+    let even = (-0.2..1.2, -0.2..1.2);
+    let heap = (0.30..0.34, 0.70..0.74);
+    let far = (-300.0..300.0, -300.0..300.0);
+    let place = prop_oneof![8 => even, 6 => heap, 1 => far].prop_map(|(x, y)| DVec2::new(x, y));
+    let velocity = (-40.0_f32..40.0, -40.0_f32..40.0).prop_map(|(x, y)| Vec2::new(x, y));
+    (any::<prop::sample::Index>(), place, any_rotation(), velocity, -47.0_f32..47.0)
+}
+
+fn any_tile(bodies: usize, statics: usize) -> impl Strategy<Value = Stuffed> {
+    let kinds = prop::collection::vec(any_kind(0.01, 100.0), 1..8);
+    let size = (0.0_f32..2.0, 0.0_f32..2.0).prop_map(|(x, y)| Vec2::new(10.0_f32.powf(x), 10.0_f32.powf(y)));
+    let bodies = prop::collection::vec(any_body(), 0..=bodies);
+    let fixed = prop::collection::vec((any_kind(0.01, 1000.0), -0.5..1.5, -0.5..1.5, any_rotation()), 0..=statics);
+    (size, kinds, bodies, 0.0..=1.0, fixed).prop_map(|(size, kinds, bodies, owned, fixed)| {
+        let bodies = bodies
+            .into_iter()
+            .map(|(kind, place, rotation, velocity, angular_velocity)| Body {
+                rotation,
+                velocity,
+                angular_velocity,
+                ..body(kind.index(kinds.len()), place * size.as_dvec2())
+            })
+            .collect();
+        let place = |x: f64, y: f64| DVec2::new(1.0 + x, 1.0 + y) * size.as_dvec2();
+        let fixed = (0..).zip(fixed).map(|(id, (kind, x, y, rotation))| StaticBody {
+            id: GlobalId(id),
+            position: place(x, y),
+            rotation,
+            kind,
+        });
+        let fixed = fixed.collect();
+        Stuffed::new(size, kinds, bodies, owned, fixed)
+    })
+}
+
+impl std::fmt::Debug for Stuffed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "a tile of {} from {}, {} bodies owned:",
+            self.setup.grid.tile_size(),
+            self.tile.corner,
+            self.tile.owned
+        )?;
+        let kinds = self.tile.bodies.kind.iter().map(|&kind| self.setup.kind(kind).shape);
+        self.tile.bodies.iter().zip(kinds).try_for_each(|(body, shape)| writeln!(f, "{body:?} {shape:?}"))
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(64))]
+
+    #[test]
+    fn grid_and_quadtree_find_what_brute_force_finds(tile in any_tile(400, 6)) {
+        prop_assert_eq!(tile.by_each(), tile.brute_force());
+    }
+
+    #[test]
+    fn many_statics_are_no_different(tile in any_tile(60, 120)) {
+        prop_assert_eq!(tile.by_each(), tile.brute_force());
+    }
+
+    #[test]
+    fn the_search_finds_the_same_at_any_width(tile in any_tile(200, 4)) {
+        let wide = tile.by_grid(&mut Grid::default());
+        prop_assert_eq!(portable(|| tile.by_grid(&mut Grid::default())), wide);
+    }
+
+    /// What is told apart as no pair does not touch in this step, whatever the definition of a pair makes of it. (Not
+    /// asked of bodies faster than the cap on the margin, and of none that turn.)
+    #[test]
+    fn no_two_bodies_touch_that_are_no_pair(tile in any_tile(40, 3)) {
+        let (bodies, params) = (&tile.tile.bodies, &tile.setup.params);
+        for pair in tile.twos().filter(|&pair| !tile.is_pair(pair)) {
+            let [a, b] = pair.map(|index| index as usize);
+            let slow = |body: usize| bodies.velocity[body].length() * params.dt < params.margin_cap;
+            if !(slow(a) && slow(b)) {
+                continue;
+            }
+            let [shape_a, shape_b] = [a, b].map(|body| tile.setup.kind(bodies.kind[body]).shape);
+            for part in (0..=16).map(|k| k as f32 / 16.0) {
+                let offset = tile.offset(pair) + (bodies.velocity[b] - bodies.velocity[a]) * (part * params.dt);
+                let apart = distance(shape_a, bodies.rotation[a], shape_b, bodies.rotation[b], offset);
+                prop_assert!(apart > 0.0, "bodies {} and {} touch after {} of the step", a, b, part);
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_and_little_have_no_pairs() {
+    let kinds = || vec![circle(0.5), rectangle(1.0, 2.0)];
+    for bodies in [vec![], vec![body(0, DVec2::ONE)]] {
+        let tile = Stuffed::new(Vec2::splat(10.0), kinds(), bodies, 1.0, vec![]);
+        assert!(tile.by_each().is_empty());
+    }
+    // Two ghosts upon one another are nobody's business here.
+    let tile = Stuffed::new(Vec2::splat(10.0), kinds(), vec![body(0, DVec2::ONE); 2], 0.0, vec![]);
+    assert!(tile.by_each().is_empty());
+}
+
+#[test]
+fn a_heap_upon_one_spot_pairs_everybody() {
+    let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.5)], vec![body(0, DVec2::ONE); 300], 0.5, vec![]);
+    let (mut grid, mut quadtree) = (Grid::default(), tile.new_quadtree());
+    assert_eq!(tile.by_grid(&mut grid).len(), 150 * 149 / 2 + 150 * 150);
+    assert_eq!(tile.by_quadtree(&mut quadtree).len(), 150 * 149 / 2 + 150 * 150);
+    // Buffers of a larger search leave no traces in a smaller one.
+    let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.5)], vec![body(0, DVec2::ONE); 30], 1.0, vec![]);
+    assert_eq!(tile.by_grid(&mut grid).len(), 30 * 29 / 2);
+    assert_eq!(tile.by_quadtree(&mut quadtree).len(), 30 * 29 / 2);
+}
+
+#[test]
+fn a_body_larger_than_the_tile_meets_all_within() {
+    let kinds = vec![circle(0.05), circle(50.0)];
+    let mut bodies: Vec<_> =
+        (0..200).map(|i| body(0, DVec2::new(f64::from(i % 20), f64::from(i / 20)) * 0.5)).collect();
+    bodies.push(body(1, DVec2::new(-30.0, 5.0)));
+    let tile = Stuffed::new(Vec2::splat(10.0), kinds, bodies, 1.0, vec![]);
+    let pairs = tile.by_each();
+    assert_eq!(pairs, tile.brute_force());
+    assert_eq!(pairs.iter().filter(|pair| pair[1] == 200).count(), 200);
+}
+
+#[test]
+fn a_wall_pairs_only_with_what_is_near_it() {
+    let wall = StaticBody {
+        id: GlobalId(0),
+        position: DVec2::new(15.0, 9.0),
+        rotation: Rot::IDENTITY,
+        kind: rectangle(1_000.0, 2.0),
+    };
+    let bodies = (0..400).map(|i| body(0, DVec2::new(f64::from(i % 20), f64::from(i / 20)) * 0.5)).collect();
+    let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.1)], bodies, 1.0, vec![wall]);
+    let pairs = tile.by_each();
+    assert_eq!(pairs, tile.brute_force());
+    assert_eq!(pairs.iter().filter(|pair| pair[1] == 400).count(), 20, "the lowest row stands upon the wall");
+}
+
+#[test]
+fn shapes_know_their_distance() {
+    // The oracle's own oracle.
+    let (square, disc) = (Shape::rectangle(2.0, 2.0), Shape::circle(1.0));
+    let gap = |a, b, offset| distance(a, Rot::IDENTITY, b, Rot::IDENTITY, offset);
+    assert_eq!(gap(square, square, Vec2::new(3.0, 0.5)), 1.0);
+    assert_eq!(gap(square, square, Vec2::new(5.0, 6.0)), 5.0);
+    assert_eq!(gap(square, square, Vec2::new(0.1, 0.1)), 0.0);
+    assert_eq!(gap(square, disc, Vec2::new(4.0, 5.0)), 4.0);
+    assert_eq!(gap(disc, disc, Vec2::new(0.0, 3.0)), 1.0);
+    let turned =
+        distance(square, Rot::from_angle(std::f32::consts::FRAC_PI_4), disc, Rot::IDENTITY, Vec2::new(3.0, 0.0));
+    assert!((turned - (2.0 - 2.0_f64.sqrt())).abs() < 1e-6);
+}

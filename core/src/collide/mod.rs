@@ -1,0 +1,6 @@
+//! Who touches whom, and how: pairs of near bodies, and their manifolds with the impulses of the step before.
+
+pub(crate) mod broad_phase;
+pub(crate) mod manifold;
+pub(crate) mod narrow_phase;
+pub(crate) mod proxies;

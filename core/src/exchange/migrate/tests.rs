@@ -1,0 +1,414 @@
+//! Owners, ghosts and border contacts against the definitions, on random worlds that are anything but comfortable:
+//! bodies larger than tiles, bodies faster than a tile a step, bodies outside the domain.
+
+use super::{MigrateWork, receive, send};
+use crate::exchange::message::{Halo, Inbox, Mailbag, Outbox, Unseen};
+use crate::model::blueprint::{Blueprint, Setup};
+use crate::model::body::{Body, StaticBody};
+use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
+use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::math::Rot;
+use crate::model::params::{Exchange, Params};
+use crate::model::shape::Kind;
+use crate::testing::{Loopback, any_kind, any_rotation, cases, circle, rectangle};
+use crate::tiling::partition::TileGrid;
+use crate::tiling::tile::Tile;
+use crate::world::World;
+use crate::{StepError, step};
+use glam::{DVec2, Vec2};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+#[derive(Clone, Debug)]
+struct Scene {
+    blueprint: Blueprint,
+    bodies: Vec<Body>,
+}
+
+impl Scene {
+    fn world(&self) -> World {
+        let tiles: Vec<_> = (0..self.blueprint.grid.tiles() as u32).map(TileId).collect();
+        let mut world = World::new(&self.blueprint, &tiles).unwrap();
+        for &body in &self.bodies {
+            assert!(world.add(body).unwrap());
+        }
+        world
+    }
+
+    /// The same bodies where nothing has a border.
+    fn on_one_tile(&self) -> Self {
+        let mut scene = self.clone();
+        let grid = &self.blueprint.grid;
+        scene.blueprint.grid = TileGrid::new(grid.min(), grid.max(), 1, 1).unwrap();
+        scene
+    }
+}
+
+fn any_body(kinds: usize, domain: DVec2) -> impl Strategy<Value = Body> {
+    let within = (0.0..1.0, 0.0..1.0);
+    let heap = (0.40..0.60, 0.45..0.55);
+    let outside = (-1.0..2.0, -1.0..2.0);
+    let place = prop_oneof![4 => within, 4 => heap, 1 => outside];
+    let slow = -3.0_f32..3.0;
+    let fast = -400.0_f32..400.0;
+    let velocity = prop_oneof![3 => (slow.clone(), slow), 1 => (fast.clone(), fast)];
+    (0..kinds, place, any_rotation(), velocity, -40.0_f32..40.0).prop_map(
+        move |(kind, (x, y), rotation, (vx, vy), angular_velocity)| Body {
+            id: GlobalId(0),
+            position: DVec2::new(x, y) * domain,
+            rotation,
+            velocity: Vec2::new(vx, vy),
+            angular_velocity,
+            kind: KindId(kind as u32),
+        },
+    )
+}
+
+fn any_scene(bodies: usize, gravity: f32) -> impl Strategy<Value = Scene> {
+    let kinds = prop::collection::vec(any_kind(0.1, 4.0), 1..5);
+    let grid = (1_u32..=7, 1_u32..=5, 0.4_f64..4.0);
+    let exchange = prop_oneof![Just(Exchange::Step), Just(Exchange::Substep)];
+    (kinds, grid, exchange, 1_u32..=5)
+        .prop_flat_map(move |(kinds, (columns, rows, side), exchange, sort_interval)| {
+            let domain = DVec2::new(side * f64::from(columns), side * f64::from(rows));
+            let bodies = prop::collection::vec(any_body(kinds.len(), domain), 0..=bodies);
+            (bodies, Just((kinds, columns, rows, domain, exchange, sort_interval)))
+        })
+        .prop_map(move |(mut bodies, (kinds, columns, rows, domain, exchange, sort_interval))| {
+            let params = Params { exchange, sort_interval, gravity: Vec2::new(0.0, gravity), ..Params::default() };
+            let floor = StaticBody {
+                id: GlobalId(0),
+                position: DVec2::new(0.5 * domain.x, -1.0),
+                rotation: Rot::IDENTITY,
+                kind: rectangle(2.0 * domain.x as f32, 2.0),
+            };
+            // Names in no relation to places.
+            let count = bodies.len() as u64;
+            for (i, body) in (0..).zip(&mut bodies) {
+                body.id = GlobalId(1 + (i * 7 + 3) % (count.next_multiple_of(7) + 1));
+            }
+            bodies.sort_by_key(|body| body.id);
+            bodies.dedup_by_key(|body| body.id);
+            bodies.reverse();
+            let grid = TileGrid::new(DVec2::ZERO, domain, columns, rows).unwrap();
+            Scene { blueprint: Blueprint { params, grid, kinds, statics: vec![floor] }, bodies }
+        })
+}
+
+/// All bodies by name; refuses one that is there twice.
+fn by_name(world: &World) -> BTreeMap<GlobalId, Body> {
+    let mut bodies = BTreeMap::new();
+    for body in world.bodies() {
+        assert!(bodies.insert(body.id, body).is_none(), "body {} is owned twice", body.id);
+    }
+    bodies
+}
+
+fn bytes(body: &Body) -> &[u8] {
+    bytemuck::bytes_of(body)
+}
+
+/// Whether the AABB grown by the margin meets the region grown by the halo: the definition, with tiles half-open.
+fn needs(world: &World, tile: &Tile, body: &Body) -> bool {
+    let (setup, region) = (&world.setup, world.setup.grid.region(tile.id));
+    let params = &setup.params;
+    let speed = (body.velocity.x * body.velocity.x + body.velocity.y * body.velocity.y).sqrt();
+    let margin = (speed * params.dt).clamp(params.margin_floor, params.margin_cap);
+    let half = setup.kind(body.kind).half_extents(body.rotation) + Vec2::splat(margin);
+    let reach = half.as_dvec2() + DVec2::splat(setup.halo_width);
+    let (low, high) = (body.position - reach, body.position + reach);
+    low.x < region.max.x && high.x >= region.min.x && low.y < region.max.y && high.y >= region.min.y
+}
+
+/// Who owns what, and who has a ghost of whom, after a step, given the bodies before it.
+fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
+    let grid = &world.setup.grid;
+    let after = by_name(world);
+    assert!(after.keys().eq(before.keys()), "a body was lost or made");
+    for tile in world.tile_states() {
+        for id in &tile.bodies.id[..tile.owned] {
+            let owner = grid.locate(before[id].position);
+            assert_eq!(owner, tile.id, "body {id} of tile {owner} is owned by {}", tile.id);
+        }
+        let mut wanted: Vec<_> = before
+            .values()
+            .map(|body| (grid.locate(body.position), body))
+            .filter(|&(owner, body)| owner != tile.id && needs(world, tile, body))
+            .collect();
+        wanted.sort_by_key(|&(owner, body)| (owner, body.id));
+        let names: Vec<_> = wanted.iter().map(|&(owner, body)| (owner, body.id)).collect();
+        let ghosts = tile.owned..tile.owned + tile.ghosts();
+        let held = tile.ghost_owners.iter().copied().zip(tile.bodies.id[ghosts.clone()].iter().copied());
+        assert_eq!(held.collect::<Vec<_>>(), names, "ghosts of tile {}", tile.id);
+        for (index, (_, body)) in ghosts.zip(wanted) {
+            let ghost = tile.bodies.get(index);
+            assert_eq!(bytes(&ghost), bytes(body), "the ghost of body {} in tile {} is no copy", body.id, tile.id);
+        }
+    }
+}
+
+type PairOfNames = (GlobalId, GlobalId);
+
+/// For each tile its contacts by the names of their bodies, and the other body's owner.
+fn contacts_of(tile: &Tile) -> BTreeMap<PairOfNames, (Option<TileId>, Contact)> {
+    let owner = |kind| match kind {
+        SlotKind::Owned(_) => Some(tile.id),
+        SlotKind::Ghost(ghost) => Some(tile.ghost_owners[ghost]),
+        SlotKind::Static(_) => None,
+    };
+    tile.contacts.iter().map(|(key, contact)| (tile.pair_of(key), (owner(key.high().kind()), *contact))).collect()
+}
+
+fn without_impulses(contact: &Contact) -> Contact {
+    let mut contact = *contact;
+    for point in &mut contact.points {
+        (point.normal_impulse, point.tangent_impulse) = (0.0, 0.0);
+    }
+    contact
+}
+
+/// Both owners hold every border contact, with one geometry, and in `substep` with the same impulses.
+fn check_border_contacts(world: &World) -> usize {
+    let tiles: Vec<_> = world.tile_states().iter().map(|tile| (tile.id, contacts_of(tile))).collect();
+    let mut border = 0;
+    for (id, contacts) in &tiles {
+        for (pair, (peer, contact)) in contacts {
+            let Some(peer) = peer.filter(|peer| peer != id) else { continue };
+            let theirs = &tiles[peer.0 as usize].1;
+            let (back, other) =
+                theirs.get(pair).unwrap_or_else(|| panic!("tile {peer} does not see {pair:?} of tile {id}"));
+            assert_eq!(*back, Some(*id));
+            let (mut mine, mut other) = (*contact, *other);
+            if world.setup.params.exchange == Exchange::Step {
+                (mine, other) = (without_impulses(&mine), without_impulses(&other));
+            }
+            assert_eq!(
+                bytemuck::bytes_of(&mine),
+                bytemuck::bytes_of(&other),
+                "{pair:?}: {mine:?} in tile {id}, {other:?} in tile {peer}"
+            );
+            border += 1;
+        }
+    }
+    border
+}
+
+/// A contact as its tile stored it: of whom, with whose body, and the impulse upon either body with its moments.
+struct Push {
+    tile: TileId,
+    pair: PairOfNames,
+    /// Owners of the two bodies when it was stored.
+    owners: [Option<TileId>; 2],
+    /// Impulse x, y and moment, upon either body.
+    upon: [[f64; 3]; 2],
+}
+
+/// Every contact held, from the definition of its numbers: a sum over points of normal and tangent impulse at the anchor.
+fn pushes(world: &World) -> Vec<Push> {
+    let mut pushes = Vec::new();
+    for tile in world.tile_states() {
+        for (pair, (peer, contact)) in contacts_of(tile) {
+            let mut upon = [[0.0; 3]; 2];
+            for point in contact.points() {
+                let (n, t) = (f64::from(point.normal_impulse), f64::from(point.tangent_impulse));
+                let (normal, anchor, offset) =
+                    (contact.normal.as_dvec2(), point.anchor.as_dvec2(), contact.offset.as_dvec2());
+                let impulse = normal * n + DVec2::new(normal.y, -normal.x) * t;
+                for (sign, arm, sum) in [(-1.0, anchor, 0), (1.0, anchor - offset, 1)] {
+                    upon[sum][0] += sign * impulse.x;
+                    upon[sum][1] += sign * impulse.y;
+                    upon[sum][2] += sign * (arm.x * impulse.y - arm.y * impulse.x);
+                }
+            }
+            let owns = |id: GlobalId| tile.bodies.id[..tile.owned].contains(&id);
+            let owner = |id: GlobalId| if owns(id) { Some(tile.id) } else { peer };
+            pushes.push(Push { tile: tile.id, pair, owners: [owner(pair.0), owner(pair.1)], upon });
+        }
+    }
+    pushes
+}
+
+/// Every ghost is given what its owner stored for contacts that the ghost's tile does not solve: those with partners
+/// that are not its own, by the owners of the step before.
+fn check_unseen(world: &World, before: &[Push]) {
+    for tile in world.tile_states() {
+        for (unseen, id) in tile.unseen.iter().zip(&tile.bodies.id[tile.owned..]) {
+            let (mut wanted, mut size) = ([0.0; 3], 1e-6);
+            for push in before {
+                for (me, other) in [(0, 1), (1, 0)] {
+                    let name = [push.pair.0, push.pair.1][me];
+                    if name == *id && push.owners[me] == Some(push.tile) && push.owners[other] != Some(tile.id) {
+                        for (sum, value) in wanted.iter_mut().zip(push.upon[me]) {
+                            *sum += value;
+                            size += value.abs();
+                        }
+                    }
+                }
+            }
+            let given = [unseen.linear.x, unseen.linear.y, unseen.angular].map(f64::from);
+            let error = given.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(error <= 1e-5 * size, "body {id} as a ghost of tile {}: {given:?}, not {wanted:?}", tile.id);
+        }
+    }
+}
+
+/// Every contact of the world with its geometry, each once.
+fn all_contacts(world: &World) -> BTreeMap<PairOfNames, Vec<u8>> {
+    let contacts = world.tile_states().iter().flat_map(contacts_of);
+    contacts.map(|(pair, (_, contact))| (pair, bytemuck::bytes_of(&without_impulses(&contact)).to_vec())).collect()
+}
+
+proptest! {
+    #![proptest_config(cases(96))]
+
+    #[test]
+    fn owners_ghosts_and_border_contacts_are_as_defined(scene in any_scene(40, -10.0)) {
+        let mut world = scene.world();
+        for _ in 0..8 {
+            let (before, stored) = (by_name(&world), pushes(&world));
+            step(&mut world, &mut Loopback).unwrap();
+            check_owners_and_ghosts(&world, &before);
+            check_unseen(&world, &stored);
+            check_border_contacts(&world);
+        }
+    }
+
+    /// In the first step no contact has a history: cutting the world into tiles must not change which there are.
+    #[test]
+    fn tiles_see_the_contacts_that_one_tile_sees(scene in any_scene(60, 0.0)) {
+        let (mut whole, mut cut) = (scene.on_one_tile().world(), scene.world());
+        let counted = step(&mut whole, &mut Loopback).unwrap();
+        let report = step(&mut cut, &mut Loopback).unwrap();
+        prop_assert_eq!(all_contacts(&cut), all_contacts(&whole));
+        prop_assert_eq!(report.contacts, counted.contacts, "each contact is counted once");
+        prop_assert_eq!(report.border_contacts * 2, check_border_contacts(&cut) as u64);
+    }
+}
+
+fn two_tiles(exchange: Exchange, kinds: Vec<Kind>) -> Blueprint {
+    let grid = TileGrid::new(DVec2::new(-10.0, -10.0), DVec2::new(10.0, 10.0), 2, 1).unwrap();
+    Blueprint { params: Params { exchange, ..Params::default() }, grid, kinds, statics: vec![] }
+}
+
+fn disc(id: u64, x: f64, y: f64, vx: f32) -> Body {
+    Body {
+        id: GlobalId(id),
+        position: DVec2::new(x, y),
+        rotation: Rot::IDENTITY,
+        velocity: Vec2::new(vx, 0.0),
+        angular_velocity: 0.0,
+        kind: KindId(0),
+    }
+}
+
+/// The contact of a pair as each tile holds it.
+fn impulses(world: &World, pair: PairOfNames) -> Vec<Option<f32>> {
+    let tiles = world.tile_states().iter();
+    tiles.map(|tile| contacts_of(tile).get(&pair).map(|(_, contact)| contact.points[0].normal_impulse)).collect()
+}
+
+#[test]
+fn a_contact_migrates_with_its_impulses() {
+    // Two discs pressed together drift over the border: first one crosses, then the other. The impulse of a step is
+    // the next one's start, wherever it is made.
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let blueprint = two_tiles(exchange, vec![circle(0.5)]);
+        let mut world = World::new(&blueprint, &[TileId(0), TileId(1)]).unwrap();
+        let pair = (GlobalId(1), GlobalId(2));
+        // Overlapping a little, so that they stay in contact; the left one pushes the right one along.
+        for body in [disc(1, -1.60, 0.0, 2.4), disc(2, -0.61, 0.0, 2.0)] {
+            world.add(body).unwrap();
+        }
+        let mut seen = Vec::new();
+        for _ in 0..90 {
+            step(&mut world, &mut Loopback).unwrap();
+            let held = impulses(&world, pair);
+            let holders = [held[0].is_some(), held[1].is_some()];
+            if holders != [false, false] && seen.last() != Some(&holders) {
+                seen.push(holders);
+            }
+        }
+        assert_eq!(seen, [[true, false], [true, true], [false, true]], "{exchange:?}");
+    }
+}
+
+/// Two tiles of one border contact, as a step leaves them, and how far each body then moves; the marks tell the two
+/// copies of the contact apart. Gives what either tile remembers of the contact after the next exchange.
+fn exchange_by_hand(moves: [f64; 2], marks: [f32; 2]) -> [Option<f32>; 2] {
+    let setup = Setup::new(&two_tiles(Exchange::Step, vec![circle(0.5)])).unwrap();
+    let bodies = [disc(1, -0.3, 0.0, 0.0), disc(2, 0.3, 0.0, 0.0)];
+    let mut tiles = [0, 1].map(|id| Tile::new(TileId(id), &setup));
+    for (i, tile) in tiles.iter_mut().enumerate() {
+        tile.bodies.push(Body { position: bodies[i].position + DVec2::new(moves[i], 0.0), ..bodies[i] });
+        tile.bodies.push(bodies[1 - i]);
+        tile.owned = 1;
+        tile.unseen.push(Unseen::default());
+        tile.ghost_owners.push(TileId(1 - i as u32));
+        let mut contact: Contact = bytemuck::Zeroable::zeroed();
+        contact.points[1].feature = ContactPoint::ABSENT;
+        contact.points[0].normal_impulse = marks[i];
+        tile.contacts.push(PairKey::new(Slot::from_index(0, 1, 1), Slot::from_index(1, 1, 1)), contact);
+    }
+    let mut outbox = Outbox { bags: vec![Mailbag::default(); 2], ..Outbox::default() };
+    let mut inbox = Inbox::new(&[TileId(0), TileId(1)], 2, 1);
+    let mut work = MigrateWork::default();
+    for (tile, bag) in tiles.iter_mut().zip(&mut outbox.bags) {
+        send(tile, bag, &mut work, &setup);
+    }
+    outbox.deliver(&mut inbox);
+    inbox.sort();
+    let mut remembered = [None; 2];
+    for (i, (tile, bag)) in tiles.iter_mut().zip(&inbox.bags).enumerate() {
+        receive(tile, bag, &mut work, &setup, 0);
+        remembered[i] = tile.strays.find((GlobalId(1), GlobalId(2))).map(|contact| contact.points[0].normal_impulse);
+    }
+    remembered
+}
+
+#[test]
+fn of_two_entries_that_of_the_lower_bodys_owner_wins() {
+    let (mine, theirs) = (5.0, 7.0);
+    // Nobody moves: each remembers its own.
+    assert_eq!(exchange_by_hand([0.0, 0.0], [mine, theirs]), [Some(mine), Some(theirs)]);
+    // Body 1 joins body 2, and the entry comes with it; tile 0 keeps one that no body of its own needs.
+    assert_eq!(exchange_by_hand([0.4, 0.0], [mine, theirs])[1], Some(mine));
+    // Body 2 joins body 1, whose tile knows better.
+    assert_eq!(exchange_by_hand([0.0, -0.4], [mine, theirs])[0], Some(mine));
+    // They change places: both end up with the entry of the tile that owned body 1.
+    assert_eq!(exchange_by_hand([0.4, -0.4], [mine, theirs]), [Some(mine), Some(mine)]);
+}
+
+/// A halo that loses what one sync point carries.
+struct Lossy {
+    loses: (u64, u32),
+}
+
+impl Halo for Lossy {
+    type Error = Infallible;
+
+    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Self::Error> {
+        if outbox.moment() == self.loses {
+            inbox.hear(outbox.verdict());
+        } else {
+            outbox.deliver(inbox);
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_lost_message_is_noticed() {
+    let blueprint = two_tiles(Exchange::Substep, vec![circle(0.5)]);
+    let outcome = |loses| {
+        let mut world = World::new(&blueprint, &[TileId(0), TileId(1)]).unwrap();
+        for body in [disc(1, -0.45, 0.0, 1.0), disc(2, 0.45, 0.0, -1.0)] {
+            world.add(body).unwrap();
+        }
+        let mut halo = Lossy { loses };
+        (0..3).try_for_each(|_| step(&mut world, &mut halo).map(|_| ()))
+    };
+    assert_eq!(outcome((9, 0)), Ok(()));
+    // A substep's refresh of the ghosts.
+    assert_eq!(outcome((1, 2)), Err(StepError::Protocol { step: 1, tile: TileId(0) }));
+}

@@ -1,0 +1,6 @@
+//! What tiles tell each other: the messages and their bytes, bodies that change owner, ghosts, and the border impulses.
+
+pub(crate) mod border;
+pub(crate) mod codec;
+pub(crate) mod message;
+pub(crate) mod migrate;

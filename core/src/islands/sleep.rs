@@ -1,0 +1,130 @@
+//! Sleeping: islands that rest are left out until something touches them. Within one tile only.
+//!
+//! A body rests while its fastest point is slower than `sleep_speed`. An island has rested as long as the one of its
+//! bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
+//! rest anew. An island sleeps once it has rested for `sleep_time`; decided before each solve, on the step's contacts.
+//! Whatever comes to touch it makes one larger island, which is awake as the newcomer is. A body without contacts is an
+//! island of its own. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with
+//! their impulses, so that they wake as they fell asleep. Source: islands that sleep as in Box2D (E. Catto); here they
+//! are found anew each step, so nothing has to be kept in order.
+
+use crate::model::blueprint::Setup;
+use crate::model::math;
+use crate::solver::place::NOT_SOLVED;
+use glam::Vec2;
+
+/// Who rests since when. Empty where nobody may sleep.
+#[derive(Default, Debug)]
+pub(crate) struct Sleep {
+    /// For each owned body how long it has rested, in seconds.
+    still: Vec<f32>,
+    /// For each owned body whether its island sleeps.
+    asleep: Vec<bool>,
+    /// For each node of the contact graph that is the lowest of its island, how long that has rested, in seconds, and
+    /// whether it sleeps.
+    rested: Vec<f32>,
+    islands: Vec<bool>,
+}
+
+impl Sleep {
+    /// Bodies that have rested for so many seconds. Who of them sleeps is decided in the next step, as in every step.
+    pub(crate) fn of(still: Vec<f32>) -> Self {
+        let asleep = vec![false; still.len()];
+        Self { still, asleep, ..Self::default() }
+    }
+
+    /// For each owned body whether it sleeps; empty where nobody may.
+    pub(crate) fn asleep(&self) -> &[bool] {
+        &self.asleep
+    }
+
+    /// For each owned body how long it has rested, in seconds; empty where nobody may sleep.
+    pub(crate) fn still(&self) -> &[f32] {
+        &self.still
+    }
+
+    /// Makes room for bodies that were added; these have not rested yet.
+    pub(crate) fn resize(&mut self, owned: usize) {
+        self.still.resize(owned, 0.0);
+        self.asleep.resize(owned, false);
+    }
+
+    /// Follows the bodies to a new order: the one at `order[i]` comes to `i`.
+    pub(crate) fn permute(&mut self, order: &[u32]) {
+        if !self.still.is_empty() {
+            // Bodies may have been added since.
+            self.resize(order.len());
+            self.still = order.iter().map(|&from| self.still[from as usize]).collect();
+            self.asleep = order.iter().map(|&from| self.asleep[from as usize]).collect();
+        }
+    }
+
+    /// Decides which islands sleep. `nodes` gives for each body its node of the contact graph plus one, or
+    /// [`NOT_SOLVED`] if it has no contact; `roots` for each node the lowest of its island. Takes the velocity of those
+    /// that sleep. Returns which islands sleep, by root, and how many bodies do.
+    pub(crate) fn decide(
+        &mut self,
+        nodes: &[u32],
+        roots: &[u32],
+        velocity: &mut [Vec2],
+        angular_velocity: &mut [f32],
+        setup: &Setup,
+    ) -> (&[bool], u64) {
+        let root_of = |node: u32| roots[node as usize - 1] as usize;
+        self.rested.clear();
+        self.rested.resize(roots.len(), f32::INFINITY);
+        for (&node, &still) in nodes.iter().zip(&self.still).filter(|&(&node, _)| node != NOT_SOLVED) {
+            let rested = &mut self.rested[root_of(node)];
+            *rested = math::min(still, *rested);
+        }
+        self.islands.clear();
+        self.islands.extend(self.rested.iter().map(|&rested| rested >= setup.params.sleep_time));
+        let mut count = 0;
+        for (i, asleep) in self.asleep.iter_mut().enumerate() {
+            if nodes[i] != NOT_SOLVED {
+                self.still[i] = self.rested[root_of(nodes[i])];
+            }
+            *asleep = self.still[i] >= setup.params.sleep_time;
+            if *asleep {
+                (velocity[i], angular_velocity[i]) = (Vec2::ZERO, 0.0);
+                count += 1;
+            }
+        }
+        (&self.islands, count)
+    }
+
+    /// Counts on for those that rest. `speed` tells that of a body's fastest point, in m/s.
+    pub(crate) fn count_on(&mut self, speed: impl Fn(usize) -> f32, setup: &Setup) {
+        for (i, still) in self.still.iter_mut().enumerate().filter(|&(i, _)| !self.asleep[i]) {
+            *still = if speed(i) < setup.params.sleep_speed { *still + setup.params.dt } else { 0.0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::blueprint::Blueprint;
+    use crate::model::params::Params;
+    use crate::tiling::partition::TileGrid;
+    use glam::DVec2;
+
+    #[test]
+    fn an_island_rests_as_long_as_its_least_rested_body() {
+        let grid = TileGrid::new(DVec2::ZERO, DVec2::ONE, 1, 1).unwrap();
+        let params = Params { sleep: true, ..Params::default() };
+        let setup = Setup::new(&Blueprint { params, grid, kinds: Vec::new(), statics: Vec::new() }).unwrap();
+        let mut sleep = Sleep { still: vec![9.0, 0.1, 9.0, 9.0], asleep: vec![true; 4], ..Sleep::default() };
+        let mut decide = |nodes: &[u32], roots: &[u32]| {
+            let (islands, count) = sleep.decide(nodes, roots, &mut [Vec2::ONE; 4], &mut [1.0; 4], &setup);
+            (islands.to_vec(), count, sleep.asleep.clone(), sleep.still.clone())
+        };
+        // The first two touch each other, the third something that never moves, the last nothing.
+        let (islands, count, asleep, still) = decide(&[1, 2, 3, NOT_SOLVED], &[0, 0, 2]);
+        assert_eq!((islands[0], islands[2], count), (false, true, 2));
+        assert_eq!((asleep, still), (vec![false, false, true, true], vec![0.1, 0.1, 9.0, 9.0]));
+        // Once apart, the first must rest anew by itself.
+        let (_, _, asleep, _) = decide(&[NOT_SOLVED, NOT_SOLVED, 1, NOT_SOLVED], &[0]);
+        assert_eq!(asleep, [false, false, true, true]);
+    }
+}

@@ -1,0 +1,143 @@
+//! What every rank knows alike, checked once and made ready for the step.
+
+use crate::model::body::{Body, StaticBody};
+use crate::model::error::SetupError;
+use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::math::{self, Rot};
+use crate::model::params::{Exchange, Params};
+use crate::model::shape::{Kind, KindRow};
+use crate::solver::softness::Softness;
+use crate::tiling::partition::TileGrid;
+use glam::Vec2;
+
+/// Everything about a world but its dynamic bodies. Every rank must be given the same.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Blueprint {
+    /// The numbers of a step.
+    pub params: Params,
+    /// How the domain is cut.
+    pub grid: TileGrid,
+    /// Shapes and materials of dynamic bodies; a body names its row. The largest sets the width of the halo.
+    pub kinds: Vec<Kind>,
+    /// Bodies that never move.
+    pub statics: Vec<StaticBody>,
+}
+
+/// The blueprint, made ready.
+#[derive(Debug)]
+pub(crate) struct Setup {
+    pub(crate) params: Params,
+    pub(crate) grid: TileGrid,
+    /// The dynamic kinds, then one for each static.
+    pub(crate) kinds: Vec<KindRow>,
+    pub(crate) dynamic_kinds: usize,
+    pub(crate) statics: Vec<Body>,
+    /// Their names, sorted.
+    static_names: Vec<GlobalId>,
+    /// Bodies this near a tile's region may matter to it, in meters.
+    pub(crate) halo_width: f64,
+    /// A body further inside its tile than this neither leaves nor is anybody's ghost.
+    pub(crate) inset: f64,
+    /// Length of a substep, in seconds.
+    pub(crate) h: f32,
+    pub(crate) softness: Softness,
+    pub(crate) static_softness: Softness,
+    /// Whether the impulses of a whole step must be summed: for restitution, and to average border contacts.
+    pub(crate) totals: bool,
+    /// Whether anything bounces.
+    pub(crate) bouncy: bool,
+}
+
+impl Setup {
+    pub(crate) fn new(blueprint: &Blueprint) -> Result<Self, SetupError> {
+        let params = blueprint.params.clone();
+        params.check()?;
+        if params.sleep && blueprint.grid.tiles() > 1 {
+            return Err(SetupError::SleepAcrossTiles { tiles: blueprint.grid.tiles() });
+        }
+        let mut kinds = Vec::with_capacity(blueprint.kinds.len() + blueprint.statics.len());
+        for (row, kind) in (0..).zip(&blueprint.kinds) {
+            kinds.push(KindRow::dynamic(kind, KindId(row))?);
+        }
+        let dynamic_kinds = kinds.len();
+        let mut statics = Vec::with_capacity(blueprint.statics.len());
+        for fixed in &blueprint.statics {
+            let refuse = SetupError::BadStatic { id: fixed.id };
+            let row = KindRow::fixed(&fixed.kind).ok_or(refuse.clone())?;
+            let body = Body {
+                id: fixed.id,
+                position: fixed.position,
+                rotation: fixed.rotation,
+                velocity: Vec2::ZERO,
+                angular_velocity: 0.0,
+                kind: KindId(kinds.len() as u32),
+            };
+            if !body.is_finite() {
+                return Err(refuse);
+            }
+            kinds.push(row);
+            statics.push(body);
+        }
+        let mut static_names: Vec<_> = statics.iter().map(|body| body.id).collect();
+        static_names.sort_unstable();
+        if let Some(pair) = static_names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(SetupError::BadStatic { id: pair[0] });
+        }
+        let largest = kinds[..dynamic_kinds].iter().fold(0.0, |most, kind| math::max(kind.bounding_radius, most));
+        // A thousandth more than the rule asks for, so that the rounding of a sum never decides who sees a contact.
+        let halo_width = f64::from(largest + params.margin_cap) * 1.001;
+        let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
+        Ok(Self {
+            grid: blueprint.grid.clone(),
+            halo_width,
+            inset: 2.0 * halo_width,
+            h: params.substep(),
+            softness: Softness::contact(&params),
+            static_softness: Softness::static_contact(&params),
+            totals: bouncy || params.exchange == Exchange::Substep,
+            bouncy,
+            kinds,
+            dynamic_kinds,
+            statics,
+            static_names,
+            params,
+        })
+    }
+
+    /// Whether a static has this name.
+    pub(crate) fn is_static(&self, id: GlobalId) -> bool {
+        self.static_names.binary_search(&id).is_ok()
+    }
+
+    /// Whether a dynamic body may be one of this world: its kind is in the table, its name no static's.
+    pub(crate) fn knows(&self, body: &Body) -> bool {
+        (body.kind.0 as usize) < self.dynamic_kinds && !self.is_static(body.id)
+    }
+
+    #[inline(always)]
+    pub(crate) fn kind(&self, kind: KindId) -> &KindRow {
+        &self.kinds[kind.0 as usize]
+    }
+
+    /// How much a body's AABB is grown: as far as it may come within a step, within limits. In meters.
+    #[inline(always)]
+    pub(crate) fn margin(&self, velocity: Vec2) -> f32 {
+        let speed = math::dot(velocity, velocity).sqrt();
+        math::clamp(speed * self.params.dt, self.params.margin_floor, self.params.margin_cap)
+    }
+
+    /// Half extents of a dynamic body's AABB, grown by its margin. In meters.
+    #[inline(always)]
+    pub(crate) fn grown_half_extents(&self, kind: KindId, rotation: Rot, velocity: Vec2) -> Vec2 {
+        self.kind(kind).half_extents(rotation) + Vec2::splat(self.margin(velocity))
+    }
+
+    /// The statics that a tile must know: those that reach its region grown by the halo.
+    pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
+        let reaches = |body: &Body| {
+            let half = self.kind(body.kind).half_extents(body.rotation);
+            self.grid.reaches(tile, body.position, half, self.halo_width)
+        };
+        (0..).zip(&self.statics).filter(|(_, body)| reaches(body)).map(|(row, _)| row).collect()
+    }
+}

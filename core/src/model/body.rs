@@ -1,0 +1,170 @@
+//! Bodies: one by one as records, and many as a structure of arrays.
+
+use crate::model::id::{GlobalId, KindId};
+use crate::model::math::Rot;
+use crate::model::shape::Kind;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, Vec2};
+
+/// The whole state of one dynamic body. This is also how a body travels: 48 bytes, nothing rounded.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Body {
+    /// Name, for life.
+    pub id: GlobalId,
+    /// Center of mass in the world, in meters.
+    pub position: DVec2,
+    /// Orientation.
+    pub rotation: Rot,
+    /// Velocity of the center, in m/s.
+    pub velocity: Vec2,
+    /// Angular velocity, in rad/s, counter-clockwise.
+    pub angular_velocity: f32,
+    /// Row of the table of kinds.
+    pub kind: KindId,
+}
+
+impl Body {
+    pub(crate) fn is_finite(&self) -> bool {
+        self.position.is_finite()
+            && self.rotation.is_finite()
+            && self.velocity.is_finite()
+            && self.angular_velocity.is_finite()
+    }
+}
+
+/// A body that never moves: every rank knows all of them.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct StaticBody {
+    /// Name; statics take the lowest.
+    pub id: GlobalId,
+    /// Center in the world, in meters.
+    pub position: DVec2,
+    /// Orientation.
+    pub rotation: Rot,
+    /// Outline and stuff.
+    pub kind: Kind,
+}
+
+/// Many bodies, a column for each field, all of one length.
+#[derive(Clone, Default, Debug)]
+pub struct Bodies {
+    /// Names.
+    pub id: Vec<GlobalId>,
+    /// Centers of mass, in meters.
+    pub position: Vec<DVec2>,
+    /// Orientations.
+    pub rotation: Vec<Rot>,
+    /// Velocities, in m/s.
+    pub velocity: Vec<Vec2>,
+    /// Angular velocities, in rad/s.
+    pub angular_velocity: Vec<f32>,
+    /// Rows of the table of kinds.
+    pub kind: Vec<KindId>,
+}
+
+macro_rules! each_column {
+    ($self:ident, $column:ident => $body:expr) => {{
+        {
+            let $column = &mut $self.id;
+            $body;
+        }
+        {
+            let $column = &mut $self.position;
+            $body;
+        }
+        {
+            let $column = &mut $self.rotation;
+            $body;
+        }
+        {
+            let $column = &mut $self.velocity;
+            $body;
+        }
+        {
+            let $column = &mut $self.angular_velocity;
+            $body;
+        }
+        {
+            let $column = &mut $self.kind;
+            $body;
+        }
+    }};
+}
+
+impl Bodies {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.id.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.id.is_empty()
+    }
+
+    /// One body as a record.
+    #[inline]
+    pub fn get(&self, index: usize) -> Body {
+        Body {
+            id: self.id[index],
+            position: self.position[index],
+            rotation: self.rotation[index],
+            velocity: self.velocity[index],
+            angular_velocity: self.angular_velocity[index],
+            kind: self.kind[index],
+        }
+    }
+
+    /// Appends one.
+    pub fn push(&mut self, body: Body) {
+        self.id.push(body.id);
+        self.position.push(body.position);
+        self.rotation.push(body.rotation);
+        self.velocity.push(body.velocity);
+        self.angular_velocity.push(body.angular_velocity);
+        self.kind.push(body.kind);
+    }
+
+    /// Puts one before the body at `index`.
+    pub(crate) fn insert(&mut self, index: usize, body: Body) {
+        self.id.insert(index, body.id);
+        self.position.insert(index, body.position);
+        self.rotation.insert(index, body.rotation);
+        self.velocity.insert(index, body.velocity);
+        self.angular_velocity.insert(index, body.angular_velocity);
+        self.kind.insert(index, body.kind);
+    }
+
+    pub(crate) fn truncate(&mut self, length: usize) {
+        each_column!(self, column => column.truncate(length));
+    }
+
+    /// Removes the bodies at the given ascending indices; the others keep their order.
+    pub(crate) fn remove_sorted(&mut self, gone: &[u32]) {
+        let Some(&first) = gone.first() else { return };
+        each_column!(self, column => {
+            // What lies between two gaps moves as one block.
+            let mut write = first as usize;
+            for (i, &gap) in gone.iter().enumerate() {
+                let block = gap as usize + 1..gone.get(i + 1).map_or(column.len(), |&next| next as usize);
+                column.copy_within(block.clone(), write);
+                write += block.len();
+            }
+            column.truncate(write);
+        });
+    }
+
+    /// Reorders the first `order.len()` bodies: the one at `order[i]` comes to `i`. `self` must hold no others.
+    pub(crate) fn permute(&mut self, order: &[u32]) {
+        debug_assert_eq!(order.len(), self.len());
+        each_column!(self, column => {
+            *column = order.iter().map(|&from| column[from as usize]).collect();
+        });
+    }
+
+    /// All of them as records.
+    pub fn iter(&self) -> impl Iterator<Item = Body> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+}

@@ -1,0 +1,266 @@
+//! Contacts that outlive a step: frozen geometry and impulses, and the cache that keeps them.
+
+use crate::model::id::GlobalId;
+use crate::model::math::Rot;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+
+/// One point of a contact.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ContactPoint {
+    /// Where it lies, from the center of body A when the geometry was frozen, in meters.
+    pub anchor: Vec2,
+    /// Distance of the two surfaces when the geometry was frozen; negative: overlap. In meters.
+    pub separation: f32,
+    /// Impulse along the normal in the last substep, in N s.
+    pub normal_impulse: f32,
+    /// Impulse along the tangent in the last substep, in N s.
+    pub tangent_impulse: f32,
+    /// Which corners, edges or faces touch; [`ContactPoint::ABSENT`] where there is no point.
+    pub feature: u32,
+}
+
+impl ContactPoint {
+    /// The feature of a point that is not there.
+    pub const ABSENT: u32 = u32::MAX;
+}
+
+/// A contact of body A, the one with the lower GlobalId, and body B.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Contact {
+    /// Unit vector from A to B, frozen.
+    pub normal: Vec2,
+    /// Center of B minus center of A when frozen, in meters.
+    pub offset: Vec2,
+    /// Rotation of A when frozen.
+    pub rotation_a: Rot,
+    /// Rotation of B when frozen.
+    pub rotation_b: Rot,
+    /// One or two points; the first is always there.
+    pub points: [ContactPoint; 2],
+}
+
+impl Contact {
+    /// The points that are there.
+    #[inline]
+    pub fn points(&self) -> &[ContactPoint] {
+        &self.points[..self.point_count()]
+    }
+
+    /// One or two.
+    #[inline(always)]
+    pub fn point_count(&self) -> usize {
+        1 + usize::from(self.points[1].feature != ContactPoint::ABSENT)
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        let point = |point: &ContactPoint| {
+            point.anchor.is_finite()
+                && point.separation.is_finite()
+                && point.normal_impulse.is_finite()
+                && point.tangent_impulse.is_finite()
+        };
+        self.normal.is_finite()
+            && self.offset.is_finite()
+            && self.rotation_a.is_finite()
+            && self.rotation_b.is_finite()
+            && self.points.iter().all(point)
+    }
+
+    /// The stored impulses' sum upon body B, and its moments about the centers of A (upon A) and of B (upon B). Body A
+    /// feels the opposite impulse.
+    pub(crate) fn impulse(&self) -> (Vec2, f32, f32) {
+        let tangent = crate::model::math::right_perp(self.normal);
+        let (mut sum, mut on_a, mut on_b) = (Vec2::ZERO, 0.0, 0.0);
+        for point in self.points() {
+            let p = self.normal * point.normal_impulse + tangent * point.tangent_impulse;
+            sum += p;
+            on_a -= crate::model::math::cross(point.anchor, p);
+            on_b += crate::model::math::cross(point.anchor - self.offset, p);
+        }
+        (sum, on_a, on_b)
+    }
+}
+
+/// Which body of a tile: an owned one, a ghost, or a static, each counted from zero. Sorted in that order.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) struct Slot(u32);
+
+/// A [`Slot`] taken apart.
+pub(crate) enum SlotKind {
+    Owned(usize),
+    Ghost(usize),
+    Static(usize),
+}
+
+impl Slot {
+    const GHOST: u32 = 1 << 30;
+    const STATIC: u32 = 1 << 31;
+
+    /// From an index into owned, ghosts and statics, one after the other.
+    #[inline(always)]
+    pub(crate) fn from_index(index: usize, owned: usize, ghosts: usize) -> Self {
+        if index < owned {
+            Self(index as u32)
+        } else if index < owned + ghosts {
+            Self((index - owned) as u32 | Self::GHOST)
+        } else {
+            Self((index - owned - ghosts) as u32 | Self::STATIC)
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn kind(self) -> SlotKind {
+        if self.0 < Self::GHOST {
+            SlotKind::Owned(self.0 as usize)
+        } else if self.0 < Self::STATIC {
+            SlotKind::Ghost((self.0 & !Self::GHOST) as usize)
+        } else {
+            SlotKind::Static((self.0 & !Self::STATIC) as usize)
+        }
+    }
+
+    /// Back to an index into owned, ghosts and statics, one after the other.
+    #[inline(always)]
+    pub(crate) fn index(self, owned: usize, ghosts: usize) -> usize {
+        match self.kind() {
+            SlotKind::Owned(i) => i,
+            SlotKind::Ghost(g) => owned + g,
+            SlotKind::Static(s) => owned + ghosts + s,
+        }
+    }
+}
+
+/// Two slots, the lower first. The lower is always an owned body: a tile solves no other contacts.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Pod, Zeroable)]
+#[repr(transparent)]
+pub(crate) struct PairKey(u64);
+
+impl PairKey {
+    #[inline(always)]
+    pub(crate) fn new(low: Slot, high: Slot) -> Self {
+        debug_assert!(low < high);
+        Self(u64::from(low.0) << 32 | u64::from(high.0))
+    }
+
+    #[inline(always)]
+    pub(crate) fn low(self) -> Slot {
+        Slot((self.0 >> 32) as u32)
+    }
+
+    #[inline(always)]
+    pub(crate) fn high(self) -> Slot {
+        Slot(self.0 as u32)
+    }
+
+    /// Whether the bodies belong to two tiles: then both solve the contact.
+    #[inline(always)]
+    pub(crate) fn is_border(self) -> bool {
+        matches!(self.high().kind(), SlotKind::Ghost(_))
+    }
+}
+
+/// The contacts a tile solved, in canonical order: ascending by the slots of their bodies.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct ContactCache {
+    pub(crate) keys: Vec<PairKey>,
+    pub(crate) contacts: Vec<Contact>,
+}
+
+impl ContactCache {
+    pub(crate) fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.keys.clear();
+        self.contacts.clear();
+    }
+
+    pub(crate) fn append(&mut self, other: &mut Self) {
+        self.keys.append(&mut other.keys);
+        self.contacts.append(&mut other.contacts);
+    }
+
+    /// Becomes a copy of another. Room is made for little more than is needed: there is one cache per tile.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        if self.keys.capacity() < other.len() {
+            self.keys.reserve_exact(other.len() + other.len() / 8);
+            self.contacts.reserve_exact(other.len() + other.len() / 8);
+        }
+        self.keys.extend_from_slice(&other.keys);
+        self.contacts.extend_from_slice(&other.contacts);
+    }
+
+    pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {
+        self.keys.push(key);
+        self.contacts.push(contact);
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (PairKey, &Contact)> {
+        self.keys.iter().copied().zip(&self.contacts)
+    }
+
+    /// Renames every slot and restores the order.
+    pub(crate) fn rename(&mut self, new_slot: impl Fn(Slot) -> Slot) {
+        let mut order: Vec<(PairKey, u32)> = self
+            .keys
+            .iter()
+            .zip(0..)
+            .map(|(key, i)| {
+                let (a, b) = (new_slot(key.low()), new_slot(key.high()));
+                (if a < b { PairKey::new(a, b) } else { PairKey::new(b, a) }, i)
+            })
+            .collect();
+        order.sort_unstable();
+        self.contacts = order.iter().map(|&(_, i)| self.contacts[i as usize]).collect();
+        self.keys.clear();
+        self.keys.extend(order.iter().map(|&(key, _)| key));
+    }
+}
+
+/// Where a contact found by name comes from; where a pair has several entries, the greatest decides.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) enum Authority {
+    /// Another tile, which did not own the lower GlobalId.
+    Foreign,
+    /// This tile's own cache.
+    Own,
+    /// Another tile, which owned the lower GlobalId.
+    ForeignOwner,
+}
+
+/// A contact known by the names of its bodies, because one of them is a ghost, has left or has arrived.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stray {
+    pub(crate) pair: (GlobalId, GlobalId),
+    pub(crate) authority: Authority,
+    pub(crate) contact: Contact,
+}
+
+/// Contacts by the names of their bodies, sorted, one per pair.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Strays(Vec<Stray>);
+
+impl Strays {
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    pub(crate) fn push(&mut self, stray: Stray) {
+        self.0.push(stray);
+    }
+
+    /// Sorts, and keeps the entry of the highest authority of each pair.
+    pub(crate) fn settle(&mut self) {
+        self.0.sort_unstable_by(|a, b| a.pair.cmp(&b.pair).then(b.authority.cmp(&a.authority)));
+        self.0.dedup_by_key(|stray| stray.pair);
+    }
+
+    pub(crate) fn find(&self, pair: (GlobalId, GlobalId)) -> Option<&Contact> {
+        self.0.binary_search_by_key(&pair, |stray| stray.pair).ok().map(|i| &self.0[i].contact)
+    }
+}

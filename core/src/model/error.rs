@@ -1,0 +1,160 @@
+//! What can go wrong, and what to do about it.
+
+use crate::model::id::{GlobalId, KindId, TileId};
+use thiserror::Error;
+
+/// A world that cannot be built.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum SetupError {
+    /// A row of the table of kinds.
+    #[error("kind {}: sizes and density must be positive and finite, friction at least 0, restitution within 0 to 1", kind.0)]
+    BadKind {
+        /// Its row.
+        kind: KindId,
+    },
+    /// A static body.
+    #[error(
+        "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive"
+    )]
+    BadStatic {
+        /// Its name.
+        id: GlobalId,
+    },
+    /// A dynamic body.
+    #[error(
+        "body {id}: position and velocities must be finite, its rotation of length one, its kind a row of the table, its name no static's"
+    )]
+    BadBody {
+        /// Its name.
+        id: GlobalId,
+    },
+    /// A parameter out of range.
+    #[error("parameter {name} = {value}: must be {must}")]
+    BadParam {
+        /// The field of `Params`.
+        name: &'static str,
+        /// What it held.
+        value: f64,
+        /// What it may hold.
+        must: &'static str,
+    },
+    /// The tile grid.
+    #[error("tile grid of {columns} x {rows} tiles over {width} x {height} m: {must}")]
+    BadGrid {
+        /// Tiles along x.
+        columns: u32,
+        /// Tiles along y.
+        rows: u32,
+        /// Width of the domain in meters.
+        width: f64,
+        /// Height of the domain in meters.
+        height: f64,
+        /// What is asked of it.
+        must: &'static str,
+    },
+    /// Sleeping is known within one tile only.
+    #[error(
+        "sleep = true on {tiles} tiles: an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
+    )]
+    SleepAcrossTiles {
+        /// How many tiles there are.
+        tiles: usize,
+    },
+    /// Frozen ghosts take nothing over within a step.
+    #[error("ghosts = \"frozen\" goes with exchange = \"step\" only: read-only copies are heard of once a step")]
+    FrozenSubsteps,
+    /// A tile outside the grid, or named twice.
+    #[error("tile {tile}: outside the grid, or given twice")]
+    BadTile {
+        /// Its name.
+        tile: TileId,
+    },
+}
+
+/// A frame of bytes that is not one of ours.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+pub enum CodecError {
+    /// The header does not decode.
+    #[error("a frame of {length} bytes has no readable header: {reason}")]
+    Header {
+        /// Bytes received.
+        length: usize,
+        /// What the decoder said.
+        reason: String,
+    },
+    /// Written by another version of the program.
+    #[error("a frame of format {found} where {expected} is spoken: run the same version on every rank")]
+    Version {
+        /// In the frame.
+        found: u32,
+        /// Ours.
+        expected: u32,
+    },
+    /// From another step or sync point: the ranks are out of step.
+    #[error("a frame of step {found_step}, sync point {found_sync}, where step {step}, sync point {sync} is under way")]
+    OutOfStep {
+        /// Step in the frame.
+        found_step: u64,
+        /// Sync point in the frame.
+        found_sync: u32,
+        /// Our step.
+        step: u64,
+        /// Our sync point.
+        sync: u32,
+    },
+    /// Lengths that do not add up.
+    #[error("a frame of {length} bytes announces {announced}")]
+    Length {
+        /// Bytes received.
+        length: usize,
+        /// Bytes its header speaks of.
+        announced: u64,
+    },
+    /// A message for a tile that lives elsewhere, or from a tile outside the grid.
+    #[error("a message from tile {from} to tile {to}, which this rank does not hold")]
+    WrongTile {
+        /// Source.
+        from: TileId,
+        /// Destination.
+        to: TileId,
+    },
+    /// A record that names a row the table of kinds does not have.
+    #[error("a record of body {id} that no table entry describes")]
+    BadRecord {
+        /// The body.
+        id: GlobalId,
+    },
+}
+
+/// Why a step ended early. Every rank reports the same one.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum StepError<E> {
+    /// The halo failed: the transport's own error.
+    #[error(transparent)]
+    Halo(E),
+    /// A position or velocity is no longer a finite number.
+    #[error("step {step}: the state of body {id} is no longer finite; a shorter time step or a speed limit may help")]
+    NonFinite {
+        /// The step in which it appeared, counted from 0.
+        step: u64,
+        /// The lowest such body of the whole world.
+        id: GlobalId,
+    },
+    /// A thread of this rank flushes small numbers to zero or rounds in another direction.
+    #[error(
+        "step {step}: the floating-point mode of a thread was changed (flush-to-zero, or another rounding); results \
+         would differ between ranks: find the library that sets it"
+    )]
+    FloatMode {
+        /// The step.
+        step: u64,
+    },
+    /// Two tiles disagree about what was sent: a bug, or memory gone bad.
+    #[error("step {step}: tile {tile} received state of a body it does not know")]
+    Protocol {
+        /// The step.
+        step: u64,
+        /// The receiving tile.
+        tile: TileId,
+    },
+}

@@ -1,0 +1,10 @@
+//! What a world is made of: names, bodies, shapes, materials, contacts, and every number that a step depends on.
+
+pub(crate) mod blueprint;
+pub(crate) mod body;
+pub(crate) mod contact;
+pub(crate) mod error;
+pub(crate) mod id;
+pub(crate) mod math;
+pub(crate) mod params;
+pub(crate) mod shape;

@@ -1,0 +1,10 @@
+//! Doing many things at once: threads that work inside one tile, and lanes of a vector register.
+//!
+//! None of it shows in a result: work is cut by what is to be done, never by who does it.
+
+pub(crate) mod crew;
+#[allow(unsafe_code)]
+pub(crate) mod lanes;
+#[allow(unsafe_code)]
+pub(crate) mod shared;
+pub(crate) mod team;

@@ -1,0 +1,276 @@
+//! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
+
+use super::groups::{Bounce, Group, Groups, NO_CONTACT};
+use crate::collide::broad_phase::Pair;
+use crate::collide::narrow_phase::Contacts;
+use crate::model::blueprint::Setup;
+use crate::model::contact::Contact;
+use crate::model::math::{dot, max, turn};
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
+use crate::parallel::team::Team;
+use crate::solver::batches::{Batch, Batches};
+use crate::solver::bodies::SolverBodies;
+use crate::solver::place::STATIC;
+use crate::tiling::tile::Tile;
+use glam::Vec2;
+
+/// What rows are made of.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub(crate) tile: &'a Tile,
+    pub(crate) contacts: &'a Contacts,
+    pub(crate) bodies: &'a SolverBodies,
+    pub(crate) setup: &'a Setup,
+}
+
+/// Groups of one slice of one color, to be written by one thread.
+struct Unit<'a> {
+    singles: &'a mut [Group<1>],
+    doubles: &'a mut [Group<2>],
+    in_singles: &'a [[u32; LANES]],
+    in_doubles: &'a [[u32; LANES]],
+    /// The first body of the batch, and which of its statics this slice uses.
+    base: u32,
+    slice: u32,
+}
+
+/// Writes the rows of a unit.
+struct Write<'a> {
+    unit: Unit<'a>,
+    source: Source<'a>,
+}
+
+impl Kernel for Write<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { unit, source } = self;
+        let local = Local { base: unit.base, slice: unit.slice };
+        for (group, members) in unit.singles.iter_mut().zip(unit.in_singles) {
+            write::<V, 1>(group, &Inputs::collect(members, source, local));
+        }
+        for (group, members) in unit.doubles.iter_mut().zip(unit.in_doubles) {
+            write::<V, 2>(group, &Inputs::collect(members, source, local));
+        }
+    }
+}
+
+/// How a place among the solver's bodies becomes one in a batch.
+#[derive(Clone, Copy)]
+struct Local {
+    base: u32,
+    slice: u32,
+}
+
+impl Local {
+    #[inline(always)]
+    fn place(self, place: u32) -> u32 {
+        if place == STATIC { self.slice } else { place - self.base }
+    }
+}
+
+/// What the rows of eight contacts follow from; in a lane without one all zero, between its slice's static and itself.
+struct Inputs {
+    a: [u32; LANES],
+    b: [u32; LANES],
+    /// The contacts, four numbers at a time (see [`Contact`]): normal, offset; rotations; two points.
+    contact: [[Quad; LANES]; QUADS],
+    separation: [Row; 2],
+    /// Roots of the masses of both bodies, as the solver has them.
+    weight_a: [Quad; LANES],
+    weight_b: [Quad; LANES],
+    friction_a: Row,
+    friction_b: Row,
+    /// One for a box, zero for a circle.
+    boxy_a: Row,
+    boxy_b: Row,
+}
+
+/// A contact in fours.
+const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
+
+impl Inputs {
+    #[inline(always)]
+    fn collect(members: &[u32; LANES], source: Source<'_>, local: Local) -> Self {
+        const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
+        const ZERO: Row = [0.0; LANES];
+        let mut inputs = Self {
+            a: [local.slice; LANES],
+            b: [local.slice; LANES],
+            contact: [NONE; QUADS],
+            separation: [ZERO; 2],
+            weight_a: NONE,
+            weight_b: NONE,
+            friction_a: ZERO,
+            friction_b: ZERO,
+            boxy_a: ZERO,
+            boxy_b: ZERO,
+        };
+        let Source { tile, contacts, bodies, setup } = source;
+        for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
+            let contact = contact as usize;
+            let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
+            for (lanes, &quad) in inputs.contact.iter_mut().zip(quads) {
+                lanes[lane] = quad;
+            }
+            let separation = contacts.separation[contact];
+            (inputs.separation[0][lane], inputs.separation[1][lane]) = (separation[0], separation[1]);
+            let [a, b] = contacts.bodies[contact];
+            let (place_a, place_b) = (bodies.place_of(a), bodies.place_of(b));
+            (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
+            inputs.weight_a[lane] = bodies.weight[place_a as usize];
+            inputs.weight_b[lane] = bodies.weight[place_b as usize];
+            let kind_a = setup.kind(tile.bodies.kind[a as usize]);
+            let kind_b = setup.kind(tile.bodies.kind[b as usize]);
+            inputs.friction_a[lane] = kind_a.material.friction;
+            inputs.friction_b[lane] = kind_b.material.friction;
+            inputs.boxy_a[lane] = kind_a.boxy();
+            inputs.boxy_b[lane] = kind_b.boxy();
+        }
+        inputs
+    }
+}
+
+/// A vector in every lane.
+#[derive(Clone, Copy)]
+struct Vectors<V> {
+    x: V,
+    y: V,
+}
+
+impl<V: Lanes> Vectors<V> {
+    #[inline(always)]
+    fn scaled(self, by: V) -> Self {
+        Self { x: self.x.mul(by), y: self.y.mul(by) }
+    }
+
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        Self { x: self.x.sub(other.x), y: self.y.sub(other.y) }
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> V {
+        self.x.mul(other.x).add(self.y.mul(other.y))
+    }
+
+    #[inline(always)]
+    fn cross(self, other: Self) -> V {
+        self.x.mul(other.y).sub(self.y.mul(other.x))
+    }
+}
+
+#[inline(always)]
+fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let [normal_x, normal_y, offset_x, offset_y] = V::load_quads(&inputs.contact[0]);
+    let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
+    let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
+    let (boxy_a, boxy_b) = (V::load(&inputs.boxy_a), V::load(&inputs.boxy_b));
+    let normal = Vectors { x: normal_x, y: normal_y };
+    let tangent = Vectors { x: normal_y, y: normal_x.mul(V::splat(-1.0)) };
+    let offset = Vectors { x: offset_x, y: offset_y };
+    let (on_a, on_b) = (normal.scaled(root_mass_a), normal.scaled(root_mass_b));
+    group.a = inputs.a;
+    group.b = inputs.b;
+    on_a.x.store(&mut group.normal_ax);
+    on_a.y.store(&mut group.normal_ay);
+    on_b.x.store(&mut group.normal_bx);
+    on_b.y.store(&mut group.normal_by);
+    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut group.friction);
+    // The roots of a static's inverse masses are zero.
+    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut group.fixed);
+    let linear = on_a.dot(on_a).add(on_b.dot(on_b));
+    // Where there is no contact nothing may come of it, not even the inverse of zero.
+    let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
+    let [x0, y0, _, normal0] = V::load_quads(&inputs.contact[2]);
+    let [tangent0, _, x1, y1] = V::load_quads(&inputs.contact[3]);
+    let [_, normal1, tangent1, _] = V::load_quads(&inputs.contact[4]);
+    let points = [(x0, y0, normal0, tangent0), (x1, y1, normal1, tangent1)];
+    for (k, rows) in group.points.iter_mut().enumerate() {
+        let (x, y, normal_impulse, tangent_impulse) = points[k];
+        let arm_a = Vectors { x, y };
+        let arm_b = arm_a.minus(offset);
+        // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
+        let normal_a = boxy_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
+        let normal_b = boxy_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
+        let (tangent_a, tangent_b) = (root_a.mul(arm_a.cross(tangent)), root_b.mul(arm_b.cross(tangent)));
+        normal_a.store(&mut rows.normal_a);
+        normal_b.store(&mut rows.normal_b);
+        tangent_a.store(&mut rows.tangent_a);
+        tangent_b.store(&mut rows.tangent_b);
+        boxy_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
+        boxy_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
+        inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b))).store(&mut rows.normal_mass);
+        inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b))).store(&mut rows.tangent_mass);
+        rows.first_separation = inputs.separation[k];
+        rows.separation = inputs.separation[k];
+        normal_impulse.store(&mut rows.normal_impulse);
+        tangent_impulse.store(&mut rows.tangent_impulse);
+        zero.store(&mut rows.total_normal);
+        zero.store(&mut rows.total_tangent);
+    }
+}
+
+impl Groups {
+    /// Writes the rows of all contacts where [`Groups::lay_out`] has put them.
+    pub(crate) fn write(&mut self, batches: &Batches, source: Source<'_>, team: Team) {
+        let Self { singles, doubles, in_singles, in_doubles, colors, .. } = self;
+        let (mut singles, mut doubles) = (&mut singles[..], &mut doubles[..]);
+        let (mut in_singles, mut in_doubles) = (&in_singles[..], &in_doubles[..]);
+        let mut next = |batch: &Batch, color: usize, slice: u32| {
+            let (single, double) = colors[color].slice(slice);
+            Unit {
+                singles: singles.split_off_mut(..single.len()).expect("groups lie in order"),
+                doubles: doubles.split_off_mut(..double.len()).expect("groups lie in order"),
+                in_singles: in_singles.split_off(..single.len()).expect("as many as groups"),
+                in_doubles: in_doubles.split_off(..double.len()).expect("as many as groups"),
+                base: batch.bodies.start as u32,
+                slice,
+            }
+        };
+        let each = batches.all.iter().flat_map(|batch| {
+            let colors = &*colors;
+            batch
+                .colors
+                .clone()
+                .flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
+        });
+        if team.is_alone() {
+            each.for_each(|(batch, color, slice)| dispatch(Write { unit: next(batch, color, slice), source }));
+        } else {
+            let units = each.map(|(batch, color, slice)| next(batch, color, slice)).collect();
+            team.for_each(units, |unit| dispatch(Write { unit, source }));
+        }
+    }
+
+    /// Finds the points that may bounce, in canonical order.
+    pub(crate) fn find_bounces(&mut self, source: Source<'_>) {
+        self.bounces.clear();
+        for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
+            let sides = source.contacts.bodies[i];
+            let [a, b] =
+                sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);
+            let restitution = max(a, b);
+            if restitution > 0.0 && self.is_solved(i as u32) {
+                for point in 0..contact.point_count() {
+                    let closing = closing_speed(source.tile, sides, contact, point);
+                    if closing > source.setup.params.restitution_threshold {
+                        let (contact, point) = (i as u32, point as u32);
+                        self.bounces.push(Bounce { contact, point, speed: restitution * closing });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Speed at which a point's surfaces come nearer, in m/s.
+fn closing_speed(tile: &Tile, [a, b]: Pair, contact: &Contact, point: usize) -> f32 {
+    let anchor = contact.points[point].anchor;
+    let velocity = |body: u32, arm: Vec2| {
+        let i = body as usize;
+        tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
+    };
+    -dot(velocity(b, anchor - contact.offset) - velocity(a, anchor), contact.normal)
+}

@@ -1,0 +1,6 @@
+//! What is made of a state between steps: figures, fingerprints, and blocks of bytes to go on from.
+
+pub(crate) mod facts;
+pub(crate) mod hash;
+pub(crate) mod snapshot;
+pub(crate) mod violation;

@@ -1,0 +1,230 @@
+//! The step, whole, from top to bottom.
+
+pub(crate) mod phase;
+pub(crate) mod stage;
+
+use crate::exchange::message::Halo;
+use crate::exchange::migrate;
+use crate::model::error::StepError;
+use crate::model::params::Exchange;
+use crate::solver;
+use crate::state::facts::TileFacts;
+use crate::tiling::tile::Fault;
+use crate::world::World;
+use phase::Phase;
+use stage::{Bench, Work};
+use std::ops::Range;
+
+/// What one step of one rank was like. Counts are of this rank's tiles.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct StepReport {
+    /// The step, counted from 0.
+    pub step: u64,
+    /// Somebody asked the run to stop; every rank sees this in the same step.
+    pub stopped: bool,
+    /// Contacts solved, each counted by one tile.
+    pub contacts: u64,
+    /// Those of them between bodies of two tiles.
+    pub border_contacts: u64,
+    /// Ghosts held.
+    pub ghosts: u64,
+    /// Bodies that came from other tiles.
+    pub migrations: u64,
+    /// Islands, each tile's counted apart.
+    pub islands: u64,
+    /// Bodies in the largest.
+    pub largest_island: u64,
+    /// Bodies whose islands sleep.
+    pub asleep: u64,
+    /// Colors of the contacts of one tile, at most.
+    pub colors: u64,
+}
+
+/// Makes one step of this rank's part of the world.
+///
+/// Every rank of a run calls it equally often, with the same blueprint behind its world. The result depends on the tile
+/// grid and not on how its tiles are spread over ranks and threads.
+///
+/// # Errors
+/// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
+pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
+    world.begin_step();
+    let stopped = migrate(world, halo)?;
+    world.measures |= stopped;
+    match world.setup.params.exchange {
+        // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
+        Exchange::Step => {
+            world.each_tile(|bench| {
+                collide(bench);
+                prepare(bench);
+                solve(bench, 0..bench.setup.params.integrations());
+                finalize(bench);
+            });
+        }
+        Exchange::Substep => {
+            world.each_tile(|bench| {
+                collide(bench);
+                prepare(bench);
+                bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
+            });
+            for substep in 0..world.setup.params.integrations() {
+                // After the last substep only a bounce still looks at a ghost's velocity.
+                let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
+                world.each_tile(|bench| {
+                    solve(bench, substep..substep + 1);
+                    if refreshed {
+                        bench.stage(Phase::Border, send_refresh);
+                    }
+                });
+                if refreshed {
+                    world.exchange(halo)?;
+                    world.each_tile(|bench| bench.stage(Phase::Border, refresh));
+                }
+            }
+            world.each_tile(|bench| {
+                bench.stage(Phase::Finalize, |b| b.work.solver.restitute(b.setup));
+                bench.stage(Phase::Border, send_impulses);
+            });
+            world.exchange(halo)?;
+            world.each_tile(|bench| {
+                bench.stage(Phase::Border, average);
+                finalize(bench);
+            });
+        }
+    }
+    report(world, stopped)
+}
+
+/// The closing exchange of a run, and a look at where everything came to rest.
+///
+/// # Errors
+/// As [`step`]; a failure of the last step is reported here.
+pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
+    world.begin_step();
+    migrate(&mut world, halo)?;
+    Ok(world.each_tile(|bench| {
+        // Manifolds as they are, not as they were frozen.
+        bench.tile.contacts.clear();
+        bench.tile.strays.clear();
+        collide(bench);
+        TileFacts::measure(bench.tile, &bench.work.contacts, bench.setup)
+    }))
+}
+
+/// The first sync point: migrants, then ghosts. Says whether to stop after this step.
+fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H::Error>> {
+    if !world.has_failed() {
+        world.each_tile(|bench| {
+            bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, &mut b.work.migrate, b.setup));
+        });
+    }
+    let verdict = world.exchange(halo)?;
+    if let Some((step, id)) = verdict.failure {
+        return Err(StepError::NonFinite { step, id });
+    }
+    world.each_tile(|bench| {
+        let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.incoming, &mut b.work.migrate, b.setup, b.step);
+        bench.stage(Phase::Migrate, receive);
+    });
+    Ok(verdict.stop)
+}
+
+/// Broad phase, narrow phase.
+fn collide(bench: &mut Bench<'_>) {
+    bench.stage(Phase::Flush, |b| {
+        let (tile, counts) = (&b.tile, [b.tile.owned, b.tile.ghosts()]);
+        b.work.proxies.load(&tile.bodies, counts, tile.corner, b.setup, b.team);
+        if let Some(quadtree) = &mut b.tile.quadtree {
+            quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
+        }
+    });
+    bench.stage(Phase::BroadPhase, |b| {
+        let Work { grid, proxies, pairs, .. } = &mut *b.work;
+        pairs.clear();
+        match &b.tile.quadtree {
+            None => grid.find_pairs(proxies, b.team, pairs),
+            Some(quadtree) => quadtree.find_pairs(proxies, b.team, pairs),
+        }
+    });
+    bench.stage(Phase::NarrowPhase, |b| {
+        let Work { narrow_phase, proxies, pairs, contacts, .. } = &mut *b.work;
+        narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, contacts);
+    });
+}
+
+/// Islands, and who sleeps; constraints.
+fn prepare(bench: &mut Bench<'_>) {
+    bench.stage(Phase::Islands, |b| {
+        let (solver, contacts, params) = (&mut b.work.solver, &b.work.contacts, &b.setup.params);
+        let (nodes, links) = solver.graph(b.tile, &contacts.bodies);
+        let sizes = b.work.islands.find(params.island_search, nodes, links, b.team);
+        let counts = &mut b.tile.counts;
+        (counts.islands, counts.largest_island) = (sizes.islands, sizes.largest);
+        (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
+        solver.gather(b.tile, &contacts.bodies, (b.work.islands.roots(), sizes.largest), b.setup, b.team);
+    });
+    bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
+    bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));
+}
+
+fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
+    bench.stage(Phase::Substeps, |b| b.work.solver.solve(substeps, b.setup, b.team));
+}
+
+/// Restitution where it has not been, and everything written back.
+fn finalize(bench: &mut Bench<'_>) {
+    bench.stage(Phase::Finalize, |b| {
+        let (solver, contacts) = (&mut b.work.solver, &mut b.work.contacts);
+        if b.setup.params.exchange == Exchange::Step {
+            solver.restitute(b.setup);
+        }
+        if b.measures {
+            b.tile.violation = solver.violation(contacts, b.setup);
+        }
+        solver.store_impulses(contacts);
+        b.tile.contacts.copy_from(&contacts.cache);
+        solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
+        b.tile.count_rest(b.setup);
+    });
+}
+
+fn send_refresh(bench: &mut Bench<'_>) {
+    let work = &*bench.work;
+    work.border.send_refresh(bench.tile, &work.solver, &work.contacts, bench.outgoing);
+}
+
+fn refresh(bench: &mut Bench<'_>) {
+    let work = &mut *bench.work;
+    work.border.refresh(bench.tile, &mut work.solver, bench.incoming);
+}
+
+fn send_impulses(bench: &mut Bench<'_>) {
+    let work = &*bench.work;
+    work.border.send_impulses(bench.tile, &work.solver, &work.contacts, bench.outgoing);
+}
+
+fn average(bench: &mut Bench<'_>) {
+    let work = &mut *bench.work;
+    work.border.average(bench.tile, &mut work.solver, &work.contacts, bench.incoming);
+}
+
+fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E>> {
+    let mut report = StepReport { step: world.step, stopped, ..StepReport::default() };
+    for tile in world.tile_states() {
+        match tile.counts.fault {
+            Some(Fault::Protocol) => return Err(StepError::Protocol { step: world.step, tile: tile.id }),
+            Some(Fault::FloatMode) => return Err(StepError::FloatMode { step: world.step }),
+            None => {}
+        }
+        report.contacts += tile.counts.contacts;
+        report.border_contacts += tile.counts.border_contacts;
+        report.ghosts += tile.ghosts() as u64;
+        report.migrations += tile.counts.migrations;
+        report.islands += tile.counts.islands;
+        report.largest_island = report.largest_island.max(tile.counts.largest_island);
+        report.asleep += tile.counts.asleep;
+        report.colors = report.colors.max(tile.counts.colors);
+    }
+    world.end_step();
+    Ok(report)
+}

@@ -1,0 +1,158 @@
+//! A tile: a rectangle of the domain, the bodies it owns, and what it remembers of their contacts.
+
+use crate::collide::broad_phase::quadtree::Quadtree;
+use crate::exchange::message::Unseen;
+use crate::islands::sleep::Sleep;
+use crate::model::blueprint::Setup;
+use crate::model::body::Bodies;
+use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
+use crate::model::id::{GlobalId, TileId};
+use crate::model::params::BroadPhase;
+use crate::state::hash::Hashes;
+use crate::state::violation::Violation;
+use crate::tiling::partition::Region;
+use glam::DVec2;
+
+/// The unit of physics: one step of a tile is a function of its state and of the messages it received.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    pub(crate) id: TileId,
+    pub(crate) region: Region,
+    /// Bodies in here are nobody else's business.
+    pub(crate) interior: Region,
+    /// Local coordinates, where single precision will do, count from here.
+    pub(crate) corner: DVec2,
+    /// Owned bodies, then ghosts, then statics.
+    pub(crate) bodies: Bodies,
+    pub(crate) owned: usize,
+    /// Owned bodies from here on came in this step.
+    pub(crate) arrived: usize,
+    /// One per ghost: the impulse it is given in every substep.
+    pub(crate) unseen: Vec<Unseen>,
+    /// One per ghost, ascending.
+    pub(crate) ghost_owners: Vec<TileId>,
+    /// Rows of the setup's statics.
+    pub(crate) statics: Vec<u32>,
+    /// What was solved last. Between the two halves of the first sync point: only contacts of bodies that stay owned
+    /// here, or of those and statics.
+    pub(crate) contacts: ContactCache,
+    /// The other remembered contacts, filled in the first sync point.
+    pub(crate) strays: Strays,
+    /// Who rests; empty unless `sleep` is on.
+    pub(crate) sleep: Sleep,
+    /// How well the contacts of the last step were solved, if that was measured.
+    pub(crate) violation: Violation,
+    /// The bodies by place, where the parameters ask for it. Never shows in a result.
+    pub(crate) quadtree: Option<Box<Quadtree>>,
+    /// What happened in the step under way.
+    pub(crate) counts: TileCounts,
+}
+
+/// What a tile counts in a step.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct TileCounts {
+    pub(crate) contacts: u64,
+    pub(crate) border_contacts: u64,
+    pub(crate) migrations: u64,
+    /// Bodies that left for a tile that is no neighbour.
+    pub(crate) leaps: u64,
+    pub(crate) islands: u64,
+    pub(crate) largest_island: u64,
+    pub(crate) asleep: u64,
+    pub(crate) colors: u64,
+    /// The lowest owned body whose state is no longer finite.
+    pub(crate) not_finite: Option<GlobalId>,
+    /// What must never happen, and did.
+    pub(crate) fault: Option<Fault>,
+}
+
+/// What ends a run because its results could not be trusted any more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Fault {
+    /// A message spoke of a body that is not known here.
+    Protocol,
+    /// This thread's floating-point unit does not compute as IEEE 754 has it by default.
+    FloatMode,
+}
+
+impl Tile {
+    pub(crate) fn new(id: TileId, setup: &Setup) -> Self {
+        Self::with_statics(id, setup.statics_of(id), setup)
+    }
+
+    /// An empty tile whose statics are known already.
+    pub(crate) fn with_statics(id: TileId, statics: Vec<u32>, setup: &Setup) -> Self {
+        let region = setup.grid.region(id);
+        let quadtree = || Box::new(Quadtree::new(setup.grid.tile_size().as_vec2().to_array()));
+        Self {
+            id,
+            region,
+            interior: region.shrunk(setup.inset),
+            corner: setup.grid.corner(id),
+            bodies: Bodies::default(),
+            owned: 0,
+            arrived: 0,
+            unseen: Vec::new(),
+            ghost_owners: Vec::new(),
+            statics,
+            contacts: ContactCache::default(),
+            strays: Strays::default(),
+            sleep: Sleep::default(),
+            violation: Violation::default(),
+            quadtree: (setup.params.broad_phase == BroadPhase::Quadtree).then(quadtree),
+            counts: TileCounts::default(),
+        }
+    }
+
+    pub(crate) fn ghosts(&self) -> usize {
+        self.unseen.len()
+    }
+
+    /// Index into [`Tile::bodies`] of a slot.
+    #[inline(always)]
+    pub(crate) fn index(&self, slot: Slot) -> usize {
+        slot.index(self.owned, self.ghosts())
+    }
+
+    /// The names of a contact's bodies, the lower first, and whether the slot order is the other way round.
+    #[inline(always)]
+    pub(crate) fn pair_of(&self, key: PairKey) -> (GlobalId, GlobalId) {
+        let (a, b) = (self.bodies.id[self.index(key.low())], self.bodies.id[self.index(key.high())]);
+        if a < b { (a, b) } else { (b, a) }
+    }
+
+    /// Sends islands to sleep, or wakes them. Returns which sleep (see [`Sleep::decide`]).
+    pub(crate) fn fall_asleep(&mut self, nodes: &[u32], roots: &[u32], setup: &Setup) -> &[bool] {
+        self.sleep.resize(self.owned);
+        let (velocity, angular_velocity) = (&mut self.bodies.velocity, &mut self.bodies.angular_velocity);
+        let (islands, count) = self.sleep.decide(nodes, roots, velocity, angular_velocity, setup);
+        self.counts.asleep = count;
+        islands
+    }
+
+    /// Notes who has rested in this step.
+    pub(crate) fn count_rest(&mut self, setup: &Setup) {
+        if setup.params.sleep {
+            let bodies = &self.bodies;
+            let speed = |i: usize| {
+                let reach = setup.kind(bodies.kind[i]).bounding_radius;
+                bodies.velocity[i].length() + reach * bodies.angular_velocity[i].abs()
+            };
+            self.sleep.count_on(speed, setup);
+        }
+    }
+
+    pub(crate) fn hashes(&self) -> Hashes {
+        let mut hashes = Hashes::default();
+        for index in 0..self.owned {
+            hashes.add_body(&self.bodies.get(index));
+        }
+        for (&id, &still) in self.bodies.id.iter().zip(self.sleep.still()) {
+            hashes.add_rest(id, still);
+        }
+        for (key, contact) in self.contacts.iter() {
+            hashes.add_contact(self.id, self.pair_of(key), contact);
+        }
+        hashes
+    }
+}
