@@ -82,7 +82,6 @@ pub use exchange::codec::{FORMAT, Frames};
 pub use exchange::message::{
     BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Halo, Inbox, Message, Outbox, Unseen, Verdict,
 };
-pub use model::blueprint::Blueprint;
 pub use model::body::{Bodies, Body, StaticBody};
 pub use model::contact::{Contact, ContactPoint};
 pub use model::error::{CodecError, SetupError, StepError};
@@ -95,5 +94,6 @@ pub use state::hash::Hashes;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, step};
+pub use tiling::blueprint::Blueprint;
 pub use tiling::partition::{Region, TileGrid};
 pub use world::World;

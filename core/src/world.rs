@@ -1,7 +1,6 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
 use crate::exchange::message::{Halo, Inbox, Mailbag, Outbox, Verdict};
-use crate::model::blueprint::{Blueprint, Setup};
 use crate::model::body::Body;
 use crate::model::error::{SetupError, StepError};
 use crate::model::id::TileId;
@@ -11,6 +10,7 @@ use crate::parallel::team::Team;
 use crate::state::hash::Hashes;
 use crate::step::phase::{Phase, Stopwatch, Timings};
 use crate::step::stage::{Bench, Work};
+use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::tile::{Fault, Tile};
 use rayon::prelude::*;
 use std::sync::Mutex;

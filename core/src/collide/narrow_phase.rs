@@ -3,11 +3,11 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, collide};
 use crate::collide::proxies::Proxies;
-use crate::model::blueprint::Setup;
 use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot};
 use crate::model::math::{Rot, dot, turn};
 use crate::model::shape::{KindRow, Shape};
 use crate::parallel::team::Team;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 use std::ops::Range;

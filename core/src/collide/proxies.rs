@@ -1,10 +1,10 @@
 //! What the search for pairs, and the manifolds after it, know of each body.
 
 use super::broad_phase::Pair;
-use crate::model::blueprint::Setup;
 use crate::model::body::Bodies;
 use crate::model::math::{self, dot};
 use crate::parallel::team::Team;
+use crate::tiling::blueprint::Setup;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 

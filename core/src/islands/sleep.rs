@@ -8,9 +8,9 @@
 //! their impulses, so that they wake as they fell asleep. Source: islands that sleep as in Box2D (E. Catto); here they
 //! are found anew each step, so nothing has to be kept in order.
 
-use crate::model::blueprint::Setup;
 use crate::model::math;
 use crate::solver::place::NOT_SOLVED;
+use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
 /// Who rests since when. Empty where nobody may sleep.
@@ -104,8 +104,8 @@ impl Sleep {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::blueprint::Blueprint;
     use crate::model::params::Params;
+    use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::TileGrid;
     use glam::DVec2;
 

@@ -2,7 +2,6 @@
 
 use super::parallel::ParallelUnionFind;
 use super::{IslandSizes, Islands};
-use crate::model::blueprint::Blueprint;
 use crate::model::body::{Body, StaticBody};
 use crate::model::contact::SlotKind;
 use crate::model::id::{GlobalId, KindId, TileId};
@@ -10,6 +9,7 @@ use crate::model::math::Rot;
 use crate::model::params::{Exchange, IslandSearch, Params};
 use crate::parallel::team::Team;
 use crate::testing::{Loopback, cases, circle, rectangle};
+use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;
 use crate::world::World;

@@ -1,6 +1,5 @@
 //! What a world is made of: names, bodies, shapes, materials, contacts, and every number that a step depends on.
 
-pub(crate) mod blueprint;
 pub(crate) mod body;
 pub(crate) mod contact;
 pub(crate) mod error;
@@ -8,3 +7,4 @@ pub(crate) mod id;
 pub(crate) mod math;
 pub(crate) mod params;
 pub(crate) mod shape;
+pub(crate) mod softness;

@@ -4,9 +4,9 @@ use super::batches::Batches;
 use super::place::{NOT_SOLVED, STATIC};
 use crate::collide::broad_phase::Pair;
 use crate::exchange::message::{GhostRefresh, Unseen};
-use crate::model::blueprint::Setup;
 use crate::model::params::Ghosts;
 use crate::parallel::lanes::Quad;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
 /// The root of how much heavier a frozen ghost is made than it is. With mass-weighted velocities infinity cannot be

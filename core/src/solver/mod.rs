@@ -24,7 +24,6 @@ mod pgs;
 pub(crate) mod place;
 mod run;
 mod soft_step;
-pub(crate) mod softness;
 mod write_back;
 
 pub(crate) use bodies::SolverBodies;
@@ -32,13 +31,13 @@ pub(crate) use write_back::write_back;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
-use crate::model::blueprint::Setup;
 use crate::model::params::{Exchange, Parallel};
 use crate::parallel::crew::{Crew, Member};
 use crate::parallel::lanes::{LANES, dispatch};
 use crate::parallel::shared::Shared;
 use crate::parallel::team::Team;
 use crate::state::violation::Violation;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use batches::{Batches, Graph};
 use coloring::Coloring;

@@ -1,7 +1,7 @@
 //! How bodies move within a substep: gravity, damping, speed limits, and positions by velocities.
 
-use crate::model::blueprint::Setup;
 use crate::parallel::lanes::Lanes;
+use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
 /// What moves a body in a substep, but contacts.

@@ -15,9 +15,9 @@ use super::constraint::groups::Group;
 use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
 use super::motion::Motion;
-use crate::model::blueprint::Setup;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::Lanes;
+use crate::tiling::blueprint::Setup;
 
 /// The whole step of a batch.
 #[inline(always)]

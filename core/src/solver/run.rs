@@ -2,10 +2,10 @@
 
 use super::job::Job;
 use super::{pgs, soft_step};
-use crate::model::blueprint::Setup;
 use crate::model::params::Solver;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{Kernel, Lanes};
+use crate::tiling::blueprint::Setup;
 use std::ops::Range;
 
 /// Some substeps of a job, as one member of its crew, or alone.

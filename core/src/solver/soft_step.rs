@@ -8,10 +8,10 @@ use super::constraint::groups::Group;
 use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
 use super::motion::Motion;
-use super::softness::Softness;
-use crate::model::blueprint::Setup;
+use crate::model::softness::Softness;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::Lanes;
+use crate::tiling::blueprint::Setup;
 
 /// One substep of a batch.
 #[inline(always)]

@@ -3,11 +3,11 @@
 use super::bodies::SolverBodies;
 use super::motion::{Motion, turn_on};
 use super::place::NOT_SOLVED;
-use crate::model::blueprint::Setup;
 use crate::model::id::GlobalId;
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row, dispatch};
 use crate::parallel::team::Team;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 

@@ -1,7 +1,7 @@
 //! What a world looks like at its end: counted per tile in f64, added up in tile order.
 
 use crate::collide::narrow_phase::Contacts;
-use crate::model::blueprint::Setup;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::{Pod, Zeroable};
 

@@ -9,9 +9,9 @@ use crate::exchange::border::Border;
 use crate::exchange::message::Mailbag;
 use crate::exchange::migrate::MigrateWork;
 use crate::islands::Islands;
-use crate::model::blueprint::Setup;
 use crate::parallel::team::Team;
 use crate::solver::Solver;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
 /// Everything a step needs beyond a tile's own state. With one sync point a step, a tile is stepped in one go and a

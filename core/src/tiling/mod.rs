@@ -1,4 +1,5 @@
-//! The domain cut into tiles: which point is whose, and what a tile holds.
+//! The domain cut into tiles: what stands in it for good, which point is whose, and what a tile holds.
 
+pub(crate) mod blueprint;
 pub(crate) mod partition;
 pub(crate) mod tile;

@@ -3,13 +3,13 @@
 use crate::collide::broad_phase::quadtree::Quadtree;
 use crate::exchange::message::Unseen;
 use crate::islands::sleep::Sleep;
-use crate::model::blueprint::Setup;
 use crate::model::body::Bodies;
 use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
 use crate::model::id::{GlobalId, TileId};
 use crate::model::params::BroadPhase;
 use crate::state::hash::Hashes;
 use crate::state::violation::Violation;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
 use glam::DVec2;
 

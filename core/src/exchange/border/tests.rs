@@ -1,13 +1,13 @@
 //! What the sync points within a step carry, and what border contacts leave behind.
 
 use crate::exchange::message::{Halo, Inbox, Outbox};
-use crate::model::blueprint::Blueprint;
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::{Kind, Material, Shape};
 use crate::step;
+use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::world::World;
 use glam::{DVec2, Vec2};

@@ -5,9 +5,9 @@
 //! nothing but the body: whose it is follows from where it is.
 
 use crate::exchange::message::{ContactRecord, GhostRecord, Mailbag, Unseen};
-use crate::model::blueprint::Setup;
 use crate::model::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::model::id::{GlobalId, TileId};
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
 #[cfg(test)]

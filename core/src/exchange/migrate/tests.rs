@@ -3,7 +3,6 @@
 
 use super::{MigrateWork, receive, send};
 use crate::exchange::message::{Halo, Inbox, Mailbag, Outbox, Unseen};
-use crate::model::blueprint::{Blueprint, Setup};
 use crate::model::body::{Body, StaticBody};
 use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, KindId, TileId};
@@ -11,6 +10,7 @@ use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::Kind;
 use crate::testing::{Loopback, any_kind, any_rotation, cases, circle, rectangle};
+use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;
 use crate::world::World;

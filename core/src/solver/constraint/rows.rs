@@ -3,7 +3,6 @@
 use super::groups::{Bounce, Group, Groups, NO_CONTACT};
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
-use crate::model::blueprint::Setup;
 use crate::model::contact::Contact;
 use crate::model::math::{dot, max, turn};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
@@ -11,6 +10,7 @@ use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use crate::solver::place::STATIC;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 

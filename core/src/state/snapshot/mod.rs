@@ -18,11 +18,11 @@
 
 use crate::exchange::message::Unseen;
 use crate::islands::sleep::Sleep;
-use crate::model::blueprint::Setup;
 use crate::model::body::{Bodies, Body};
 use crate::model::contact::{Contact, ContactCache, PairKey, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::state::hash::Hashes;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use crate::world::World;
 use bytemuck::{Pod, Zeroable, cast_slice};

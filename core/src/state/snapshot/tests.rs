@@ -2,7 +2,6 @@
 //! several ranks, on the outside.
 
 use super::{HEADER, SNAPSHOT_FORMAT, SavedTile, UNCHECKED, checksum};
-use crate::model::blueprint::Blueprint;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
@@ -11,6 +10,7 @@ use crate::state::hash::Hashes;
 use crate::state::snapshot::RestoreError;
 use crate::step::step;
 use crate::testing::{Loopback, circle, rectangle};
+use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;
 use crate::world::World;

@@ -6,7 +6,7 @@ use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::{self, Rot};
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::{Kind, KindRow};
-use crate::solver::softness::Softness;
+use crate::model::softness::Softness;
 use crate::tiling::partition::TileGrid;
 use glam::Vec2;
 
