@@ -79,9 +79,9 @@ mod tiling;
 mod world;
 
 pub use exchange::codec::{FORMAT, Frames};
-pub use exchange::message::{
-    BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Halo, Inbox, Message, Outbox, Unseen, Verdict,
-};
+pub use exchange::halo::{Halo, Loopback, NotHere, Verdict};
+pub use exchange::mail::{Inbox, Message, Outbox};
+pub use exchange::record::{BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Unseen};
 pub use model::body::{Bodies, Body, StaticBody};
 pub use model::contact::{Contact, ContactPoint};
 pub use model::error::{CodecError, SetupError, StepError};
@@ -93,7 +93,7 @@ pub use state::facts::{Facts, TileFacts};
 pub use state::hash::Hashes;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use step::phase::{Phase, Timings};
-pub use step::{StepReport, finish, step};
+pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::Blueprint;
 pub use tiling::partition::{Region, TileGrid};
 pub use world::World;

@@ -1,28 +1,14 @@
 //! What this crate's own tests share.
 
-use crate::exchange::message::{Halo, Inbox, Outbox};
 use crate::model::math::Rot;
 use crate::model::shape::{Kind, Material, Shape};
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
-use std::convert::Infallible;
 
 /// How many cases a property is tried on, unless the environment says `PROPTEST_CASES`.
 pub(crate) fn cases(cases: u32) -> ProptestConfig {
     let asked = std::env::var_os("PROPTEST_CASES").is_some();
     if asked { ProptestConfig::default() } else { ProptestConfig::with_cases(cases) }
-}
-
-/// One rank alone.
-pub(crate) struct Loopback;
-
-impl Halo for Loopback {
-    type Error = Infallible;
-
-    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Infallible> {
-        outbox.deliver(inbox);
-        Ok(())
-    }
 }
 
 /// A rough circle.

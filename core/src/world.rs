@@ -1,26 +1,32 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
-use crate::exchange::message::{Halo, Inbox, Mailbag, Outbox, Verdict};
+use crate::exchange::halo::{Halo, Verdict};
+use crate::exchange::mail::{Inbox, Mail, Outbox};
 use crate::model::body::Body;
 use crate::model::error::{SetupError, StepError};
-use crate::model::id::TileId;
+use crate::model::id::{GlobalId, TileId};
 use crate::model::math::float_mode_is_default;
-use crate::model::params::Exchange;
+use crate::model::names::Names;
 use crate::parallel::team::Team;
 use crate::state::hash::Hashes;
 use crate::step::phase::{Phase, Stopwatch, Timings};
-use crate::step::stage::{Bench, Work};
+use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::tile::{Fault, Tile};
 use rayon::prelude::*;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// The tiles one rank holds. The bodies of other ranks' tiles are elsewhere.
 #[derive(Debug)]
 pub struct World {
-    pub(crate) setup: Setup,
+    pub(crate) setup: Arc<Setup>,
     tiles: Vec<Tile>,
-    works: Vec<Mutex<Work>>,
+    /// Of the bodies that were added here.
+    names: Names,
+    /// One per thread.
+    hands: Vec<Mutex<Hand>>,
+    /// Per tile what it keeps between the stages of a step with several sync points.
+    works: Vec<Option<Box<Work>>>,
     outbox: Outbox,
     inbox: Inbox,
     pub(crate) step: u64,
@@ -55,14 +61,31 @@ impl World {
         if let Some(tile) = doubled.or(outside) {
             return Err(SetupError::BadTile { tile });
         }
-        let inbox = Inbox::new(&names, setup.grid.tiles(), setup.dynamic_kinds);
-        let outbox = Outbox { bags: vec![Mailbag::default(); names.len()], ..Outbox::default() };
         let tiles = names.into_iter().map(|id| Tile::new(id, &setup)).collect();
-        Ok(Self {
+        Ok(Self::of(Arc::new(setup), tiles))
+    }
+
+    /// An empty world of every tile of the grid: one that needs no other rank, and can be stepped with
+    /// [`Loopback`](crate::Loopback).
+    ///
+    /// # Errors
+    /// If a parameter, a kind or a static is out of range.
+    pub fn whole(blueprint: &Blueprint) -> Result<Self, SetupError> {
+        let all: Vec<_> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
+        Self::new(blueprint, &all)
+    }
+
+    /// A world of some tiles, which are in ascending order.
+    fn of(setup: Arc<Setup>, tiles: Vec<Tile>) -> Self {
+        let names: Vec<_> = tiles.iter().map(|tile| tile.id).collect();
+        let inbox = Inbox::new(&names, setup.grid.tiles(), setup.dynamic_kinds);
+        Self {
             setup,
+            works: tiles.iter().map(|_| None).collect(),
+            outbox: Outbox::new(tiles.len()),
             tiles,
-            works: Vec::new(),
-            outbox,
+            names: Names::default(),
+            hands: Vec::new(),
             inbox,
             step: 0,
             sync: 0,
@@ -70,15 +93,23 @@ impl World {
             timings: Timings::default(),
             measures: false,
             warned_of_leaps: false,
-        })
+        }
+    }
+
+    /// The same bodies at the same step, in a world that remembers no contacts: to look at.
+    pub(crate) fn copy_bodies(&self) -> Self {
+        let tiles = self.tiles.iter().map(|tile| tile.copy_bodies(&self.setup)).collect();
+        let verdict = Verdict { stop: false, ..self.verdict };
+        Self { step: self.step, verdict, ..Self::of(Arc::clone(&self.setup), tiles) }
     }
 
     /// Adds a body if one of this world's tiles owns it, and says whether. Give every rank every body, in the same
     /// order, or each its own.
     ///
     /// # Errors
-    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name a static's. That no
-    /// two bodies of the world share a name is for the caller to see to.
+    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name taken: by a static, or
+    /// by a body that was added to this world. That bodies of different ranks have different names is for the caller to
+    /// see to.
     pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
         let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
         if !(body.is_finite() && turned && self.setup.knows(&body)) {
@@ -86,6 +117,9 @@ impl World {
         }
         let owner = self.setup.grid.locate(body.position);
         let Ok(place) = self.tiles.binary_search_by_key(&owner, |tile| tile.id) else { return Ok(false) };
+        if !self.names.insert(body.id) {
+            return Err(SetupError::NameTaken { id: body.id });
+        }
         let tile = &mut self.tiles[place];
         // Ghosts and statics of the last step may stand behind the owned bodies.
         tile.bodies.insert(tile.owned, body);
@@ -141,12 +175,8 @@ impl World {
     pub(crate) fn begin_step(&mut self) {
         self.sync = 0;
         let threads = rayon::current_num_threads();
-        let works = match self.setup.params.exchange {
-            Exchange::Step => threads,
-            Exchange::Substep => self.tiles.len(),
-        };
-        if self.works.len() < works {
-            self.works.resize_with(works, Mutex::default);
+        if self.hands.len() < threads {
+            self.hands.resize_with(threads, Mutex::default);
         }
         for tile in &mut self.tiles {
             tile.counts = Default::default();
@@ -160,14 +190,13 @@ impl World {
         }
     }
 
-    /// Ends a step: the clock, and what went wrong.
-    pub(crate) fn end_step(&mut self) {
+    /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
+    pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
         let threads = if apart(self.tiles.len()) { rayon::current_num_threads() as u32 } else { 1 };
-        for work in &mut self.works {
-            let work = work.get_mut().expect("no stage panicked");
-            self.timings.add_share(&std::mem::take(&mut work.timings), threads);
+        for hand in &mut self.hands {
+            let hand = hand.get_mut().expect("no stage panicked");
+            self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
         }
-        let leaps: u64 = self.tiles.iter().map(|tile| tile.counts.leaps).sum();
         if leaps > 0 && !self.warned_of_leaps {
             self.warned_of_leaps = true;
             tracing::warn!(
@@ -175,7 +204,7 @@ impl World {
                 self.step
             );
         }
-        if let Some(id) = self.tiles.iter().filter_map(|tile| tile.counts.not_finite).min() {
+        if let Some(id) = not_finite {
             self.verdict = self.verdict.merge(Verdict { stop: false, failure: Some((self.step, id)) });
         }
         self.measures = false;
@@ -195,32 +224,60 @@ impl World {
         self.inbox.begin(self.step, self.sync);
         self.sync += 1;
         halo.exchange(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
-        self.inbox.sort();
-        self.outbox.bags.iter_mut().for_each(Mailbag::clear);
+        self.inbox.end(&mut self.outbox);
         watch.lap(Phase::Exchange, &mut self.timings);
         Ok(self.inbox.verdict)
     }
 
     /// A stage over all tiles, in parallel; each result at its tile's place.
     pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
-        let Self { setup, works, tiles, outbox, inbox, step, measures, .. } = self;
-        let (setup, works, step, measures) = (&*setup, &*works, *step, *measures);
-        let apart = apart(tiles.len());
+        let results = self.each(|_, _| true, |bench, _| stage(bench));
+        results.into_iter().map(|result| result.expect("every tile was wanted")).collect()
+    }
+
+    /// A stage over the tiles that own bodies: only they have something to tell, or to solve.
+    pub(crate) fn each_owner(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each(|tile, _| !tile.is_idle(), |bench, _| stage(bench));
+    }
+
+    /// A stage over the tiles that own bodies, are about to, or have until now.
+    pub(crate) fn each_heir(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each(|tile, mail| !tile.is_bare() || mail.brings_migrants(), |bench, _| stage(bench));
+    }
+
+    /// As [`each_owner`](Self::each_owner), for what a tile keeps from stage to stage.
+    pub(crate) fn each_solver(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each(|tile, _| !tile.is_idle(), |bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
+    }
+
+    /// A stage over the tiles that are wanted, in parallel.
+    fn each<R: Send>(
+        &mut self,
+        wanted: impl Fn(&Tile, Mail<'_>) -> bool + Sync,
+        stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync,
+    ) -> Vec<Option<R>> {
+        let apart = apart(self.tiles.len());
+        let Self { setup, hands, works, tiles, outbox, inbox, step, measures, .. } = self;
         let team = if apart { Team::ALONE } else { Team::of_pool() };
-        let per_tile = setup.params.exchange == Exchange::Substep;
-        let run = |(place, ((tile, outgoing), incoming)): (usize, ((&mut Tile, _), _))| {
-            let work = if per_tile { place } else { rayon::current_thread_index().unwrap_or(0) };
-            let mut work = works[work].lock().expect("no stage panicked");
+        let shop = Shop { setup, step: *step, team, measures: *measures };
+        let (hands, inbox) = (&*hands, &*inbox);
+        let run = |(place, ((tile, outgoing), own)): (usize, ((&mut Tile, _), &mut Option<Box<Work>>))| {
+            let mail = inbox.mail(place);
+            if !wanted(tile, mail) {
+                *own = None;
+                return None;
+            }
+            let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
             if !float_mode_is_default() {
                 tile.counts.fault = Some(Fault::FloatMode);
             }
-            stage(&mut Bench { tile, work: &mut work, outgoing, incoming, setup, step, team, measures })
+            Some(stage(&mut Bench::new(shop, tile, (outgoing, mail), &mut hand), own))
         };
         if !apart {
-            tiles.iter_mut().zip(&mut outbox.bags).zip(&inbox.bags).enumerate().map(run).collect()
+            tiles.iter_mut().zip(&mut outbox.bags).zip(works).enumerate().map(run).collect()
         } else {
             let tiles = tiles.par_iter_mut().with_max_len(1);
-            tiles.zip(&mut outbox.bags).zip(&inbox.bags).enumerate().map(run).collect()
+            tiles.zip(&mut outbox.bags).zip(works).enumerate().map(run).collect()
         }
     }
 }

@@ -4,11 +4,10 @@
 //! alone in its process; [`crate::ranks::run`] spreads the same tiles over several ranks.
 
 use atoll_core::{
-    Blueprint, Body, Exchange, Facts, GlobalId, Halo, Hashes, Inbox, Kind, KindId, Material, Outbox, Params, Rot,
-    Shape, StaticBody, StepReport, TileGrid, TileId, World, finish, step,
+    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, Kind, KindId, Loopback, Material, Params, Rot, Shape,
+    StaticBody, StepReport, TileGrid, TileId, World, finish, step,
 };
 use glam::{DVec2, Vec2};
-use std::convert::Infallible;
 
 /// Where the tile borders run, seen from the middle of the action.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -144,19 +143,6 @@ impl Scene {
             assert!(world.add(body).expect("a body that can be added"), "body {} has no owner", body.id);
         }
         Sim { world, kinds: self.kinds.clone(), report: StepReport::default() }
-    }
-}
-
-/// The halo of a rank that holds every tile.
-#[derive(Clone, Copy, Debug)]
-pub struct Loopback;
-
-impl Halo for Loopback {
-    type Error = Infallible;
-
-    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Infallible> {
-        outbox.deliver(inbox);
-        Ok(())
     }
 }
 

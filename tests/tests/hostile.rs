@@ -3,7 +3,7 @@
 //! panic, no error of two lines, and no more memory than the bytes that came can justify.
 
 use atoll::scene::SplitMix64;
-use atoll_core::{KindId, Message, TileId};
+use atoll_core::{KindId, TileId};
 use atoll_tests::{fuzz, program};
 use bytemuck::Pod;
 use proptest::prelude::*;
@@ -82,9 +82,9 @@ fn records<T: Pod>(random: &mut SplitMix64) -> Vec<T> {
 
 /// A frame that is what it should be, whatever its records hold.
 fn genuine(random: &mut SplitMix64) -> Vec<u8> {
-    let messages: Vec<Message> = (0..below(random, 5))
+    let letters: Vec<fuzz::Letter> = (0..below(random, 5))
         .map(|_| {
-            let mut message = Message {
+            let mut letter = fuzz::Letter {
                 from: TileId(random.bits() as u32 % fuzz::TILES),
                 to: TileId(0),
                 migrants: records(random),
@@ -93,12 +93,12 @@ fn genuine(random: &mut SplitMix64) -> Vec<u8> {
                 refreshes: records(random),
                 impulses: records(random),
             };
-            let ghosts = message.ghosts.iter_mut().map(|ghost| &mut ghost.body);
-            message.migrants.iter_mut().chain(ghosts).for_each(|body| body.kind = KindId(0));
-            message
+            let ghosts = letter.ghosts.iter_mut().map(|ghost| &mut ghost.body);
+            letter.migrants.iter_mut().chain(ghosts).for_each(|body| body.kind = KindId(0));
+            letter
         })
         .collect();
-    fuzz::frame(messages.iter())
+    fuzz::frame(letters.iter().map(fuzz::Letter::message))
 }
 
 /// Length of the counts of one message.
@@ -196,9 +196,9 @@ fn random_frames_neither_panic_nor_fill_the_memory() {
 fn a_frame_costs_what_it_brings_and_not_what_it_announces() {
     let mut random = SplitMix64::after(2, 0);
     // As many empty messages as fit: what costs most for its length.
-    let empty = Message { from: TileId(1), to: TileId(0), ..Message::default() };
+    let empty = fuzz::Letter { from: TileId(1), to: TileId(0), ..fuzz::Letter::default() };
     let many = vec![empty; 40_000];
-    let bytes = fuzz::frame(many.iter());
+    let bytes = fuzz::frame(many.iter().map(fuzz::Letter::message));
     let (asked, accepted) = cost(&bytes);
     assert!(accepted && asked <= allowed_at_most(bytes.len()), "{asked} bytes for {}", bytes.len());
     // The same bytes, announced as something else.

@@ -2,19 +2,7 @@
 
 use super::case::Case;
 use super::{Failure, Simulation};
-use ::atoll_core::{Body, Halo, Inbox, Kind, Outbox, TileId, World};
-use std::convert::Infallible;
-
-/// The halo of tiles that all live in one process.
-pub struct Loopback;
-
-impl Halo for Loopback {
-    type Error = Infallible;
-    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Infallible> {
-        outbox.deliver(inbox);
-        Ok(())
-    }
-}
+use ::atoll_core::{Body, Kind, Loopback, World};
 
 /// This version of Atoll.
 pub fn version() -> String {
@@ -36,8 +24,7 @@ impl Simulated {
     /// If the scene makes no world.
     pub fn new(case: &Case) -> Result<Self, Failure> {
         let blueprint = &case.plan.blueprint;
-        let tiles: Vec<TileId> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
-        let mut world = World::new(blueprint, &tiles).map_err(Failure::refused)?;
+        let mut world = World::whole(blueprint).map_err(Failure::refused)?;
         for body in case.plan.scene.iter() {
             world.add(body).map_err(Failure::refused)?;
         }

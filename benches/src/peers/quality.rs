@@ -1,7 +1,6 @@
 //! What the end of a run looks like, measured by the same code for every engine.
 
 use super::Failure;
-use super::atoll::Loopback;
 use super::case::Case;
 use ::atoll_core::{Body, Facts, TileId, World};
 use serde::{Deserialize, Serialize};
@@ -40,7 +39,7 @@ pub fn measure(case: &Case, bodies: &[Body]) -> Result<Quality, Failure> {
     for &body in bodies {
         world.add(body).map_err(|error| Failure::broken(format!("at the end: {error}")))?;
     }
-    let tiles = atoll_core::finish(world, &mut Loopback).map_err(Failure::broken)?;
+    let tiles = atoll_core::finish(world, &mut atoll_core::Loopback).map_err(Failure::broken)?;
     let facts = Facts::total(tiles);
     Ok(Quality {
         contacts: facts.contacts,

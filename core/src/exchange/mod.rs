@@ -2,5 +2,7 @@
 
 pub(crate) mod border;
 pub(crate) mod codec;
-pub(crate) mod message;
+pub(crate) mod halo;
+pub(crate) mod mail;
 pub(crate) mod migrate;
+pub(crate) mod record;

@@ -2,13 +2,14 @@
 
 use super::parallel::ParallelUnionFind;
 use super::{IslandSizes, Islands};
+use crate::Loopback;
 use crate::model::body::{Body, StaticBody};
 use crate::model::contact::SlotKind;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, IslandSearch, Params};
 use crate::parallel::team::Team;
-use crate::testing::{Loopback, cases, circle, rectangle};
+use crate::testing::{cases, circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;

@@ -25,6 +25,11 @@ pub struct Body {
 }
 
 impl Body {
+    /// A body that stands upright and does not move.
+    pub fn at_rest(id: GlobalId, kind: KindId, position: DVec2) -> Self {
+        Self { id, position, rotation: Rot::IDENTITY, velocity: Vec2::ZERO, angular_velocity: 0.0, kind }
+    }
+
     pub(crate) fn is_finite(&self) -> bool {
         self.position.is_finite()
             && self.rotation.is_finite()
@@ -44,6 +49,13 @@ pub struct StaticBody {
     pub rotation: Rot,
     /// Outline and stuff.
     pub kind: Kind,
+}
+
+impl StaticBody {
+    /// A static that stands upright.
+    pub fn new(id: GlobalId, kind: Kind, position: DVec2) -> Self {
+        Self { id, position, rotation: Rot::IDENTITY, kind }
+    }
 }
 
 /// Many bodies, a column for each field, all of one length.
@@ -101,6 +113,11 @@ impl Bodies {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.id.is_empty()
+    }
+
+    /// Whether it holds memory.
+    pub(crate) fn has_room(&self) -> bool {
+        self.id.capacity() > 0
     }
 
     /// One body as a record.

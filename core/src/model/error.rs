@@ -28,6 +28,12 @@ pub enum SetupError {
         /// Its name.
         id: GlobalId,
     },
+    /// Two dynamic bodies of one name.
+    #[error("body {id}: another body has this name; give each its own")]
+    NameTaken {
+        /// The name.
+        id: GlobalId,
+    },
     /// A parameter out of range.
     #[error("parameter {name} = {value}: must be {must}")]
     BadParam {

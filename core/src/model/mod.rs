@@ -5,6 +5,7 @@ pub(crate) mod contact;
 pub(crate) mod error;
 pub(crate) mod id;
 pub(crate) mod math;
+pub(crate) mod names;
 pub(crate) mod params;
 pub(crate) mod shape;
 pub(crate) mod softness;

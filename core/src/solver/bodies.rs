@@ -3,7 +3,7 @@
 use super::batches::Batches;
 use super::place::{NOT_SOLVED, STATIC};
 use crate::collide::broad_phase::Pair;
-use crate::exchange::message::{GhostRefresh, Unseen};
+use crate::exchange::record::{GhostRefresh, Unseen};
 use crate::model::params::Ghosts;
 use crate::parallel::lanes::Quad;
 use crate::tiling::blueprint::Setup;

@@ -3,9 +3,10 @@
 pub(crate) mod phase;
 pub(crate) mod stage;
 
-use crate::exchange::message::Halo;
+use crate::exchange::halo::Halo;
 use crate::exchange::migrate;
 use crate::model::error::StepError;
+use crate::model::id::GlobalId;
 use crate::model::params::Exchange;
 use crate::solver;
 use crate::state::facts::TileFacts;
@@ -26,7 +27,7 @@ pub struct StepReport {
     pub contacts: u64,
     /// Those of them between bodies of two tiles.
     pub border_contacts: u64,
-    /// Ghosts held.
+    /// Ghosts that this rank's tiles sent.
     pub ghosts: u64,
     /// Bodies that came from other tiles.
     pub migrations: u64,
@@ -54,7 +55,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
-            world.each_tile(|bench| {
+            world.each_owner(|bench| {
                 collide(bench);
                 prepare(bench);
                 solve(bench, 0..bench.setup.params.integrations());
@@ -62,7 +63,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             });
         }
         Exchange::Substep => {
-            world.each_tile(|bench| {
+            world.each_solver(|bench| {
                 collide(bench);
                 prepare(bench);
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
@@ -70,7 +71,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             for substep in 0..world.setup.params.integrations() {
                 // After the last substep only a bounce still looks at a ghost's velocity.
                 let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
-                world.each_tile(|bench| {
+                world.each_solver(|bench| {
                     solve(bench, substep..substep + 1);
                     if refreshed {
                         bench.stage(Phase::Border, send_refresh);
@@ -78,15 +79,15 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 });
                 if refreshed {
                     world.exchange(halo)?;
-                    world.each_tile(|bench| bench.stage(Phase::Border, refresh));
+                    world.each_solver(|bench| bench.stage(Phase::Border, refresh));
                 }
             }
-            world.each_tile(|bench| {
+            world.each_solver(|bench| {
                 bench.stage(Phase::Finalize, |b| b.work.solver.restitute(b.setup));
                 bench.stage(Phase::Border, send_impulses);
             });
             world.exchange(halo)?;
-            world.each_tile(|bench| {
+            world.each_solver(|bench| {
                 bench.stage(Phase::Border, average);
                 finalize(bench);
             });
@@ -95,7 +96,17 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
     report(world, stopped)
 }
 
-/// The closing exchange of a run, and a look at where everything came to rest.
+/// The figures of a world between two steps: energies, contacts, overlaps, tile by tile ([`Facts::total`](crate::Facts::total)
+/// adds them up). The world stays as it is. Every rank must call it at the same step: it is an exchange, and costs a
+/// part of a step, and a copy of the bodies while it lasts.
+///
+/// # Errors
+/// As [`step`]; a failure of the last step is reported here.
+pub fn measure<H: Halo>(world: &World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
+    finish(world.copy_bodies(), halo)
+}
+
+/// The closing exchange of a run, and a look at where everything came to rest: as [`measure`], without a copy.
 ///
 /// # Errors
 /// As [`step`]; a failure of the last step is reported here.
@@ -114,16 +125,16 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
 /// The first sync point: migrants, then ghosts. Says whether to stop after this step.
 fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H::Error>> {
     if !world.has_failed() {
-        world.each_tile(|bench| {
-            bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, &mut b.work.migrate, b.setup));
+        world.each_owner(|bench| {
+            bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
         });
     }
     let verdict = world.exchange(halo)?;
     if let Some((step, id)) = verdict.failure {
         return Err(StepError::NonFinite { step, id });
     }
-    world.each_tile(|bench| {
-        let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.incoming, &mut b.work.migrate, b.setup, b.step);
+    world.each_heir(|bench| {
+        let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.mail, b.migrate, b.setup, b.step);
         bench.stage(Phase::Migrate, receive);
     });
     Ok(verdict.stop)
@@ -195,7 +206,7 @@ fn send_refresh(bench: &mut Bench<'_>) {
 
 fn refresh(bench: &mut Bench<'_>) {
     let work = &mut *bench.work;
-    work.border.refresh(bench.tile, &mut work.solver, bench.incoming);
+    work.border.refresh(bench.tile, &mut work.solver, bench.mail);
 }
 
 fn send_impulses(bench: &mut Bench<'_>) {
@@ -205,26 +216,30 @@ fn send_impulses(bench: &mut Bench<'_>) {
 
 fn average(bench: &mut Bench<'_>) {
     let work = &mut *bench.work;
-    work.border.average(bench.tile, &mut work.solver, &work.contacts, bench.incoming);
+    work.border.average(bench.tile, &mut work.solver, &work.contacts, bench.mail);
 }
 
 fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E>> {
     let mut report = StepReport { step: world.step, stopped, ..StepReport::default() };
+    let (mut leaps, mut not_finite): (u64, Option<GlobalId>) = (0, None);
     for tile in world.tile_states() {
-        match tile.counts.fault {
+        let counts = &tile.counts;
+        match counts.fault {
             Some(Fault::Protocol) => return Err(StepError::Protocol { step: world.step, tile: tile.id }),
             Some(Fault::FloatMode) => return Err(StepError::FloatMode { step: world.step }),
             None => {}
         }
-        report.contacts += tile.counts.contacts;
-        report.border_contacts += tile.counts.border_contacts;
-        report.ghosts += tile.ghosts() as u64;
-        report.migrations += tile.counts.migrations;
-        report.islands += tile.counts.islands;
-        report.largest_island = report.largest_island.max(tile.counts.largest_island);
-        report.asleep += tile.counts.asleep;
-        report.colors = report.colors.max(tile.counts.colors);
+        report.contacts += counts.contacts;
+        report.border_contacts += counts.border_contacts;
+        report.ghosts += counts.ghosts;
+        report.migrations += counts.migrations;
+        report.islands += counts.islands;
+        report.largest_island = report.largest_island.max(counts.largest_island);
+        report.asleep += counts.asleep;
+        report.colors = report.colors.max(counts.colors);
+        leaps += counts.leaps;
+        not_finite = not_finite.into_iter().chain(counts.not_finite).min();
     }
-    world.end_step();
+    world.end_step(leaps, not_finite);
     Ok(report)
 }

@@ -88,6 +88,7 @@ impl Timings {
 }
 
 /// Times one phase after another.
+#[derive(Clone, Copy)]
 pub(crate) struct Stopwatch(Instant);
 
 impl Stopwatch {

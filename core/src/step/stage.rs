@@ -6,7 +6,7 @@ use crate::collide::broad_phase::grid::Grid;
 use crate::collide::narrow_phase::{Contacts, NarrowPhase};
 use crate::collide::proxies::Proxies;
 use crate::exchange::border::Border;
-use crate::exchange::message::Mailbag;
+use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::migrate::MigrateWork;
 use crate::islands::Islands;
 use crate::parallel::team::Team;
@@ -14,12 +14,11 @@ use crate::solver::Solver;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
-/// Everything a step needs beyond a tile's own state. With one sync point a step, a tile is stepped in one go and a
+/// Everything that is derived of a tile's state in a step. With one sync point a step, a tile is stepped in one go and a
 /// thread's tiles share one of these, so that little more than the bodies streams through memory; with several, every
-/// tile keeps its own between them.
+/// tile that owns bodies keeps its own between them.
 #[derive(Default, Debug)]
 pub(crate) struct Work {
-    pub(crate) migrate: MigrateWork,
     pub(crate) proxies: Proxies,
     pub(crate) grid: Grid,
     pub(crate) pairs: Vec<Pair>,
@@ -28,29 +27,66 @@ pub(crate) struct Work {
     pub(crate) islands: Islands,
     pub(crate) solver: Solver,
     pub(crate) border: Border,
+}
+
+/// What a thread has for all tiles it works on.
+#[derive(Default, Debug)]
+pub(crate) struct Hand {
+    pub(crate) migrate: MigrateWork,
     pub(crate) timings: Timings,
+    /// For tiles that are stepped in one go.
+    work: Work,
 }
 
 /// One tile with all it needs for a stage.
 pub(crate) struct Bench<'a> {
     pub(crate) tile: &'a mut Tile,
     pub(crate) work: &'a mut Work,
+    pub(crate) migrate: &'a mut MigrateWork,
     pub(crate) outgoing: &'a mut Mailbag,
-    pub(crate) incoming: &'a Mailbag,
+    pub(crate) mail: Mail<'a>,
     pub(crate) setup: &'a Setup,
     pub(crate) step: u64,
     /// Who works on this tile.
     pub(crate) team: Team,
     /// Whether this step measures how well its contacts are solved.
     pub(crate) measures: bool,
+    timings: &'a mut Timings,
+    watch: Stopwatch,
 }
 
-impl Bench<'_> {
-    /// Runs one stage and books its time.
+/// What is the same for all tiles in one stage.
+#[derive(Clone, Copy)]
+pub(crate) struct Shop<'a> {
+    pub(crate) setup: &'a Setup,
+    pub(crate) step: u64,
+    pub(crate) team: Team,
+    pub(crate) measures: bool,
+}
+
+impl<'a> Bench<'a> {
+    pub(crate) fn new(
+        shop: Shop<'a>,
+        tile: &'a mut Tile,
+        (outgoing, mail): (&'a mut Mailbag, Mail<'a>),
+        hand: &'a mut Hand,
+    ) -> Self {
+        let Hand { migrate, timings, work } = hand;
+        let Shop { setup, step, team, measures } = shop;
+        Self { tile, work, migrate, outgoing, mail, setup, step, team, measures, timings, watch: Stopwatch::start() }
+    }
+
+    /// The same with work of the tile's own.
+    pub(crate) fn with_work<'b>(&'b mut self, work: &'b mut Work) -> Bench<'b> {
+        let Self { tile, migrate, outgoing, timings, .. } = self;
+        let Self { mail, setup, step, team, measures, watch, .. } = *self;
+        Bench { tile, work, migrate, outgoing, mail, setup, step, team, measures, timings, watch }
+    }
+
+    /// Runs one stage and books the time since the one before.
     pub(crate) fn stage(&mut self, phase: Phase, stage: impl FnOnce(&mut Self)) {
         let _span = tracing::trace_span!("stage", name = phase.name(), tile = self.tile.id.0).entered();
-        let mut watch = Stopwatch::start();
         stage(self);
-        watch.lap(phase, &mut self.work.timings);
+        self.watch.lap(phase, self.timings);
     }
 }

@@ -1,7 +1,7 @@
 //! A tile: a rectangle of the domain, the bodies it owns, and what it remembers of their contacts.
 
 use crate::collide::broad_phase::quadtree::Quadtree;
-use crate::exchange::message::Unseen;
+use crate::exchange::record::Unseen;
 use crate::islands::sleep::Sleep;
 use crate::model::body::Bodies;
 use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
@@ -54,6 +54,8 @@ pub(crate) struct TileCounts {
     pub(crate) contacts: u64,
     pub(crate) border_contacts: u64,
     pub(crate) migrations: u64,
+    /// Ghosts that other tiles were sent.
+    pub(crate) ghosts: u64,
     /// Bodies that left for a tile that is no neighbour.
     pub(crate) leaps: u64,
     pub(crate) islands: u64,
@@ -102,6 +104,35 @@ impl Tile {
             quadtree: (setup.params.broad_phase == BroadPhase::Quadtree).then(quadtree),
             counts: TileCounts::default(),
         }
+    }
+
+    /// A tile of the same bodies that remembers nothing but how well its contacts were solved.
+    pub(crate) fn copy_bodies(&self, setup: &Setup) -> Self {
+        let mut bodies = self.bodies.clone();
+        bodies.truncate(self.owned);
+        let empty = Self::with_statics(self.id, self.statics.clone(), setup);
+        Self { bodies, owned: self.owned, violation: self.violation, ..empty }
+    }
+
+    /// Whether it owns nothing: then a step has nothing to do here.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.owned == 0
+    }
+
+    /// Whether it owns nothing and remembers nothing.
+    pub(crate) fn is_bare(&self) -> bool {
+        self.is_idle() && !self.bodies.has_room()
+    }
+
+    /// What an idle tile remembers is forgotten, and its memory given back: there may be very many of them.
+    pub(crate) fn lay_bare(&mut self) {
+        debug_assert!(self.is_idle());
+        self.bodies = Bodies::default();
+        self.contacts = ContactCache::default();
+        self.strays = Strays::default();
+        self.unseen = Vec::new();
+        self.ghost_owners = Vec::new();
+        self.violation = Violation::default();
     }
 
     pub(crate) fn ghosts(&self) -> usize {

@@ -2,8 +2,8 @@
 
 use super::assert_one_line;
 use atoll_core::{
-    Blueprint, Exchange, FORMAT, Halo, Inbox, Kind, Material, Message, Outbox, Params, Shape, StepError, TileGrid,
-    TileId, World, step,
+    Blueprint, Body, BorderImpulse, ContactRecord, Exchange, FORMAT, GhostRecord, GhostRefresh, Halo, Inbox, Kind,
+    Material, Message, Outbox, Params, Shape, StepError, TileGrid, TileId, World, step,
 };
 use bytemuck::cast_slice;
 use glam::DVec2;
@@ -42,9 +42,36 @@ pub fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
     ear.heard.expect("a step begins with an exchange")
 }
 
+/// A message that owns its records.
+#[derive(Clone, Default, Debug)]
+pub struct Letter {
+    /// Source.
+    pub from: TileId,
+    /// Destination.
+    pub to: TileId,
+    /// As in [`Message`], here and below.
+    pub migrants: Vec<Body>,
+    /// Contacts of those bodies.
+    pub contacts: Vec<ContactRecord>,
+    /// Ghosts.
+    pub ghosts: Vec<GhostRecord>,
+    /// The ghosts' state after a substep.
+    pub refreshes: Vec<GhostRefresh>,
+    /// What border contacts did.
+    pub impulses: Vec<BorderImpulse>,
+}
+
+impl Letter {
+    /// The message itself.
+    pub fn message(&self) -> Message<'_> {
+        let Self { from, to, migrants, contacts, ghosts, refreshes, impulses } = self;
+        Message { from: *from, to: *to, migrants, contacts, ghosts, refreshes, impulses }
+    }
+}
+
 /// A frame of step 0, sync point 0, written after the description of the format alone: what `Frames::encode` would
 /// write.
-pub fn frame<'a>(messages: impl Iterator<Item = &'a Message> + Clone) -> Vec<u8> {
+pub fn frame<'a>(messages: impl Iterator<Item = Message<'a>> + Clone) -> Vec<u8> {
     let mut bytes = Vec::new();
     let count = |length: usize| (length as u32).to_le_bytes();
     bytes.extend(FORMAT.to_le_bytes());
@@ -73,7 +100,7 @@ pub fn frame<'a>(messages: impl Iterator<Item = &'a Message> + Clone) -> Vec<u8>
 pub fn codec(bytes: &[u8]) -> bool {
     let decoded = receive(|inbox| {
         let result = inbox.decode(bytes);
-        result.map(|()| frame(inbox.messages().collect::<Vec<_>>().into_iter()))
+        result.map(|()| frame(inbox.messages()))
     });
     match &decoded {
         Ok(again) => assert!(again == bytes, "{bytes:02x?} were taken for {again:02x?}"),

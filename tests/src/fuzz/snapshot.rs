@@ -2,8 +2,8 @@
 
 use super::assert_one_line;
 use crate::scenes;
-use crate::world::{Loopback, Scene};
-use atoll_core::{Exchange, Hashes, RestoreError, SNAPSHOT_FORMAT, TileId, World, step};
+use crate::world::Scene;
+use atoll_core::{Exchange, Hashes, Loopback, RestoreError, SNAPSHOT_FORMAT, TileId, World, step};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Where the checksum of a block ends and what it is of begins.

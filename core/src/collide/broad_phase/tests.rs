@@ -4,7 +4,7 @@ use super::Pair;
 use super::grid::Grid;
 use super::quadtree::Quadtree;
 use crate::collide::proxies::Proxies;
-use crate::exchange::message::Unseen;
+use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;

@@ -5,7 +5,8 @@
 //! so the bodies that one side sends are exactly those the other expects, in the order of its ghost list.
 
 use crate::collide::narrow_phase::Contacts;
-use crate::exchange::message::{BorderImpulse, BorderPoint, GhostRefresh, Mailbag, Unseen};
+use crate::exchange::mail::{Mail, Mailbag};
+use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
 use crate::model::contact::{Contact, ContactPoint, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::solver::Solver;
@@ -25,6 +26,10 @@ pub(crate) struct Border {
     ghosts: Vec<u32>,
     /// Border contacts by the names of their bodies, sorted.
     contacts: Vec<BorderContact>,
+    /// Places in `sends` in the order they are sent: by peer, and for each as its ghosts are ordered.
+    send_order: Vec<u32>,
+    /// Places in `contacts` in the order they are sent: by peer.
+    contact_order: Vec<u32>,
     /// For every owned body the range of its `sends`; all empty between steps.
     sends_of: Vec<(u32, u32)>,
 }
@@ -76,6 +81,16 @@ impl Border {
         self.ghosts.sort_unstable();
         self.ghosts.dedup();
         self.contacts.sort_unstable();
+        let Self { sends, contacts: by_pair, send_order, contact_order, .. } = self;
+        send_order.clear();
+        send_order.extend(0..sends.len() as u32);
+        send_order.sort_unstable_by_key(|&i| {
+            let Outgoing { body, peer } = sends[i as usize];
+            (peer, tile.bodies.id[body as usize])
+        });
+        contact_order.clear();
+        contact_order.extend(0..by_pair.len() as u32);
+        contact_order.sort_unstable_by_key(|&i| (by_pair[i as usize].peer, i));
         self.find_feeds(tile, contacts);
     }
 
@@ -117,20 +132,19 @@ impl Border {
                 unseen.add(linear, on_b);
             }
         }
-        let mut order: Vec<_> = (0..self.sends.len()).collect();
-        order.sort_unstable_by_key(|&i| (self.sends[i].peer, tile.bodies.id[self.sends[i].body as usize]));
-        for i in order {
-            let Outgoing { body, peer } = self.sends[i];
+        for &i in &self.send_order {
+            let Outgoing { body, peer } = self.sends[i as usize];
             let (velocity, pose) = solver.bodies.state_of(body);
-            bag.message(tile.id, peer).refreshes.push(GhostRefresh { velocity, pose, unseen: unseen[i] });
+            bag.address(tile.id, peer);
+            bag.refreshes.push(GhostRefresh { velocity, pose, unseen: unseen[i as usize] });
         }
     }
 
     /// Takes over the owners' state of the ghosts in contact.
-    pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, bag: &Mailbag) {
+    pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>) {
         let mut ghosts = self.ghosts.iter().peekable();
-        for message in bag.messages() {
-            for refresh in &message.refreshes {
+        for message in mail.messages() {
+            for refresh in message.refreshes {
                 let of_peer = |ghost: &&u32| tile.ghost_owners[**ghost as usize] == message.from;
                 match ghosts.next_if(of_peer) {
                     Some(&ghost) => solver.bodies.refresh(tile.owned + ghost as usize, refresh),
@@ -148,16 +162,18 @@ impl Border {
 
     /// Tells every peer what this tile's copies of their common contacts did in the whole step.
     pub(crate) fn send_impulses(&self, tile: &Tile, solver: &Solver, contacts: &Contacts, bag: &mut Mailbag) {
-        for border in &self.contacts {
+        for &i in &self.contact_order {
+            let border = &self.contacts[i as usize];
             let (low, high) = border.pair;
             let points = solver.border_points(contacts, border.contact);
-            bag.message(tile.id, border.peer).impulses.push(BorderImpulse { low, high, points });
+            bag.address(tile.id, border.peer);
+            bag.impulses.push(BorderImpulse { low, high, points });
         }
     }
 
     /// Moves both copies of every border contact to their mean. Points that only one side has are left alone.
-    pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, contacts: &Contacts, bag: &Mailbag) {
-        for impulse in bag.messages().iter().flat_map(|message| &message.impulses) {
+    pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, contacts: &Contacts, mail: Mail<'_>) {
+        for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
             match self.contacts.binary_search_by_key(&pair, |border| border.pair) {
                 Ok(i) => {

@@ -1,6 +1,7 @@
 //! What the sync points within a step carry, and what border contacts leave behind.
 
-use crate::exchange::message::{Halo, Inbox, Outbox};
+use crate::exchange::halo::Halo;
+use crate::exchange::mail::{Inbox, Outbox};
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;

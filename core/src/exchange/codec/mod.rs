@@ -14,12 +14,12 @@
 //! `bincode` 2.0.1 is its last release and is pinned; only the header goes through it. Records are plain old data
 //! (`bytemuck`), copied in and out with one `memcpy` each, which needs no alignment of the frame.
 
-use crate::exchange::message::{Inbox, Message, Outbox};
+use crate::exchange::mail::{Inbox, Mailbag, Message, Outbox};
 use crate::model::error::CodecError;
 use crate::model::id::TileId;
 use bincode::config::{Configuration, Fixint, Limit, LittleEndian};
 use bincode::{Decode, Encode};
-use bytemuck::Pod;
+use bytemuck::{Pod, cast_slice};
 
 #[cfg(test)]
 mod tests;
@@ -43,66 +43,19 @@ fn config() -> Configuration<LittleEndian, Fixint, Limit<HEADER>> {
     bincode::config::standard().with_fixed_int_encoding().with_limit()
 }
 
-/// The five arrays of a message, each as one expression: their order on the wire.
-macro_rules! each_array {
-    ($message:expr, $array:ident => $body:expr) => {{
-        {
-            let $array = $message.migrants;
-            $body;
-        }
-        {
-            let $array = $message.contacts;
-            $body;
-        }
-        {
-            let $array = $message.ghosts;
-            $body;
-        }
-        {
-            let $array = $message.refreshes;
-            $body;
-        }
-        {
-            let $array = $message.impulses;
-            $body;
-        }
-    }};
+/// The five arrays of a message, in their order on the wire: how many records, and their bytes.
+fn arrays<'a>(message: &Message<'a>) -> [(usize, &'a [u8]); 5] {
+    [
+        (message.migrants.len(), cast_slice(message.migrants)),
+        (message.contacts.len(), cast_slice(message.contacts)),
+        (message.ghosts.len(), cast_slice(message.ghosts)),
+        (message.refreshes.len(), cast_slice(message.refreshes)),
+        (message.impulses.len(), cast_slice(message.impulses)),
+    ]
 }
 
-/// Borrows of a message's arrays, so that [`each_array`] serves reading and writing.
-struct Arrays<M, C, G, R, I> {
-    migrants: M,
-    contacts: C,
-    ghosts: G,
-    refreshes: R,
-    impulses: I,
-}
-
-macro_rules! arrays {
-    (& $message:expr) => {
-        Arrays {
-            migrants: &$message.migrants,
-            contacts: &$message.contacts,
-            ghosts: &$message.ghosts,
-            refreshes: &$message.refreshes,
-            impulses: &$message.impulses,
-        }
-    };
-    (&mut $message:expr) => {
-        Arrays {
-            migrants: &mut $message.migrants,
-            contacts: &mut $message.contacts,
-            ghosts: &mut $message.ghosts,
-            refreshes: &mut $message.refreshes,
-            impulses: &mut $message.impulses,
-        }
-    };
-}
-
-fn message_length(message: &Message) -> usize {
-    let mut length = COUNTS;
-    each_array!(arrays!(&message), array => length += std::mem::size_of_val(array.as_slice()));
-    length
+fn message_length(message: &Message<'_>) -> usize {
+    COUNTS + arrays(message).iter().map(|(_, bytes)| bytes.len()).sum::<usize>()
 }
 
 /// The messages of an outbox dealt out to ranks, a frame for each. Keep one value: it keeps its memory.
@@ -126,15 +79,18 @@ impl Frames {
         // Counted at first, one place further on, so that adding up gives where each begins.
         ends.clear();
         ends.resize(size + 1, 0);
+        order.clear();
+        if size == 1 {
+            return;
+        }
         let others = || outbox.numbered_messages().map(|(place, m)| (place, m, rank_of(m.to))).filter(|m| m.2 != own);
         for (_, message, rank) in others() {
-            lengths[rank] += message_length(message) + if lengths[rank] == 0 { HEADER } else { 0 };
+            lengths[rank] += message_length(&message) + if lengths[rank] == 0 { HEADER } else { 0 };
             ends[rank + 1] += 1;
         }
         for rank in 0..size {
             ends[rank + 1] += ends[rank];
         }
-        order.clear();
         order.resize(ends[size], (0, 0));
         for (place, _, rank) in others() {
             order[ends[rank]] = place;
@@ -170,10 +126,10 @@ impl Frames {
         for message in messages() {
             put(&message.from.0.to_le_bytes());
             put(&message.to.0.to_le_bytes());
-            each_array!(arrays!(&message), array => put(&(array.len() as u32).to_le_bytes()));
+            arrays(&message).iter().for_each(|(count, _)| put(&(*count as u32).to_le_bytes()));
         }
         for message in messages() {
-            each_array!(arrays!(&message), array => put(bytemuck::cast_slice(array)));
+            arrays(&message).iter().for_each(|(_, bytes)| put(bytes));
         }
     }
 }
@@ -235,10 +191,23 @@ impl Inbox {
         let mut counts = Reader { rest: counts, length };
         for _ in 0..header.messages {
             let (from, to) = (TileId(counts.take_u32()?), TileId(counts.take_u32()?));
-            let message = self.receive(from, to).ok_or(CodecError::WrongTile { from, to })?;
-            each_array!(arrays!(&mut message), array => reader.take_records(counts.take_u32()?, array)?);
+            let mut announced = [0; 5];
+            for count in &mut announced {
+                *count = counts.take_u32()?;
+            }
+            if !self.receive(from, to, announced[0] > 0) {
+                return Err(CodecError::WrongTile { from, to });
+            }
+            let Mailbag { migrants, contacts, ghosts, refreshes, impulses, .. } = &mut self.decoded;
+            let (known_migrants, known_ghosts) = (migrants.len(), ghosts.len());
+            reader.take_records(announced[0], migrants)?;
+            reader.take_records(announced[1], contacts)?;
+            reader.take_records(announced[2], ghosts)?;
+            reader.take_records(announced[3], refreshes)?;
+            reader.take_records(announced[4], impulses)?;
             // A kind that the table does not have would be an index out of bounds later on.
-            let bodies = message.migrants.iter().chain(message.ghosts.iter().map(|ghost| &ghost.body));
+            let bodies =
+                migrants[known_migrants..].iter().chain(ghosts[known_ghosts..].iter().map(|ghost| &ghost.body));
             if let Some(unknown) = bodies.into_iter().find(|body| body.kind.0 >= kinds) {
                 return Err(CodecError::BadRecord { id: unknown.id });
             }

@@ -1,15 +1,16 @@
 //! Frames there and back, and bytes that are no frames.
 
 use super::{COUNTS, FORMAT, Frames};
-use crate::exchange::message::{
-    BorderImpulse, ContactRecord, GhostRecord, GhostRefresh, Inbox, Mailbag, Message, Outbox, Verdict,
-};
+use crate::exchange::halo::Verdict;
+use crate::exchange::mail::{Inbox, Mailbag, Message, Outbox};
+use crate::exchange::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
 use crate::model::body::Body;
 use crate::model::error::CodecError;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::testing::cases;
 use bytemuck::Pod;
 use proptest::prelude::*;
+use std::collections::BTreeSet;
 
 /// Kinds that the receiving world knows.
 const KINDS: usize = 3;
@@ -28,15 +29,17 @@ fn records<T: Pod>(seed: u64, count: usize) -> Vec<T> {
     (0..count).map(|_| record()).collect()
 }
 
-fn fill(message: &mut Message, seed: u64, counts: [usize; 5]) {
-    message.migrants = records(seed, counts[0]);
-    message.contacts = records(seed ^ 1, counts[1]);
-    message.ghosts = records(seed ^ 2, counts[2]);
-    message.refreshes = records(seed ^ 3, counts[3]);
-    message.impulses = records(seed ^ 4, counts[4]);
+/// Writes one more message.
+fn fill(bag: &mut Mailbag, (from, to): (TileId, TileId), seed: u64, counts: [usize; 5]) {
+    bag.begin(from, to);
+    bag.migrants.extend(records::<Body>(seed, counts[0]));
+    bag.contacts.extend(records::<ContactRecord>(seed ^ 1, counts[1]));
+    bag.ghosts.extend(records::<GhostRecord>(seed ^ 2, counts[2]));
+    bag.refreshes.extend(records::<GhostRefresh>(seed ^ 3, counts[3]));
+    bag.impulses.extend(records::<BorderImpulse>(seed ^ 4, counts[4]));
     // Rows of the table that exist: all others are refused.
-    let ghosts = message.ghosts.iter_mut().map(|ghost| &mut ghost.body);
-    for body in message.migrants.iter_mut().chain(ghosts) {
+    let ghosts = bag.ghosts.iter_mut().map(|ghost| &mut ghost.body);
+    for body in bag.migrants.iter_mut().chain(ghosts) {
         body.kind = KindId(body.kind.0 % KINDS as u32);
     }
 }
@@ -44,12 +47,12 @@ fn fill(message: &mut Message, seed: u64, counts: [usize; 5]) {
 /// A message for comparison: its tiles and the bytes of its arrays.
 type Flat = (TileId, TileId, [Vec<u8>; 5]);
 
-fn flat(message: &Message) -> Flat {
+fn flat(message: Message<'_>) -> Flat {
     fn bytes<T: Pod>(records: &[T]) -> Vec<u8> {
         bytemuck::cast_slice(records).to_vec()
     }
     let Message { from, to, migrants, contacts, ghosts, refreshes, impulses } = message;
-    (*from, *to, [bytes(migrants), bytes(contacts), bytes(ghosts), bytes(refreshes), bytes(impulses)])
+    (from, to, [bytes(migrants), bytes(contacts), bytes(ghosts), bytes(refreshes), bytes(impulses)])
 }
 
 /// The messages of a rank's outbox, as `(from, to, seed, counts)`.
@@ -62,11 +65,15 @@ fn tiles_of(rank: usize, ranks: usize, tiles: u32) -> Vec<TileId> {
 
 fn outbox(rank: usize, ranks: usize, tiles: u32, letters: &Letters) -> Outbox {
     let own = tiles_of(rank, ranks, tiles);
-    let mut outbox = Outbox { bags: vec![Mailbag::default(); own.len()], step: 12, sync: 3, ..Outbox::default() };
+    let mut outbox = Outbox { step: 12, sync: 3, ..Outbox::new(own.len()) };
+    let mut told = BTreeSet::new();
     for &(from, to, seed, counts) in letters {
         let (from, to) = (TileId(from % tiles), TileId(to % tiles));
-        if let Ok(place) = own.binary_search(&from) {
-            fill(outbox.bags[place].message(from, to), seed, counts);
+        // One message for each destination at most.
+        if let Ok(place) = own.binary_search(&from)
+            && told.insert((from, to))
+        {
+            fill(&mut outbox.bags[place], (from, to), seed, counts);
         }
     }
     outbox
@@ -112,9 +119,11 @@ proptest! {
         let mut outboxes: Vec<_> =
             (0..ranks).map(|rank| outbox(rank, ranks, tiles, &letters)).collect();
         let mut sent: Vec<_> = outboxes.iter().flat_map(|outbox| outbox.messages().map(flat)).collect();
+        let bring_bodies = |(_, to, arrays): &Flat| !arrays[0].is_empty() && to.0 < tiles;
+        let heirs: BTreeSet<TileId> = sent.iter().filter(|flat| bring_bodies(flat)).map(|flat| flat.1).collect();
         let mut received = Vec::new();
-        for rank in 0..ranks {
-            let mut inbox = inbox(rank, ranks, tiles);
+        let mut inboxes: Vec<_> = (0..ranks).map(|rank| inbox(rank, ranks, tiles)).collect();
+        for (rank, inbox) in inboxes.iter_mut().enumerate() {
             // In no order in particular.
             for from in (0..ranks).rev().filter(|&from| from != rank) {
                 let frame = frame(&outboxes[from], from, rank, ranks);
@@ -122,11 +131,16 @@ proptest! {
                     inbox.decode(&frame).unwrap();
                 }
             }
+        }
+        for (rank, mut inbox) in inboxes.into_iter().enumerate() {
             outboxes[rank].deliver(&mut inbox);
-            inbox.sort();
-            for bag in &inbox.bags {
-                prop_assert!(bag.messages().is_sorted_by_key(|message| message.from));
-                received.extend(bag.messages().iter().map(flat));
+            inbox.end(&mut outboxes[rank]);
+            for (place, tile) in tiles_of(rank, ranks, tiles).into_iter().enumerate() {
+                let mail = inbox.mail(place);
+                prop_assert!(mail.messages().is_sorted_by_key(|message| message.from));
+                prop_assert!(mail.messages().all(|message| message.to == tile));
+                prop_assert_eq!(mail.brings_migrants(), heirs.contains(&tile));
+                received.extend(mail.messages().map(flat));
             }
         }
         sent.sort();
@@ -152,8 +166,8 @@ fn small_frame() -> Vec<u8> {
 
 /// What was decoded, encoded again.
 fn again(inbox: &Inbox) -> Vec<u8> {
-    let Inbox { bags, step, sync, .. } = inbox;
-    let outbox = Outbox { bags: bags.clone(), step: *step, sync: *sync, ..Outbox::default() };
+    let Inbox { decoded, step, sync, .. } = inbox;
+    let outbox = Outbox { bags: vec![decoded.clone()], step: *step, sync: *sync, ..Outbox::default() };
     frame(&outbox, 1, 0, 2)
 }
 
@@ -231,8 +245,8 @@ fn what_does_not_fit_is_named() {
     // A kind out of the table, in a migrant and in a ghost.
     for ghost in [false, true] {
         let mut outbox = outbox(1, 2, 4, &vec![(1, 0, 9, [1, 0, 1, 0, 0])]);
-        let message = outbox.bags[0].message(TileId(1), TileId(0));
-        let body = if ghost { &mut message.ghosts[0].body } else { &mut message.migrants[0] };
+        let bag = &mut outbox.bags[0];
+        let body = if ghost { &mut bag.ghosts[0].body } else { &mut bag.migrants[0] };
         (body.id, body.kind) = (GlobalId(42), KindId(KINDS as u32));
         let refused = error(&frame(&outbox, 1, 0, 2), inbox(0, 2, 4));
         assert_eq!(refused, CodecError::BadRecord { id: GlobalId(42) });
@@ -253,11 +267,8 @@ fn kept(inbox: &Inbox) -> usize {
     fn room<T>(records: &Vec<T>) -> usize {
         records.capacity() * size_of::<T>()
     }
-    let message = |message: &Message| {
-        let Message { migrants, contacts, ghosts, refreshes, impulses, .. } = message;
-        size_of::<Message>() + room(migrants) + room(contacts) + room(ghosts) + room(refreshes) + room(impulses)
-    };
-    inbox.bags.iter().flat_map(|bag| bag.messages()).map(message).sum()
+    let Mailbag { migrants, contacts, ghosts, refreshes, impulses, .. } = &inbox.decoded;
+    inbox.decoded.room() + room(migrants) + room(contacts) + room(ghosts) + room(refreshes) + room(impulses)
 }
 
 #[test]

@@ -4,7 +4,8 @@
 //! and sends every body's ghosts on the new owner's behalf. So one exchange suffices, and a receiver needs to know
 //! nothing but the body: whose it is follows from where it is.
 
-use crate::exchange::message::{ContactRecord, GhostRecord, Mailbag, Unseen};
+use crate::exchange::mail::{Mail, Mailbag};
+use crate::exchange::record::{ContactRecord, GhostRecord, Unseen};
 use crate::model::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::model::id::{GlobalId, TileId};
 use crate::tiling::blueprint::Setup;
@@ -20,6 +21,10 @@ pub(crate) struct MigrateWork {
     mark: Vec<u32>,
     border: Vec<Border>,
     sends: Vec<Send>,
+    /// Contacts of bodies that leave, each with the tile that gets it.
+    contacts: Vec<(TileId, ContactRecord)>,
+    /// What is sent, by destination.
+    parcels: Vec<Parcel>,
     departures: Vec<u32>,
     arrivals: Vec<crate::Body>,
     /// Owner, name, and where the record lies: message, place.
@@ -45,24 +50,52 @@ struct Send {
     unseen: Unseen,
 }
 
+/// Something to be sent, and where to. Sorts by destination.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Parcel {
+    to: TileId,
+    what: What,
+}
+
+/// An index into the tile's bodies, `contacts` or `sends`.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum What {
+    Migrant(u32),
+    Contact(u32),
+    Ghost(u32),
+}
+
 /// Writes everything other tiles must hear from this one, and takes leave of what is no longer owned here. After this
 /// the tile holds owned bodies only, and its cache only contacts among them and with statics.
 pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, setup: &Setup) {
     find_border(tile, work, setup);
-    sort_contacts_out(tile, bag, work);
-    let MigrateWork { mark, border, sends, departures, .. } = work;
-    for send in sends.drain(..) {
-        let body = tile.bodies.get(send.body as usize);
-        bag.message(tile.id, send.target).ghosts.push(GhostRecord { body, unseen: send.unseen, padding: 0 });
-    }
+    sort_contacts_out(tile, work);
+    let MigrateWork { mark, border, sends, contacts, parcels, departures, .. } = work;
+    tile.counts.ghosts = sends.len() as u64;
+    parcels.extend((0..).zip(&*sends).map(|(i, send)| Parcel { to: send.target, what: What::Ghost(i) }));
+    parcels.extend((0..).zip(&*contacts).map(|(i, &(to, _))| Parcel { to, what: What::Contact(i) }));
     for body in border.drain(..) {
         mark[body.body as usize] = 0;
         if body.owner != tile.id {
             departures.push(body.body);
             tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, body.owner));
-            bag.message(tile.id, body.owner).migrants.push(tile.bodies.get(body.body as usize));
+            parcels.push(Parcel { to: body.owner, what: What::Migrant(body.body) });
         }
     }
+    parcels.sort_unstable();
+    for Parcel { to, what } in parcels.drain(..) {
+        bag.address(tile.id, to);
+        match what {
+            What::Migrant(body) => bag.migrants.push(tile.bodies.get(body as usize)),
+            What::Contact(contact) => bag.contacts.push(contacts[contact as usize].1),
+            What::Ghost(send) => {
+                let Send { body, unseen, .. } = sends[send as usize];
+                bag.ghosts.push(GhostRecord { body: tile.bodies.get(body as usize), unseen, padding: 0 });
+            }
+        }
+    }
+    sends.clear();
+    contacts.clear();
     tile.bodies.truncate(tile.owned);
     tile.unseen.clear();
     tile.ghost_owners.clear();
@@ -102,9 +135,9 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
     }
 }
 
-/// One pass over the contacts of the last step: sums unseen impulses, sends the contacts of departing bodies, and
+/// One pass over the contacts of the last step: sums unseen impulses, finds the contacts of departing bodies, and
 /// moves those that cannot be found by slot any more to the strays.
-fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork) {
+fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork) {
     tile.strays.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
@@ -142,12 +175,9 @@ fn sort_contacts_out(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork)
                 if border.owner != tile.id && border.owner != heir {
                     heir = border.owner;
                     let owned_low = low_is_a || !with_ghost;
-                    bag.message(tile.id, heir).contacts.push(ContactRecord {
-                        low: pair.0,
-                        high: pair.1,
-                        from_owner_of_low: u64::from(owned_low),
-                        contact,
-                    });
+                    let from_owner_of_low = u64::from(owned_low);
+                    let record = ContactRecord { low: pair.0, high: pair.1, from_owner_of_low, contact };
+                    work.contacts.push((heir, record));
                 }
                 stray |= border.owner != tile.id;
             }
@@ -179,17 +209,18 @@ fn close_gaps(keys: &mut [PairKey], gone: &[u32]) {
     }
 }
 
-/// Takes in what other tiles sent: arrivals, ghosts, contacts. Sorts the bodies by place when it is time to.
-pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, setup: &Setup, step: u64) {
+/// Takes in what other tiles sent: arrivals, ghosts, contacts. Sorts the bodies by place when it is time to. A tile that
+/// owns nothing solves nothing, and keeps no ghosts.
+pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, setup: &Setup, step: u64) {
     tile.arrived = tile.owned;
-    for message in bag.messages() {
+    for message in mail.messages() {
         work.arrivals.clear();
-        work.arrivals.extend_from_slice(&message.migrants);
+        work.arrivals.extend_from_slice(message.migrants);
         work.arrivals.sort_unstable_by_key(|body| body.id);
         for &body in &work.arrivals {
             tile.bodies.push(body);
         }
-        for record in &message.contacts {
+        for record in message.contacts {
             let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
             let pair = (record.low, record.high);
             tile.strays.push(Stray { pair, authority, contact: record.contact });
@@ -198,18 +229,21 @@ pub(crate) fn receive(tile: &mut Tile, bag: &Mailbag, work: &mut MigrateWork, se
     tile.owned = tile.bodies.len();
     tile.counts.migrations = (tile.owned - tile.arrived) as u64;
     tile.strays.settle();
+    if tile.is_idle() {
+        return tile.lay_bare();
+    }
     if step.is_multiple_of(u64::from(setup.params.sort_interval)) {
         sort_by_place(tile, setup);
     }
 
     work.ghosts.clear();
-    for (m, message) in (0..).zip(bag.messages()) {
+    for (m, message) in (0..).zip(mail.messages()) {
         let owner = |ghost: &GhostRecord| setup.grid.locate(ghost.body.position);
-        work.ghosts.extend((0..).zip(&message.ghosts).map(|(g, ghost)| (owner(ghost), ghost.body.id, m, g)));
+        work.ghosts.extend((0..).zip(message.ghosts).map(|(g, ghost)| (owner(ghost), ghost.body.id, m, g)));
     }
     work.ghosts.sort_unstable();
     for &(owner, _, m, g) in &work.ghosts {
-        let ghost = &bag.messages()[m as usize].ghosts[g as usize];
+        let ghost = &mail.message(m as usize).ghosts[g as usize];
         tile.bodies.push(ghost.body);
         tile.unseen.push(ghost.unseen);
         tile.ghost_owners.push(owner);

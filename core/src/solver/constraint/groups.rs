@@ -1,6 +1,6 @@
 //! Constraints in groups of eight lanes, by batch, color and number of points.
 
-use crate::exchange::message::BorderPoint;
+use crate::exchange::record::BorderPoint;
 use crate::model::contact::Contact;
 use crate::model::math::max;
 use crate::parallel::lanes::{LANES, Quad, Row};

@@ -16,7 +16,7 @@
 //! and owners are enough. Statics are in the setup. All else is derived in each step; who sleeps follows from who has
 //! rested.
 
-use crate::exchange::message::Unseen;
+use crate::exchange::record::Unseen;
 use crate::islands::sleep::Sleep;
 use crate::model::body::{Bodies, Body};
 use crate::model::contact::{Contact, ContactCache, PairKey, SlotKind};

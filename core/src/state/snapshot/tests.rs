@@ -2,6 +2,7 @@
 //! several ranks, on the outside.
 
 use super::{HEADER, SNAPSHOT_FORMAT, SavedTile, UNCHECKED, checksum};
+use crate::Loopback;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
@@ -9,7 +10,7 @@ use crate::model::params::Params;
 use crate::state::hash::Hashes;
 use crate::state::snapshot::RestoreError;
 use crate::step::step;
-use crate::testing::{Loopback, circle, rectangle};
+use crate::testing::{circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;

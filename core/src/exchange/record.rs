@@ -1,0 +1,104 @@
+//! The records that messages are made of.
+
+use crate::model::body::Body;
+use crate::model::contact::Contact;
+use crate::model::id::GlobalId;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+
+/// A contact on the move, known by the names of its bodies, the lower first.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ContactRecord {
+    /// Body A.
+    pub low: GlobalId,
+    /// Body B.
+    pub high: GlobalId,
+    /// One if the sending tile owned body A, else zero: where two tiles hold an entry of one pair, that one wins.
+    pub from_owner_of_low: u64,
+    /// Geometry and impulses.
+    pub contact: Contact,
+}
+
+/// An impulse and its moment about a body's center: what a ghost is given in every substep.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Unseen {
+    /// N s.
+    pub linear: Vec2,
+    /// N m s.
+    pub angular: f32,
+}
+
+impl Unseen {
+    pub(crate) fn add(&mut self, linear: Vec2, angular: f32) {
+        self.linear += linear;
+        self.angular += angular;
+    }
+}
+
+/// A ghost on its way: 64 bytes.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct GhostRecord {
+    /// A bit-exact copy.
+    pub body: Body,
+    /// The sum of the body's stored impulses from contacts that the receiving tile does not solve.
+    pub unseen: Unseen,
+    /// Zero; fills the record to a multiple of its alignment.
+    pub padding: u32,
+}
+
+/// A ghost's state after a substep: 40 bytes. Velocities and displacements are mass-weighted (times the square root of
+/// mass or inertia), as the solver holds them, so that the copy is exact.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct GhostRefresh {
+    /// Velocity x, y and angular velocity, mass-weighted.
+    pub velocity: [f32; 3],
+    /// Displacement x, y of the step so far, mass-weighted; cosine minus one, and mass-weighted sine, of its rotation.
+    pub pose: [f32; 4],
+    /// As in [`GhostRecord`].
+    pub unseen: Unseen,
+}
+
+/// What one owner's copy of a border contact did in a step.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct BorderImpulse {
+    /// Body A.
+    pub low: GlobalId,
+    /// Body B.
+    pub high: GlobalId,
+    /// The one or two points.
+    pub points: [BorderPoint; 2],
+}
+
+/// One point of a [`BorderImpulse`].
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct BorderPoint {
+    /// As in [`crate::ContactPoint`].
+    pub feature: u32,
+    /// Sum over substeps of the impulse along the normal, restitution included, in N s.
+    pub total_normal: f32,
+    /// Sum over substeps of the impulse along the tangent, in N s.
+    pub total_tangent: f32,
+    /// The last substep's impulse along the normal, restitution excluded, in N s.
+    pub normal: f32,
+    /// The last substep's impulse along the tangent, in N s.
+    pub tangent: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+impl BorderPoint {
+    pub(crate) const NONE: Self = Self {
+        feature: crate::model::contact::ContactPoint::ABSENT,
+        total_normal: 0.0,
+        total_tangent: 0.0,
+        normal: 0.0,
+        tangent: 0.0,
+        padding: 0,
+    };
+}

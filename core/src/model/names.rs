@@ -1,0 +1,62 @@
+//! The names that are taken.
+
+use crate::model::id::GlobalId;
+use std::collections::HashSet;
+
+/// A set of names: a bit for each up to some multiple of how many there are, which is all of them where bodies are
+/// numbered through, and a hash table for the others.
+#[derive(Default, Debug)]
+pub(crate) struct Names {
+    bits: Vec<u64>,
+    sparse: HashSet<GlobalId>,
+    count: u64,
+}
+
+/// Bits that may be spent on each name: no more than a name itself takes.
+const BITS_EACH: u64 = 64;
+
+impl Names {
+    /// Takes a name; says no if it is taken.
+    pub(crate) fn insert(&mut self, name: GlobalId) -> bool {
+        let (word, bit) = ((name.0 / 64) as usize, 1 << (name.0 % 64));
+        if self.bits.get(word).is_some_and(|bits| bits & bit != 0) || self.sparse.contains(&name) {
+            return false;
+        }
+        self.count += 1;
+        // The first thousands need not be spread.
+        if name.0 < BITS_EACH * self.count + 65_536 {
+            if word >= self.bits.len() {
+                self.bits.resize((word + 1).next_power_of_two(), 0);
+            }
+            self.bits[word] |= bit;
+        } else {
+            self.sparse.insert(name);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_name_is_taken_once(names in prop::collection::vec(
+            prop_oneof![0..300_u64, 0..200_000_u64, any::<u64>(), Just(u64::MAX)], 0..600)) {
+            let mut taken = Names::default();
+            let mut known = HashSet::new();
+            for name in names {
+                prop_assert_eq!(taken.insert(GlobalId(name)), known.insert(name), "{}", name);
+            }
+        }
+    }
+
+    #[test]
+    fn numbered_names_take_a_bit_each() {
+        let mut taken = Names::default();
+        (0..1_000_000).for_each(|name| assert!(taken.insert(GlobalId(name))));
+        assert!(taken.sparse.is_empty() && taken.bits.len() <= 1 << 15);
+    }
+}
