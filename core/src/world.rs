@@ -1,7 +1,7 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
 use crate::exchange::halo::{Halo, Verdict};
-use crate::exchange::mail::{Inbox, Mail, Outbox};
+use crate::exchange::mail::{Inbox, Mailbag, Outbox};
 use crate::model::body::Body;
 use crate::model::error::{SetupError, StepError};
 use crate::model::id::{GlobalId, TileId};
@@ -12,7 +12,7 @@ use crate::state::hash::Hashes;
 use crate::step::phase::{Phase, Stopwatch, Timings};
 use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
-use crate::tiling::tile::{Fault, Tile};
+use crate::tiling::tile::{Fault, Tile, TileCounts};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
 
@@ -21,6 +21,12 @@ use std::sync::{Arc, Mutex};
 pub struct World {
     pub(crate) setup: Arc<Setup>,
     tiles: Vec<Tile>,
+    /// Places of the tiles that own bodies, ascending: only these cost anything in a step.
+    busy: Vec<u32>,
+    /// Those that owned some until this step.
+    dismissed: Vec<u32>,
+    /// Whether `busy` must be made anew: bodies came or went between two steps.
+    changed: bool,
     /// Of the bodies that were added here.
     names: Names,
     /// One per thread.
@@ -82,8 +88,11 @@ impl World {
         Self {
             setup,
             works: tiles.iter().map(|_| None).collect(),
-            outbox: Outbox::new(tiles.len()),
+            outbox: Outbox::default(),
             tiles,
+            busy: Vec::new(),
+            dismissed: Vec::new(),
+            changed: true,
             names: Names::default(),
             hands: Vec::new(),
             inbox,
@@ -124,6 +133,7 @@ impl World {
         // Ghosts and statics of the last step may stand behind the owned bodies.
         tile.bodies.insert(tile.owned, body);
         tile.owned += 1;
+        self.changed = true;
         Ok(true)
     }
 
@@ -167,8 +177,20 @@ impl World {
         &self.tiles
     }
 
+    #[cfg(test)]
     pub(crate) fn tile_states_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
+    }
+
+    /// The tiles that had something to do in the step under way.
+    pub(crate) fn tiles_of_step(&self) -> impl Iterator<Item = &Tile> {
+        self.busy.iter().chain(&self.dismissed).map(|&place| &self.tiles[place as usize])
+    }
+
+    /// Puts a tile in the place of another of the same name.
+    pub(crate) fn replace_tile(&mut self, place: usize, tile: Tile) {
+        self.tiles[place] = tile;
+        self.changed = true;
     }
 
     /// Starts a step: no sync point passed, nothing counted.
@@ -178,21 +200,19 @@ impl World {
         if self.hands.len() < threads {
             self.hands.resize_with(threads, Mutex::default);
         }
-        for tile in &mut self.tiles {
-            tile.counts = Default::default();
+        if std::mem::take(&mut self.changed) {
+            let tiles = (0..).zip(&self.tiles);
+            self.busy.clear();
+            self.busy.extend(tiles.filter(|(_, tile)| !tile.is_bare()).map(|(place, _)| place));
         }
-        // Where threads help within tiles, each of them is asked once a step; else in every stage.
-        if threads > 1
-            && !apart(self.tiles.len())
-            && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok)
-        {
-            self.tiles.iter_mut().for_each(|tile| tile.counts.fault = Some(Fault::FloatMode));
+        for &place in &self.busy {
+            self.tiles[place as usize].counts = TileCounts::default();
         }
     }
 
     /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
     pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
-        let threads = if apart(self.tiles.len()) { rayon::current_num_threads() as u32 } else { 1 };
+        let threads = if apart(self.busy.len()) { rayon::current_num_threads() as u32 } else { 1 };
         for hand in &mut self.hands {
             let hand = hand.get_mut().expect("no stage panicked");
             self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
@@ -221,6 +241,10 @@ impl World {
         let mut watch = Stopwatch::start();
         self.outbox.verdict = self.verdict;
         (self.outbox.step, self.outbox.sync) = (self.step, self.sync);
+        self.outbox.bags.resize_with(self.hands.len(), Mailbag::default);
+        for (hand, bag) in self.hands.iter_mut().zip(&mut self.outbox.bags) {
+            std::mem::swap(&mut hand.get_mut().expect("no stage panicked").outgoing, bag);
+        }
         self.inbox.begin(self.step, self.sync);
         self.sync += 1;
         halo.exchange(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
@@ -229,55 +253,71 @@ impl World {
         Ok(self.inbox.verdict)
     }
 
-    /// A stage over all tiles, in parallel; each result at its tile's place.
+    /// Counts those tiles among the busy ones that bodies come to.
+    pub(crate) fn welcome_heirs(&mut self) {
+        let Self { busy, tiles, inbox, .. } = self;
+        let owners = busy.len();
+        for heir in inbox.heirs().filter(|&heir| tiles[heir as usize].is_bare()) {
+            tiles[heir as usize].counts = TileCounts::default();
+            busy.push(heir);
+        }
+        if busy.len() > owners {
+            busy.sort_unstable();
+            busy.dedup();
+        }
+    }
+
+    /// Counts those tiles no longer among the busy ones that bodies have left. Now it is known who works on what: where
+    /// threads help within tiles, each of them is asked how it computes, once a step; else in every stage.
+    pub(crate) fn dismiss_idle(&mut self) {
+        let Self { busy, dismissed, tiles, works, .. } = self;
+        dismissed.clear();
+        dismissed.extend(busy.extract_if(.., |&mut place| tiles[place as usize].is_idle()));
+        for &place in &*dismissed {
+            works[place as usize] = None;
+        }
+        let helped = rayon::current_num_threads() > 1 && !apart(busy.len());
+        if helped && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok) {
+            busy.iter().for_each(|&place| tiles[place as usize].counts.fault = Some(Fault::FloatMode));
+        }
+    }
+
+    /// A stage over the busy tiles, in parallel; their results in order.
     pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
-        let results = self.each(|_, _| true, |bench, _| stage(bench));
-        results.into_iter().map(|result| result.expect("every tile was wanted")).collect()
+        self.each(|bench, _| stage(bench))
     }
 
-    /// A stage over the tiles that own bodies: only they have something to tell, or to solve.
-    pub(crate) fn each_owner(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(|tile, _| !tile.is_idle(), |bench, _| stage(bench));
+    /// As [`each_tile`](Self::each_tile), with work that each tile keeps from stage to stage.
+    pub(crate) fn each_tile_apart(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each(|bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
     }
 
-    /// A stage over the tiles that own bodies, are about to, or have until now.
-    pub(crate) fn each_heir(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(|tile, mail| !tile.is_bare() || mail.brings_migrants(), |bench, _| stage(bench));
-    }
-
-    /// As [`each_owner`](Self::each_owner), for what a tile keeps from stage to stage.
-    pub(crate) fn each_solver(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(|tile, _| !tile.is_idle(), |bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
-    }
-
-    /// A stage over the tiles that are wanted, in parallel.
-    fn each<R: Send>(
-        &mut self,
-        wanted: impl Fn(&Tile, Mail<'_>) -> bool + Sync,
-        stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync,
-    ) -> Vec<Option<R>> {
-        let apart = apart(self.tiles.len());
-        let Self { setup, hands, works, tiles, outbox, inbox, step, measures, .. } = self;
+    fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
+        let apart = apart(self.busy.len());
+        let Self { setup, hands, works, tiles, busy, inbox, step, measures, .. } = self;
         let team = if apart { Team::ALONE } else { Team::of_pool() };
         let shop = Shop { setup, step: *step, team, measures: *measures };
         let (hands, inbox) = (&*hands, &*inbox);
-        let run = |(place, ((tile, outgoing), own)): (usize, ((&mut Tile, _), &mut Option<Box<Work>>))| {
-            let mail = inbox.mail(place);
-            if !wanted(tile, mail) {
-                *own = None;
-                return None;
-            }
+        let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
             let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
             if !float_mode_is_default() {
                 tile.counts.fault = Some(Fault::FloatMode);
             }
-            Some(stage(&mut Bench::new(shop, tile, (outgoing, mail), &mut hand), own))
+            stage(&mut Bench::new(shop, tile, inbox.mail(place), &mut hand), own)
         };
-        if !apart {
-            tiles.iter_mut().zip(&mut outbox.bags).zip(works).enumerate().map(run).collect()
+        let mut rest = (0, &mut tiles[..], &mut works[..]);
+        let tiles = busy.iter().map(|&place| {
+            let place = place as usize;
+            let (first, tiles, works) = std::mem::take(&mut rest);
+            let (tile, tiles) = tiles[place - first..].split_first_mut().expect("busy tiles are tiles");
+            let (work, works) = works[place - first..].split_first_mut().expect("busy tiles are tiles");
+            rest = (place + 1, tiles, works);
+            (place, tile, work)
+        });
+        if apart {
+            tiles.collect::<Vec<_>>().into_par_iter().with_max_len(1).map(run).collect()
         } else {
-            let tiles = tiles.par_iter_mut().with_max_len(1);
-            tiles.zip(&mut outbox.bags).zip(works).enumerate().map(run).collect()
+            tiles.map(run).collect()
         }
     }
 }

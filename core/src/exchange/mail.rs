@@ -1,7 +1,9 @@
-//! How messages lie in memory: those of one tile together, column by column, and for each receiver the list of its own.
+//! How messages lie in memory: those that one thread's tiles write together, column by column, and for each receiver
+//! the list of its own.
 //!
 //! A tile writes its messages one after the other, so all their ghosts are one array, and so on: a message is five
-//! ranges. Within a rank nothing is copied: outbox and inbox swap their bags, and a receiver is told where to look.
+//! ranges. Within a rank nothing is copied: outbox and inbox swap their bags, and a receiver is told where to look. Which
+//! thread a tile was on decides in which bag its messages lie, and shows nowhere: receivers sort by source.
 
 use super::halo::Verdict;
 use super::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
@@ -60,10 +62,6 @@ impl Mailbag {
         self.impulses.clear();
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.envelopes.is_empty()
-    }
-
     pub(crate) fn len(&self) -> usize {
         self.envelopes.len()
     }
@@ -76,7 +74,7 @@ impl Mailbag {
 
     /// As [`begin`](Self::begin), if the message under way is not for `to` already.
     pub(crate) fn address(&mut self, from: TileId, to: TileId) {
-        if self.envelopes.last().is_none_or(|last| last.to != to) {
+        if self.envelopes.last().is_none_or(|last| (last.from, last.to) != (from, to)) {
             self.begin(from, to);
         }
     }
@@ -122,7 +120,7 @@ impl Mailbag {
 /// Everything this rank's tiles send at one sync point.
 #[derive(Debug, Default)]
 pub struct Outbox {
-    /// One per tile of this rank, in the order of the world's tiles.
+    /// One per thread.
     pub(crate) bags: Vec<Mailbag>,
     pub(crate) verdict: Verdict,
     pub(crate) step: u64,
@@ -130,10 +128,6 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    pub(crate) fn new(tiles: usize) -> Self {
-        Self { bags: vec![Mailbag::default(); tiles], ..Self::default() }
-    }
-
     /// This rank's verdict, which every rank must hear.
     pub fn verdict(&self) -> Verdict {
         self.verdict
@@ -184,7 +178,7 @@ struct Route {
     /// Place of the receiver among this rank's tiles.
     to: u32,
     from: TileId,
-    /// Place of the sender among this rank's tiles, or [`DECODED`].
+    /// Whose bag it lies in, or [`DECODED`].
     bag: u32,
     /// Place in the bag.
     message: u32,
@@ -200,7 +194,7 @@ const DECODED: u32 = u32::MAX;
 pub struct Inbox {
     /// For every tile of the grid its place among this rank's, or `ELSEWHERE`.
     places: Vec<u32>,
-    /// What this rank's own tiles sent, once the sync point is over.
+    /// The bags of this rank's own tiles, once the sync point is over.
     sent_here: Vec<Mailbag>,
     pub(crate) decoded: Mailbag,
     routes: Vec<Route>,
@@ -222,8 +216,7 @@ impl Inbox {
         for (place, tile) in (0..).zip(tiles) {
             places[tile.0 as usize] = place;
         }
-        let sent_here = vec![Mailbag::default(); tiles.len()];
-        Self { places, sent_here, ends: vec![0; tiles.len()], kinds: kinds as u32, ..Self::default() }
+        Self { places, ends: vec![0; tiles.len()], kinds: kinds as u32, ..Self::default() }
     }
 
     /// The messages of other ranks decoded so far, in the order they came in.
@@ -276,7 +269,7 @@ impl Inbox {
     /// receives. Takes time for each tile and each message.
     pub(crate) fn end(&mut self, outbox: &mut Outbox) {
         std::mem::swap(&mut self.sent_here, &mut outbox.bags);
-        outbox.bags.iter_mut().filter(|bag| !bag.is_empty()).for_each(Mailbag::clear);
+        outbox.bags.iter_mut().for_each(Mailbag::clear);
         let Self { routes, sorted, ends, .. } = self;
         // Counted at first; adding up gives where each begins; placing moves that on to where each ends.
         ends.fill(0);
@@ -297,12 +290,17 @@ impl Inbox {
         let mut begin = 0;
         for &end in ends.iter() {
             let own = &mut sorted[begin as usize..end as usize];
-            // This rank's tiles come in order; those of other ranks come in between.
+            // One thread's tiles come in order; those of others, here or elsewhere, come in between.
             if !own.is_sorted_by_key(|route| route.from) {
                 own.sort_by_key(|route| route.from);
             }
             begin = end;
         }
+    }
+
+    /// Places of the tiles that bodies come to, in any order, some perhaps more than once.
+    pub(crate) fn heirs(&self) -> impl Iterator<Item = u32> {
+        self.routes.iter().filter(|route| route.brings_migrants).map(|route| route.to)
     }
 
     /// What one of this rank's tiles receives.
@@ -326,11 +324,6 @@ impl<'a> Mail<'a> {
         let Route { bag, message, .. } = self.routes[place];
         let bag = if bag == DECODED { self.decoded } else { &self.sent_here[bag as usize] };
         bag.message(message as usize)
-    }
-
-    /// Whether bodies come to stay.
-    pub(crate) fn brings_migrants(self) -> bool {
-        self.routes.iter().any(|route| route.brings_migrants)
     }
 
     pub(crate) fn messages(self) -> impl Iterator<Item = Message<'a>> {

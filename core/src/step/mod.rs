@@ -55,7 +55,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
-            world.each_owner(|bench| {
+            world.each_tile(|bench| {
                 collide(bench);
                 prepare(bench);
                 solve(bench, 0..bench.setup.params.integrations());
@@ -63,7 +63,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             });
         }
         Exchange::Substep => {
-            world.each_solver(|bench| {
+            world.each_tile_apart(|bench| {
                 collide(bench);
                 prepare(bench);
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
@@ -71,7 +71,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             for substep in 0..world.setup.params.integrations() {
                 // After the last substep only a bounce still looks at a ghost's velocity.
                 let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
-                world.each_solver(|bench| {
+                world.each_tile_apart(|bench| {
                     solve(bench, substep..substep + 1);
                     if refreshed {
                         bench.stage(Phase::Border, send_refresh);
@@ -79,15 +79,15 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 });
                 if refreshed {
                     world.exchange(halo)?;
-                    world.each_solver(|bench| bench.stage(Phase::Border, refresh));
+                    world.each_tile_apart(|bench| bench.stage(Phase::Border, refresh));
                 }
             }
-            world.each_solver(|bench| {
+            world.each_tile_apart(|bench| {
                 bench.stage(Phase::Finalize, |b| b.work.solver.restitute(b.setup));
                 bench.stage(Phase::Border, send_impulses);
             });
             world.exchange(halo)?;
-            world.each_solver(|bench| {
+            world.each_tile_apart(|bench| {
                 bench.stage(Phase::Border, average);
                 finalize(bench);
             });
@@ -96,8 +96,8 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
     report(world, stopped)
 }
 
-/// The figures of a world between two steps: energies, contacts, overlaps, tile by tile ([`Facts::total`](crate::Facts::total)
-/// adds them up). The world stays as it is. Every rank must call it at the same step: it is an exchange, and costs a
+/// The figures of a world between two steps: energies, contacts, overlaps, of each tile that owns bodies
+/// ([`Facts::total`](crate::Facts::total) adds them up). The world stays as it is. Every rank must call it at the same step: it is an exchange, and costs a
 /// part of a step, and a copy of the bodies while it lasts.
 ///
 /// # Errors
@@ -125,7 +125,7 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
 /// The first sync point: migrants, then ghosts. Says whether to stop after this step.
 fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H::Error>> {
     if !world.has_failed() {
-        world.each_owner(|bench| {
+        world.each_tile(|bench| {
             bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
         });
     }
@@ -133,10 +133,12 @@ fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H
     if let Some((step, id)) = verdict.failure {
         return Err(StepError::NonFinite { step, id });
     }
-    world.each_heir(|bench| {
+    world.welcome_heirs();
+    world.each_tile(|bench| {
         let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.mail, b.migrate, b.setup, b.step);
         bench.stage(Phase::Migrate, receive);
     });
+    world.dismiss_idle();
     Ok(verdict.stop)
 }
 
@@ -222,7 +224,7 @@ fn average(bench: &mut Bench<'_>) {
 fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E>> {
     let mut report = StepReport { step: world.step, stopped, ..StepReport::default() };
     let (mut leaps, mut not_finite): (u64, Option<GlobalId>) = (0, None);
-    for tile in world.tile_states() {
+    for tile in world.tiles_of_step() {
         let counts = &tile.counts;
         match counts.fault {
             Some(Fault::Protocol) => return Err(StepError::Protocol { step: world.step, tile: tile.id }),

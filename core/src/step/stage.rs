@@ -34,6 +34,8 @@ pub(crate) struct Work {
 pub(crate) struct Hand {
     pub(crate) migrate: MigrateWork,
     pub(crate) timings: Timings,
+    /// What its tiles have to tell at the next sync point.
+    pub(crate) outgoing: Mailbag,
     /// For tiles that are stepped in one go.
     work: Work,
 }
@@ -65,13 +67,8 @@ pub(crate) struct Shop<'a> {
 }
 
 impl<'a> Bench<'a> {
-    pub(crate) fn new(
-        shop: Shop<'a>,
-        tile: &'a mut Tile,
-        (outgoing, mail): (&'a mut Mailbag, Mail<'a>),
-        hand: &'a mut Hand,
-    ) -> Self {
-        let Hand { migrate, timings, work } = hand;
+    pub(crate) fn new(shop: Shop<'a>, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
+        let Hand { migrate, timings, outgoing, work } = hand;
         let Shop { setup, step, team, measures } = shop;
         Self { tile, work, migrate, outgoing, mail, setup, step, team, measures, timings, watch: Stopwatch::start() }
     }

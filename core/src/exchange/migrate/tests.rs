@@ -4,7 +4,7 @@
 use super::{MigrateWork, receive, send};
 use crate::Loopback;
 use crate::exchange::halo::Halo;
-use crate::exchange::mail::{Inbox, Outbox};
+use crate::exchange::mail::{Inbox, Mailbag, Outbox};
 use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
@@ -357,7 +357,7 @@ fn exchange_by_hand(moves: [f64; 2], marks: [f32; 2]) -> [Option<f32>; 2] {
         contact.points[0].normal_impulse = marks[i];
         tile.contacts.push(PairKey::new(Slot::from_index(0, 1, 1), Slot::from_index(1, 1, 1)), contact);
     }
-    let mut outbox = Outbox::new(2);
+    let mut outbox = Outbox { bags: vec![Mailbag::default(); 2], ..Outbox::default() };
     let mut inbox = Inbox::new(&[TileId(0), TileId(1)], 2, 1);
     let mut work = MigrateWork::default();
     for (tile, bag) in tiles.iter_mut().zip(&mut outbox.bags) {

@@ -174,7 +174,7 @@ impl World {
         let place = self.tile_states().binary_search_by_key(&tile, |tile| tile.id);
         let place = place.map_err(|_| RestoreError::NotHere { tile })?;
         let restored = restore(&self.tile_states()[place], block, &self.setup)?;
-        self.tile_states_mut()[place] = restored;
+        self.replace_tile(place, restored);
         Ok(())
     }
 
