@@ -48,7 +48,7 @@ impl<F: FnOnce(&mut Inbox) -> R, R> Halo for Ear<F, R> {
 
 /// Gives a new, empty inbox to `listen`: that of a rank which holds the first of [`TILES`] tiles, knows one kind of
 /// body, and waits for the frames of step 0, sync point 0.
-pub fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
+fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
     let blueprint = Blueprint {
         params: Params { exchange: Exchange::Substep, ..Params::default() },
         grid: TileGrid::new(DVec2::ZERO, DVec2::splat(20.0), 2, TILES / 2).expect("a domain with a size"),
@@ -91,8 +91,13 @@ pub fn frame<'a>((step, sync): (u64, u32), messages: impl Iterator<Item = &'a Me
 
 /// A frame is refused in one line, or it means what it says: written again, it is the same bytes.
 pub fn codec(bytes: &[u8]) -> Outcome<CodecError> {
+    codec_by(bytes, |inbox| inbox.decode(bytes))
+}
+
+/// As [`codec`], for whoever does something around the decoding.
+pub fn codec_by(bytes: &[u8], decode: impl FnOnce(&mut Inbox) -> Result<(), CodecError>) -> Outcome<CodecError> {
     let decoded = receive(|inbox| {
-        let result = inbox.decode(bytes);
+        let result = decode(inbox);
         result.map(|()| frame((0, 0), inbox.messages().collect::<Vec<_>>().into_iter()))
     });
     if let Ok(again) = &decoded {

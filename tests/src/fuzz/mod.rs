@@ -12,7 +12,7 @@ mod snapshot;
 mod transport;
 
 pub use arguments::{NoRun, arguments};
-pub use codec::{FRAME, FrameLayout, TILES, codec, frame, receive};
+pub use codec::{FRAME, FrameLayout, TILES, codec, codec_by, frame};
 pub use config::config;
 pub use segment::{footer, segment, segment_file};
 pub use snapshot::{BLOCK, BlockLayout, block, fresh, seal, snapshot};
