@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks everything: formatting, lints, documentation, tests in both build profiles, and, as it is compiled for speed, the
 # transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces; and results on
-# another architecture, aarch64. Stops at the first failure. Takes about twenty minutes on two cores.
+# another architecture, aarch64. Stops at the first failure. Takes less than half an hour on two cores.
 #
 # Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu, and packages of Python in target/python;
 # elsewhere it leaves out what it cannot check, and the end says so.

@@ -8,7 +8,7 @@ use atoll_core::{
 use bytemuck::cast_slice;
 use glam::DVec2;
 
-/// Tiles of the world that [`receive`] builds; it holds tile 0 alone.
+/// Tiles of the world whose inbox reads frames; it holds tile 0 alone.
 pub const TILES: u32 = 4;
 
 /// Where things stand in a frame, in bytes.
