@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks everything: formatting, lints, documentation, tests in both build profiles, and, as it is compiled for speed, the
-# transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces. Stops at the
-# first failure. Takes about twenty minutes on two cores.
+# transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces; and results on
+# another architecture, aarch64. Stops at the first failure. Takes less than half an hour on two cores.
 #
 # Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu, and packages of Python in target/python;
 # elsewhere it leaves out what it cannot check, and the end says so.
@@ -32,6 +32,18 @@ step_with() {
         step "$@"
     else
         leave_out "cargo $part, which is not installed"
+    fi
+}
+
+# As step, for a script that says by exit code 77 that what is named first cannot be checked here.
+step_unless_77() {
+    local what=$1 code=0
+    shift
+    step "$@" || code=$?
+    if ((code == 77)); then
+        leave_out "$what, as said above"
+    elif ((code)); then
+        exit "$code"
     fi
 }
 
@@ -111,14 +123,9 @@ if [[ ${features[*]} == *mpi* ]]; then
     else
         leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
     fi
-    cluster=0
-    step tests/cluster.sh "${CARGO_TARGET_DIR:-target}/release/atoll" || cluster=$?
-    if ((cluster == 77)); then
-        leave_out 'the cluster, as said above'
-    elif ((cluster)); then
-        exit "$cluster"
-    fi
+    step_unless_77 'the cluster' tests/cluster.sh "${CARGO_TARGET_DIR:-target}/release/atoll"
 fi
+step_unless_77 aarch64 tests/aarch64.sh
 
 printf '\nAll passed in %d s\n' "$SECONDS"
 if ((${#left_out[@]})); then

@@ -257,9 +257,12 @@ impl World {
     pub(crate) fn welcome_heirs(&mut self) {
         let Self { busy, tiles, inbox, .. } = self;
         let owners = busy.len();
-        for heir in inbox.heirs().filter(|&heir| tiles[heir as usize].is_bare()) {
-            tiles[heir as usize].counts = TileCounts::default();
-            busy.push(heir);
+        for heir in inbox.heirs() {
+            let tile = &mut tiles[heir as usize];
+            if tile.is_bare() {
+                tile.counts = TileCounts::default();
+                busy.push(heir);
+            }
         }
         if busy.len() > owners {
             busy.sort_unstable();

@@ -2,4 +2,6 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| atoll_tests::fuzz::transport(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    atoll_tests::fuzz::transport(bytes);
+});

@@ -1,9 +1,10 @@
 //! Command lines.
 
-use super::assert_one_line;
+use super::{Outcome, assert_one_line};
 use crate::program;
 use atoll::Config;
 use atoll::args::{Cli, Command, one_line};
+use atoll::config::ConfigError;
 use clap::Parser;
 use clap::error::ErrorKind;
 use std::ffi::OsString;
@@ -24,10 +25,22 @@ fn argument(bytes: &[u8]) -> OsString {
     String::from_utf8_lossy(bytes).into_owned().into()
 }
 
+/// Why a command line makes no run.
+#[derive(Debug)]
+pub enum NoRun {
+    /// The parser of the command line says so, or what help was asked for.
+    Parser(ErrorKind),
+    /// What it says is no configuration.
+    Config(ConfigError),
+    /// It is another verb.
+    OtherVerb,
+}
+
 /// Arguments, the name of the program left out, with a zero byte between any two. They are refused in one line, they
 /// ask for help, or they make a configuration.
-pub fn arguments(bytes: &[u8]) -> bool {
+pub fn arguments(bytes: &[u8]) -> Outcome<NoRun> {
     let given: Vec<OsString> = bytes.split(|&byte| byte == 0).map(argument).collect();
+    let refused = |why| Outcome { accepted: false, refusals: vec![why] };
     let cli = match Cli::try_parse_from(once(OsString::from("atoll")).chain(given.iter().cloned())) {
         Ok(cli) => cli,
         Err(error) => {
@@ -38,11 +51,11 @@ pub fn arguments(bytes: &[u8]) -> bool {
                 | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {}
                 _ => assert_one_line(text),
             }
-            return false;
+            return refused(NoRun::Parser(error.kind()));
         }
     };
-    let Command::Run(args) = cli.command else { return false };
+    let Command::Run(args) = cli.command else { return refused(NoRun::OtherVerb) };
     let config = args.overrides().and_then(|overrides| Config::load(&CONFIG, &overrides));
-    config.as_ref().err().into_iter().for_each(assert_one_line);
-    config.is_ok()
+    let Outcome { accepted, refusals } = Outcome::of(config);
+    Outcome { accepted, refusals: refusals.into_iter().map(NoRun::Config).collect() }
 }

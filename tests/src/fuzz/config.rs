@@ -1,8 +1,8 @@
 //! Configurations, and what is planned from them.
 
-use super::assert_one_line;
+use super::{Outcome, assert_one_line};
 use atoll::Config;
-use atoll::config::SceneKind;
+use atoll::config::{ConfigError, SceneKind};
 use atoll::plan::Plan;
 
 /// What a target has time to plan: bodies, ranks, and tiles along both axes together.
@@ -19,25 +19,22 @@ const HOW: [(&str, &str); 5] = [
 
 /// The text of a file, and after it any number of `key=value` as for `--set`, with a zero byte before each. It is
 /// refused in one line, or it is a configuration that means something.
-pub fn config(bytes: &[u8]) -> bool {
-    let Ok(text) = std::str::from_utf8(bytes) else { return false };
+pub fn config(bytes: &[u8]) -> Outcome<ConfigError> {
+    let Ok(text) = std::str::from_utf8(bytes) else { return Outcome { accepted: false, refusals: Vec::new() } };
     let mut parts = text.split('\0');
     let text = parts.next().unwrap_or_default();
     let mut overrides: Vec<_> = parts.filter_map(|part| part.split_once('=')).collect();
     let config = Config::from_toml_str("fuzz.toml", text, &overrides);
-    match &config {
-        Err(error) => assert_one_line(error),
-        Ok(config) => {
-            assert_eq!(Config::from_toml_str("fuzz.toml", text, &overrides), Ok(config.clone()), "read again");
-            check(config);
-            overrides.extend(HOW);
-            let otherwise = Config::from_toml_str("fuzz.toml", text, &overrides);
-            let otherwise = otherwise.expect("any configuration can be computed in another way");
-            let tiles = config.run.tiles.unwrap_or([1, 1]);
-            assert_eq!(config.hash(tiles), otherwise.hash(tiles), "how it is computed shows");
-        }
+    if let Ok(config) = &config {
+        assert_eq!(Config::from_toml_str("fuzz.toml", text, &overrides), Ok(config.clone()), "read again");
+        check(config);
+        overrides.extend(HOW);
+        let otherwise = Config::from_toml_str("fuzz.toml", text, &overrides);
+        let otherwise = otherwise.expect("any configuration can be computed in another way");
+        let tiles = config.run.tiles.unwrap_or([1, 1]);
+        assert_eq!(config.hash(tiles), otherwise.hash(tiles), "how it is computed shows");
     }
-    config.is_ok()
+    Outcome::of(config)
 }
 
 /// Every number is one that can be computed with.

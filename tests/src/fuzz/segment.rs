@@ -1,6 +1,6 @@
 //! Segments of recordings, as `Trajectory` reads them.
 
-use super::assert_one_line;
+use super::Outcome;
 use atoll::trajectory::{Record, Row, RunFacts, Trajectory, TrajectoryError, TrajectoryWriter, rank_folder};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
@@ -95,21 +95,18 @@ fn seal(bytes: &mut [u8]) {
 
 /// A segment is refused in one line, or its bodies are those that were written; with a new checksum it is refused in one
 /// line, or read without a panic, whatever it then says.
-pub fn segment(bytes: &[u8]) -> bool {
+pub fn segment(bytes: &[u8]) -> Outcome<TrajectoryError> {
     RUN.with(|run| {
-        match run.read(bytes) {
-            Ok(rows) => {
-                let ids = rows.iter().map(|row| row.id);
-                assert!(ids.eq(0..BODIES), "other rows were read: {rows:?}");
-            }
-            Err(error) => assert_one_line(error),
+        let result = run.read(bytes);
+        if let Ok(rows) = &result {
+            let ids = rows.iter().map(|row| row.id);
+            assert!(ids.eq(0..BODIES), "other rows were read: {rows:?}");
         }
+        let Outcome { mut refusals, .. } = Outcome::of(result);
         let mut sealed = bytes.to_vec();
         seal(&mut sealed);
-        let result = run.read(&sealed);
-        if let Err(error) = &result {
-            assert_one_line(error);
-        }
-        result.is_ok()
+        let outcome = Outcome::of(run.read(&sealed));
+        refusals.extend(outcome.refusals);
+        Outcome { refusals, ..outcome }
     })
 }

@@ -1,15 +1,36 @@
 //! Blocks of saved tiles, as `World::restore` reads them.
 
-use super::assert_one_line;
+use super::Outcome;
 use crate::scenes;
 use crate::world::Scene;
-use atoll_core::{Exchange, Hashes, Loopback, RestoreError, SNAPSHOT_FORMAT, TileId, World, step};
+use atoll_core::{
+    Body, Contact, Exchange, GlobalId, Hashes, Loopback, RestoreError, SNAPSHOT_FORMAT, TileId, World, step,
+};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Where the checksum of a block ends and what it is of begins.
-const CHECKSUM_END: usize = 16;
-/// Length of the header of a block; its last 32 bytes are the hashes.
-pub const BLOCK_HEADER: usize = 64;
+/// Where things stand in a block, in bytes.
+#[derive(Debug)]
+pub struct BlockLayout {
+    /// Where the header has the checksum.
+    pub checksum: usize,
+    /// Where it has four counts, which the checksum is of, as it is of all that follows.
+    pub counts: usize,
+    /// Where it has the hashes.
+    pub hashes: usize,
+    /// Its length.
+    pub header: usize,
+    /// Bytes of a body, of a time of rest, of a ghost, of a contact and its key: what the counts are of, in that order.
+    pub records: [usize; 4],
+}
+
+/// After the description of the format alone.
+pub const BLOCK: BlockLayout = BlockLayout {
+    checksum: 8,
+    counts: 16,
+    hashes: 32,
+    header: 64,
+    records: [size_of::<Body>(), 4, size_of::<GlobalId>() + size_of::<TileId>(), 8 + size_of::<Contact>()],
+};
 
 const TILES: (u32, u32) = (2, 2);
 const TILE: TileId = TileId(0);
@@ -33,11 +54,12 @@ pub fn block() -> Vec<u8> {
 
 /// Writes format, tile and checksum as whoever saves would have written them.
 pub fn seal(block: &mut [u8]) {
-    if block.len() >= CHECKSUM_END {
-        let checksum = xxh3_64(&block[CHECKSUM_END..]);
+    let BlockLayout { checksum: place, counts, .. } = BLOCK;
+    if block.len() >= counts {
+        let checksum = xxh3_64(&block[counts..]);
         block[..4].copy_from_slice(&SNAPSHOT_FORMAT.to_le_bytes());
-        block[4..8].copy_from_slice(&TILE.0.to_le_bytes());
-        block[8..CHECKSUM_END].copy_from_slice(&checksum.to_le_bytes());
+        block[4..place].copy_from_slice(&TILE.0.to_le_bytes());
+        block[place..counts].copy_from_slice(&checksum.to_le_bytes());
     }
 }
 
@@ -48,30 +70,25 @@ fn restored(block: &[u8]) -> Result<World, RestoreError> {
 
 /// A block is refused in one line. One that was sealed anew, with the hashes of what is in it, is refused or means what
 /// it says: saved again it is the same bytes, and a world can be stepped from there, if not to any sense.
-pub fn snapshot(bytes: &[u8]) -> bool {
-    if let Err(error) = restored(bytes) {
-        assert_one_line(error);
-    }
+pub fn snapshot(bytes: &[u8]) -> Outcome<RestoreError> {
+    let mut outcome = Outcome::of(restored(bytes));
     let mut forged = bytes.to_vec();
     seal(&mut forged);
     let mut result = restored(&forged);
     if let Err(RestoreError::Hashes { restored: Hashes { state, contact }, .. }) = result {
-        forged[BLOCK_HEADER - 32..BLOCK_HEADER].copy_from_slice(&[state, contact].map(u128::to_le_bytes).concat());
+        outcome.refusals.extend(Outcome::of(result).refusals);
+        forged[BLOCK.hashes..BLOCK.header].copy_from_slice(&[state, contact].map(u128::to_le_bytes).concat());
         seal(&mut forged);
         result = restored(&forged);
     }
-    match result {
-        Err(error) => {
-            assert_one_line(error);
-            false
-        }
-        Ok(mut world) => {
-            let mut again = Vec::new();
-            world.save(&mut again);
-            assert!(again == forged, "{forged:02x?} were taken for {again:02x?}");
-            // It may fail, and must not panic.
-            let _ = (0..2).try_for_each(|_| step(&mut world, &mut Loopback).map(|_| ()));
-            true
-        }
+    if let Ok(world) = &mut result {
+        let mut again = Vec::new();
+        world.save(&mut again);
+        assert!(again == forged, "{forged:02x?} were taken for {again:02x?}");
+        // It may fail, and must not panic.
+        let _ = (0..2).try_for_each(|_| step(world, &mut Loopback).map(|_| ()));
     }
+    let Outcome { accepted, refusals } = Outcome::of(result);
+    outcome.refusals.extend(refusals);
+    Outcome { accepted, ..outcome }
 }
