@@ -13,7 +13,7 @@ pub struct Launched {
 
 /// What the launcher says, if there was one that says it: `mpirun` of Open MPI or of MPICH and those like it, or `srun`.
 ///
-/// If its number of ranks is not the [size](Transport::size) of the run, the program was started by the launcher of
+/// If its number of ranks is not the [size](crate::Transport::size) of the run, the program was started by the launcher of
 /// another MPI than the one that it was built with.
 pub fn launched() -> Option<Launched> {
     launched_in(|name| std::env::var(name).ok())

@@ -2,7 +2,7 @@
 //!
 //! Behind the cargo feature `mpi`, which needs an MPI library to build with. The program is started by that library's own
 //! launcher, as in `mpirun -n 4 program`; with another one's, each process finds itself alone, which a program can
-//! tell by [`launched`]. Each process calls [`Mpi::init`] once and passes the endpoint to the code that needs it.
+//! tell by [`launched()`]. Each process calls [`Mpi::init`] once and passes the endpoint to the code that needs it.
 //!
 //! There are two ways to exchange a round, a [`Method`] each, with the same results. Every rank switches at the same
 //! round.
@@ -14,7 +14,7 @@
 //!   them come together.
 //! - **After an error** of an exchange or of `close` the job cannot be saved, as the library cannot go on without a
 //!   rank. Dropping the endpoint then does nothing; finalizing would wait for ever. The process must end by
-//!   [`abort`](Transport::abort) or [`abort_with`](Mpi::abort_with), which end all processes of the job.
+//!   [`abort`](crate::Transport::abort) or [`abort_with`](Mpi::abort_with), which end all processes of the job.
 //! - **By a panic:** an endpoint that is dropped by one ends the job with [`ABORTED`], after the panic's message was
 //!   printed.
 //!
@@ -49,7 +49,7 @@ use std::time::Duration;
 pub use self::endpoint::Mpi;
 pub use self::launched::{Launched, can_join_others, launched};
 
-/// The exit code of a job that a rank ended by [`abort`](Transport::abort) or by a panic.
+/// The exit code of a job that a rank ended by [`abort`](crate::Transport::abort) or by a panic.
 pub const ABORTED: i32 = 3;
 
 /// How a round is exchanged.
