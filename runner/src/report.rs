@@ -7,7 +7,6 @@ use atoll_core::TileFacts;
 use atoll_transport::{Rank, RankFailure, TransportError};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
-use std::time::Duration;
 
 /// How a rank ended.
 #[derive(Serialize, Deserialize)]
@@ -30,10 +29,8 @@ struct Figures {
 /// Why a rank ended early.
 #[derive(Serialize, Deserialize)]
 enum Trouble {
-    /// It lost another one.
-    Lost { rank: u32, reason: String },
-    /// Another one did not answer for so long.
-    Silent { rank: u32, seconds: f64 },
+    /// The transport failed, as [`TransportError::to_text`] says it.
+    Transport(String),
     /// Anything else, in words, with an exit code.
     Other { text: String, exit: u8 },
 }
@@ -64,13 +61,7 @@ pub fn write(end: &Result<RankEnd, RankFailure>, complete: u64) -> String {
 
 fn trouble(error: &RankError) -> Trouble {
     match (error, error.transport()) {
-        (_, Some(TransportError::PeerLost { rank, reason })) => Trouble::Lost { rank: rank.0, reason: reason.clone() },
-        (_, Some(TransportError::Timeout { rank, waited })) => {
-            Trouble::Silent { rank: rank.0, seconds: waited.as_secs_f64() }
-        }
-        (_, Some(error @ TransportError::Usage { .. })) => {
-            Trouble::Other { text: error.to_string(), exit: Exit::PeerLost as u8 }
-        }
+        (_, Some(error)) => Trouble::Transport(error.to_text()),
         (RankError::Told { text, exit }, None) => Trouble::Other { text: text.clone(), exit: *exit as u8 },
         (error, None) => Trouble::Other { text: format!("{error:?}"), exit: Exit::PeerLost as u8 },
     }
@@ -87,13 +78,7 @@ pub fn read(rank: Rank, bytes: &[u8]) -> Option<(Result<RankEnd, RankFailure>, u
                 Ok(Some(figures)) => {
                     Ok(Some(Gathered { ranks: records(&figures.ranks)?, tiles: records(&figures.tiles)? }))
                 }
-                Err(Trouble::Lost { rank, reason }) => {
-                    Err(RankError::Transport(TransportError::PeerLost { rank: Rank(rank), reason }))
-                }
-                Err(Trouble::Silent { rank, seconds }) => Err(RankError::Transport(TransportError::Timeout {
-                    rank: Rank(rank),
-                    waited: Duration::try_from_secs_f64(seconds).ok()?,
-                })),
+                Err(Trouble::Transport(text)) => Err(RankError::Transport(TransportError::from_text(&text)?)),
                 Err(Trouble::Other { text, exit }) => Err(RankError::Told { text, exit: Exit::from_code(exit) }),
             };
             Ok(RankEnd { complete, result })
@@ -116,6 +101,7 @@ const _: () = assert!(align_of::<RankFacts>() == 8 && align_of::<TileFacts>() ==
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn there_and_back(end: Result<RankEnd, RankFailure>) -> Result<RankEnd, RankFailure> {
         let line = write(&end, 17);
@@ -143,6 +129,7 @@ mod tests {
         for error in [
             TransportError::PeerLost { rank: Rank(1), reason: "it panicked".to_owned() },
             TransportError::Timeout { rank: Rank(2), waited: Duration::from_millis(1500) },
+            TransportError::Usage { message: "rank 3: two\nlengths".to_owned() },
         ] {
             let end = transport(error.clone()).unwrap();
             assert!(matches!(end.result, Err(RankError::Transport(arrived)) if arrived == error));

@@ -106,6 +106,16 @@ mod iceoryx2 {
     use super::*;
 
     #[test]
+    fn a_small_limit_on_the_stack_is_enough() {
+        let usual = || Way::Iceoryx2.command(2, "configs/quickstart.toml");
+        let mut limited = Command::new("bash");
+        limited.args(["-c", "ulimit -s 64 && exec \"$@\"", "bash"]).arg(usual().get_program()).args(usual().get_args());
+        program::at_home(&mut limited);
+        let given = ["--bodies", "2000", "--tiles", "2x2", "--steps", "20"];
+        assert_eq!(summary(limited.args(given))["state_hash"], summary(usual().args(given))["state_hash"]);
+    }
+
+    #[test]
     fn a_second_interrupt_ends_even_ranks_that_hang() {
         let before = processes::shared_memory();
         let mut running =

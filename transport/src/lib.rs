@@ -91,6 +91,8 @@ pub mod mpi;
 mod origin;
 mod patience;
 mod rank;
+#[cfg(any(feature = "iceoryx2", all(loom, test)))]
+mod seat;
 mod stats;
 
 pub use collective::Collective;

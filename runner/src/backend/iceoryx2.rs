@@ -1,5 +1,6 @@
 //! Ranks as processes of this machine that share memory: the launcher, and what each of them does.
 
+use super::in_process::on_own_thread;
 use super::outcome::{Ends, outcome, told};
 use crate::drive::{self, Observer, RankEnd, RankError};
 use crate::error::{Exit, RunError};
@@ -12,7 +13,6 @@ use atoll_transport::iceoryx2::{self, Control, LaunchError, LaunchOptions, RankE
 use atoll_transport::{Rank, RankFailure, Transport};
 use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::Ordering;
@@ -128,8 +128,7 @@ impl RankProcess {
         let stop = StopFlag::on_signals(false, || {}).asking(iceoryx2::stop_requested);
         let observer = Observer { stop, ..observer };
         // The endpoint is dropped while a panic unwinds, which tells the other ranks.
-        let end = catch_unwind(AssertUnwindSafe(|| take_part(plan, &observer)));
-        let end = end.map_err(|payload| RankFailure::from_panic(rank, payload));
+        let end = on_own_thread(rank, || take_part(plan, &observer));
         let exit = match &end {
             Ok(RankEnd { result: Ok(_), .. }) => Exit::Done,
             Ok(RankEnd { result: Err(RankError::Told { exit, .. }), .. }) => *exit,

@@ -1,7 +1,7 @@
 //! Ranks as threads of this process.
 
 use super::Ends;
-use crate::drive::{self, Observer};
+use crate::drive::{self, Observer, RankEnd};
 use crate::plan::Plan;
 use atoll_transport::channel::{self, ChannelOptions};
 use atoll_transport::local::Local;
@@ -17,17 +17,17 @@ pub(super) fn channel(plan: &Plan, observer: &Observer) -> Ends {
     })
 }
 
-/// A thread of its own all the same: it becomes the first of the rank's thread pool, and the caller's thread could not
-/// leave that again.
+/// One rank, which is all there is.
 pub(super) fn local(plan: &Plan, observer: &Observer) -> Ends {
-    let end = thread::scope(|scope| {
-        let thread = thread::Builder::new()
-            .name("rank 0".to_owned())
-            .spawn_scoped(scope, || drive::drive(Local::new(), plan, observer, true));
-        match thread {
-            Ok(thread) => thread.join().map_err(|payload| RankFailure::from_panic(Rank(0), payload)),
-            Err(error) => Err(RankFailure::NotStarted { rank: Rank(0), reason: error.to_string() }),
-        }
-    });
-    vec![end]
+    vec![on_own_thread(Rank(0), || drive::drive(Local::new(), plan, observer, true))]
+}
+
+/// Runs a rank on a thread of its own, also where it is the only one of its process: the thread becomes the first of the
+/// rank's thread pool, and the caller's could not leave that again; and its stack is as large as it needs, whatever limit
+/// the process was started with.
+pub(super) fn on_own_thread(rank: Rank, body: impl FnOnce() -> RankEnd + Send) -> Result<RankEnd, RankFailure> {
+    thread::scope(|scope| match thread::Builder::new().name(format!("rank {rank}")).spawn_scoped(scope, body) {
+        Ok(thread) => thread.join().map_err(|payload| RankFailure::from_panic(rank, payload)),
+        Err(error) => Err(RankFailure::NotStarted { rank, reason: error.to_string() }),
+    })
 }

@@ -11,38 +11,61 @@ use atoll_transport::{RankFailure, TransportError};
 /// How every rank ended, in rank order.
 pub(super) type Ends = Vec<Result<RankEnd, RankFailure>>;
 
+/// How near to the cause somebody is who says how a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Nearness {
+    /// Knows why, from itself.
+    Cause,
+    /// Is the lost rank itself, or has what it sent.
+    Lost,
+    /// Misses another rank.
+    Misses,
+    /// Had to be killed: it may be the lost one itself, or not, and the others know better.
+    Outlived,
+}
+
+impl Nearness {
+    fn of_error(error: &RankError) -> Self {
+        match (error.transport(), error) {
+            (Some(TransportError::PeerLost { .. } | TransportError::Timeout { .. }), _) => Self::Misses,
+            // It could not take part itself.
+            (Some(TransportError::Usage { .. }), _) => Self::Cause,
+            (None, RankError::Step(StepError::Halo(_))) => Self::Lost,
+            (None, _) => Self::Cause,
+        }
+    }
+
+    fn of_failure(failure: &RankFailure) -> Self {
+        match failure {
+            RankFailure::Outlived { .. } => Self::Outlived,
+            RankFailure::Panicked { .. }
+            | RankFailure::Aborted { .. }
+            | RankFailure::Died { .. }
+            | RankFailure::NotStarted { .. } => Self::Lost,
+        }
+    }
+}
+
 /// What all ranks together have to say. Most errors reach several ranks; the one nearest to the cause is told. If no rank
 /// says how far it came, it is as far as `before`.
 pub(super) fn outcome(plan: &Plan, ends: Ends, before: u64) -> Result<Summary, RunError> {
     let steps = plan.config.run.steps;
     let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(before);
-    let (mut summary, mut errors, mut outlived) = (None, Vec::new(), Vec::new());
+    let (mut summary, mut errors) = (None, Vec::new());
     for end in ends {
         match end.map(|end| end.result) {
             Ok(Ok(None)) => {}
             Ok(Ok(Some(gathered))) => summary = Some(Summary::new(plan, gathered)),
-            Ok(Err(error)) => errors.push(told(error, complete, steps)),
+            Ok(Err(error)) => errors.push((Nearness::of_error(&error), told(error, complete, steps))),
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
-                // One that had to be killed may be the lost one itself, or not: the others know better.
-                let errors = if matches!(failure, RankFailure::Outlived { .. }) { &mut outlived } else { &mut errors };
-                errors.push(RunError::PeerLost { rank, complete, steps, reason });
+                errors.push((Nearness::of_failure(&failure), RunError::PeerLost { rank, complete, steps, reason }));
             }
         }
     }
-    // Stable: among equals, the lowest rank's.
-    errors.sort_by_key(|error| match error {
-        RunError::NonFinite { .. }
-        | RunError::Protocol { .. }
-        | RunError::FloatMode { .. }
-        | RunError::Setup(_)
-        | RunError::Threads { .. }
-        | RunError::Relayed { .. } => 0,
-        // A rank that says itself how it ended, before those that merely miss it.
-        RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
-        _ => 2,
-    });
-    match (errors.into_iter().chain(outlived).next(), summary) {
+    // The first of them: among equals, the lowest rank's.
+    let nearest = errors.into_iter().min_by_key(|&(nearness, _)| nearness);
+    match (nearest.map(|(_, error)| error), summary) {
         (Some(error), _) => Err(error),
         (None, Some(summary)) => Ok(summary),
         (None, None) => unreachable!("a run without errors has a summary from rank 0"),
@@ -79,6 +102,7 @@ mod tests {
     use super::*;
     use crate::config::Config;
     use crate::drive::{self, Observer};
+    use crate::error::Exit;
     use atoll_core::GlobalId;
     use atoll_transport::channel::{self, ChannelOptions};
     use atoll_transport::{Incoming, Outgoing, Rank, Transport};
@@ -111,6 +135,25 @@ mod tests {
         let told = outcome(&plan(), vec![failed(6, error()), failed(6, error()), failed(5, lost(0))], 0).unwrap_err();
         assert!(told.to_string().starts_with("step 5: the state of body 77 is no longer finite"), "{told}");
         assert_eq!(told.exit() as u8, 4);
+    }
+
+    #[test]
+    fn who_is_nearest_to_the_cause_is_heard_in_whatever_order_ranks_come() {
+        // It reads as if the lost one itself said it, but only misses it.
+        let misses = || {
+            let error = TransportError::PeerLost { rank: Rank(1), reason: "rank 1 may be slow".to_owned() };
+            failed(4, RankError::Transport(error))
+        };
+        let died = || Err(RankFailure::Died { rank: Rank(1), how: "was killed by signal 9".to_owned() });
+        let outlived = || Err(RankFailure::Outlived { rank: Rank(2) });
+        let knows = || failed(4, RankError::Told { text: "in its own words".to_owned(), exit: Exit::Physics });
+        let told = |ends| outcome(&plan(), ends, 0).unwrap_err().to_string();
+        assert_eq!(told(vec![misses(), died(), knows()]), "in its own words");
+        assert_eq!(told(vec![knows(), outlived(), misses()]), "in its own words");
+        let lost = "rank 1 was lost after 4 of 9 steps: rank 1 ";
+        assert_eq!(told(vec![outlived(), misses(), died()]), format!("{lost}was killed by signal 9"));
+        assert_eq!(told(vec![outlived(), misses()]), format!("{lost}may be slow"));
+        assert!(told(vec![outlived()]).contains("rank 2 was killed"));
     }
 
     /// Panics in a given round on one rank.

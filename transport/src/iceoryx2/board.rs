@@ -1,9 +1,7 @@
-//! A page of numbers that all ranks of a run see: who rang at whose door, who has received what, who is gone.
+//! The seats of all ranks, in a file that every process of a run maps.
 //!
-//! Each rank has a *seat* with a bell that counts. A sender rings after each message; a rank that has nothing to do
-//! looks at its own bell, first awake and then asleep in the kernel (a futex). The sleeper says at which count it wants
-//! to be woken, the number of messages that it still misses, so a whole round costs one system call for each side and
-//! none where nobody sleeps. iceoryx2's own events cost a socket per pair of ranks and a system call per message.
+//! A rank that has nothing to do looks at its own bell, first awake and then asleep in the kernel (a futex). iceoryx2's own
+//! events cost a socket per pair of ranks and a system call per message.
 
 #![allow(unsafe_code)]
 
@@ -13,8 +11,7 @@ use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::ptr::{NonNull, null_mut};
-use std::sync::atomic::Ordering::{Acquire, Release, SeqCst};
-use std::sync::atomic::{AtomicU32, AtomicU64};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -23,9 +20,7 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use rustix::thread::futex;
 
 use crate::Rank;
-
-/// By how much an alarm moves a bell: beyond any number of messages that a sleeper can miss.
-const ALARM: u32 = 1 << 16;
+use crate::seat::{Bell, Memory, Word};
 
 /// Looks at the bell before the processor is offered to others: some microseconds.
 const SPINS: u32 = 500;
@@ -33,20 +28,60 @@ const SPINS: u32 = 500;
 /// Offers of the processor to others before this rank sleeps.
 const YIELDS: u32 = 20;
 
-/// What the others see of one rank. Alone on its cache lines, two of which processors fetch at once.
-#[repr(C, align(128))]
-struct Seat {
-    /// Counts messages that were sent to this rank, and alarms by [`ALARM`].
-    bell: AtomicU32,
-    /// Not zero while this rank sleeps, or is about to.
-    asleep: AtomicU32,
-    /// The count of the bell at which to wake it.
-    wake_at: AtomicU32,
-    /// Not zero once this rank sends and receives no more.
-    gone: AtomicU32,
-    /// Rounds of which it has received every message.
-    completed: AtomicU64,
+/// Memory that several processes map.
+#[derive(Debug)]
+struct Mapped;
+
+impl Memory for Mapped {
+    type Bell = AtomicU32;
+    type Word = AtomicU64;
+
+    fn fence(order: Ordering) {
+        fence(order);
+    }
 }
+
+impl Bell for AtomicU32 {
+    fn load(&self, order: Ordering) -> u32 {
+        self.load(order)
+    }
+
+    fn fetch_add(&self, count: u32, order: Ordering) -> u32 {
+        self.fetch_add(count, order)
+    }
+
+    fn sleep(&self, at: u32, limit: Duration) {
+        let limit = Timespec { tv_sec: limit.as_secs() as i64, tv_nsec: i64::from(limit.subsec_nanos()) };
+        // However it returns: whoever sleeps looks again.
+        let _ = futex::wait(self, futex::Flags::empty(), at, Some(&limit));
+    }
+
+    fn wake(&self) {
+        // It fails for addresses that are none; the worst that follows is a sleep that lasts its time.
+        let _ = futex::wake(self, futex::Flags::empty(), 1);
+    }
+}
+
+impl Word for AtomicU64 {
+    fn load(&self, order: Ordering) -> u64 {
+        self.load(order)
+    }
+
+    fn store(&self, value: u64, order: Ordering) {
+        self.store(value, order);
+    }
+
+    fn swap(&self, value: u64, order: Ordering) -> u64 {
+        self.swap(value, order)
+    }
+
+    fn exchange(&self, old: u64, new: u64, order: Ordering) -> bool {
+        self.compare_exchange(old, new, order, order).is_ok()
+    }
+}
+
+/// What lies in the file, once for each rank.
+type Seat = crate::seat::Seat<Mapped>;
 
 /// The seats of all ranks, mapped into this process.
 #[derive(Debug)]
@@ -94,29 +129,17 @@ impl Board {
 
     /// Tells `rank` that a message was sent to it.
     pub(super) fn ring(&self, rank: Rank) {
-        self.ring_by(rank, 1);
+        self.seat(rank).ring();
     }
 
     /// Wakes `rank` whatever it waits for.
     pub(super) fn alarm(&self, rank: Rank) {
-        self.ring_by(rank, ALARM);
-    }
-
-    fn ring_by(&self, rank: Rank, count: u32) {
-        let seat = self.seat(rank);
-        let now = seat.bell.fetch_add(count, SeqCst).wrapping_add(count);
-        // The sleeper says that it sleeps before it looks at the bell for the last time, and here it is the other way
-        // round, so one of the two sees the other. Whoever takes the mark wakes it; the rest save the system call.
-        if seat.asleep.load(SeqCst) != 0 && reached(now, seat.wake_at.load(Acquire)) && seat.asleep.swap(0, SeqCst) != 0
-        {
-            // It fails for addresses that are none; the worst that follows is a sleep that lasts its time.
-            let _ = futex::wake(&seat.bell, futex::Flags::empty(), 1);
-        }
+        self.seat(rank).alarm();
     }
 
     /// The count of the bell of `rank`. Messages counted in it are there to be received.
     pub(super) fn rung(&self, rank: Rank) -> u32 {
-        self.seat(rank).bell.load(SeqCst)
+        self.seat(rank).rung()
     }
 
     /// Returns when the bell of `rank`, which is this process, shows that `missing` messages came after it stood at
@@ -124,48 +147,35 @@ impl Board {
     pub(super) fn wait(&self, rank: Rank, seen: u32, missing: u32, limit: Duration, spin: bool) {
         let seat = self.seat(rank);
         for look in 0..if spin { SPINS + YIELDS } else { YIELDS } {
-            if seat.bell.load(Acquire) != seen {
+            if seat.rung() != seen {
                 return;
             }
             if spin && look < SPINS { spin_loop() } else { thread::yield_now() }
         }
         let started = Instant::now();
-        let wake_at = seen.wrapping_add(missing);
-        seat.wake_at.store(wake_at, Release);
-        loop {
-            // Anew before each look: a late ringer of the wait before may have taken the mark.
-            seat.asleep.store(1, SeqCst);
-            let now = seat.bell.load(SeqCst);
-            let left = limit.saturating_sub(started.elapsed());
-            if reached(now, wake_at) || left.is_zero() {
-                break;
-            }
-            let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: i64::from(left.subsec_nanos()) };
-            // However it returns, woken, interrupted, late or because the bell rang just now: look again.
-            let _ = futex::wait(&seat.bell, futex::Flags::empty(), now, Some(&left));
-        }
-        seat.asleep.store(0, SeqCst);
+        let left = || Some(limit.saturating_sub(started.elapsed())).filter(|left| !left.is_zero());
+        seat.sleep(seen.wrapping_add(missing), left);
     }
 
     /// Records that `rank` has received everything of that many rounds.
     pub(super) fn complete(&self, rank: Rank, rounds: u64) {
-        self.seat(rank).completed.store(rounds, Release);
+        self.seat(rank).complete(rounds);
     }
 
     /// Of how many rounds `rank` has received everything.
     pub(super) fn completed(&self, rank: Rank) -> u64 {
-        self.seat(rank).completed.load(Acquire)
+        self.seat(rank).completed()
     }
 
     /// Records that `rank` sends and receives no more, and wakes all others.
     pub(super) fn leave(&self, rank: Rank) {
-        self.seat(rank).gone.store(1, SeqCst);
-        Rank::all(self.size).filter(|&other| other != rank).for_each(|other| self.alarm(other));
+        let others = Rank::all(self.size).filter(|&other| other != rank);
+        self.seat(rank).leave(others.map(|other| self.seat(other)));
     }
 
     /// Whether `rank` sends no more. What it had sent is there to be received.
     pub(super) fn is_gone(&self, rank: Rank) -> bool {
-        self.seat(rank).gone.load(SeqCst) != 0
+        self.seat(rank).is_gone()
     }
 }
 
@@ -174,11 +184,6 @@ impl Drop for Board {
         // SAFETY: this mapping, whose borrows end with `self`. It cannot fail for a mapping that exists.
         let _ = unsafe { munmap(self.seats.as_ptr().cast(), Board::bytes(self.size)) };
     }
-}
-
-/// Whether a bell at `now` is at `target` or past it; both wrap around.
-fn reached(now: u32, target: u32) -> bool {
-    now.wrapping_sub(target) < u32::MAX / 2
 }
 
 #[cfg(test)]
@@ -237,13 +242,12 @@ mod tests {
     }
 
     #[test]
-    fn a_wait_ends_after_its_limit_and_the_count_wraps() {
+    fn a_wait_ends_after_its_limit_where_the_count_wraps() {
         let (board, _) = boards("limit", 1);
-        board.ring_by(Rank(0), u32::MAX);
+        board.seat(Rank(0)).ring_by(u32::MAX);
         let seen = board.rung(Rank(0));
         board.wait(Rank(0), seen, 4, Duration::from_millis(5), true);
         assert_eq!(board.rung(Rank(0)), seen);
-        assert!(!reached(seen, seen.wrapping_add(4)) && reached(2, u32::MAX) && reached(7, 7));
     }
 
     #[test]

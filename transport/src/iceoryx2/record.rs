@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use crate::origin::Origin;
 use crate::{Rank, TransportError};
@@ -39,31 +38,19 @@ impl Record {
     }
 }
 
-fn to_text(origin: &Origin) -> String {
-    let reporter = origin.reporter;
-    match &origin.error {
-        TransportError::PeerLost { rank, reason } => format!("lost {rank} {reporter}\n{reason}"),
-        TransportError::Timeout { rank, waited } => format!("timeout {rank} {reporter}\n{}", waited.as_micros()),
-        TransportError::Usage { message } => format!("lost {reporter} {reporter}\nit misused its endpoint: {message}"),
-    }
+fn to_text(Origin { error, reporter }: &Origin) -> String {
+    format!("{reporter} {}", error.to_text())
 }
 
 fn from_text(text: &str) -> Option<Origin> {
-    let (line, rest) = text.split_once('\n')?;
-    let mut words = line.split(' ');
-    let (kind, rank, reporter) = (words.next()?, words.next()?, words.next()?);
-    let rank = Rank(rank.parse().ok()?);
-    let error = match kind {
-        "lost" => TransportError::PeerLost { rank, reason: rest.to_owned() },
-        "timeout" => TransportError::Timeout { rank, waited: Duration::from_micros(rest.parse().ok()?) },
-        _ => return None,
-    };
-    Some(Origin { error, reporter: Rank(reporter.parse().ok()?) })
+    let (reporter, error) = text.split_once(' ')?;
+    Some(Origin { error: TransportError::from_text(error)?, reporter: Rank(reporter.parse().ok()?) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn lost(rank: u32, reason: &str, reporter: u32) -> Origin {
         let error = TransportError::PeerLost { rank: Rank(rank), reason: reason.to_owned() };
@@ -77,7 +64,7 @@ mod tests {
         for origin in origins {
             assert_eq!(from_text(&to_text(&origin)), Some(origin));
         }
-        for text in ["", "lost 1 2", "lost 1\nx", "found 1 2\nx", "timeout 1 2\nx"] {
+        for text in ["", "1", "1 ", "x lost 1 it left", "1 found 1 it left"] {
             assert_eq!(from_text(text), None, "{text:?}");
         }
     }

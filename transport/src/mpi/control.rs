@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::notice::Notice;
 use super::pause::{awake, pause};
 use super::raw::{Communicator, Pending};
-use crate::origin::left_early;
+use crate::origin::{Origin, left_early};
 use crate::patience::Patience;
 use crate::{Rank, TransportError};
 
@@ -208,7 +208,7 @@ impl Watch {
             Some(Notice::Left { rounds }) => self.left[from.index()] = Some(rounds),
             Some(Notice::Failed(error)) => {
                 self.told_by_other = true;
-                return Err(as_seen_by(self.communicator.rank(), error, from));
+                return Err(Origin { error, reporter: from }.as_seen_by(self.communicator.rank()));
             }
             None => {
                 let reason = "it sent a notice that means nothing here, as if it ran another version".to_owned();
@@ -274,22 +274,6 @@ impl Watch {
     }
 }
 
-/// What rank `own` makes of the news that `reporter` has given up.
-fn as_seen_by(own: Rank, error: TransportError, reporter: Rank) -> TransportError {
-    let reason = match &error {
-        // This very rank was at fault. To itself it is not lost; the other one is.
-        TransportError::Timeout { rank, waited } if *rank == own => {
-            format!("it gave up after waiting {waited:.1?} for this rank, {own}")
-        }
-        TransportError::PeerLost { rank, reason } if *rank == own => {
-            format!("it gave up because of this rank, {own}: {reason}")
-        }
-        TransportError::Usage { message } => format!("it gave up: {message}"),
-        _ => return error,
-    };
-    TransportError::PeerLost { rank: reporter, reason }
-}
-
 /// Whom rank `own`, which has completed so many rounds, is to blame for a wait: the lowest rank that did not answer. If
 /// all have answered, each of them waits as well, and something between ranks is slow or lost: then that one of the
 /// others that is farthest behind.
@@ -324,17 +308,5 @@ mod tests {
         let error = blame(Rank(0), &[Some(2), Some(5), Some(4), Some(4)], 5, WAITED);
         assert_eq!(error.blamed(), Some(Rank(2)));
         assert!(error.to_string().contains("it answers") && error.to_string().contains("round 6"), "{error}");
-    }
-
-    #[test]
-    fn no_rank_is_lost_to_itself() {
-        let timeout = TransportError::Timeout { rank: Rank(2), waited: WAITED };
-        assert_eq!(as_seen_by(Rank(1), timeout.clone(), Rank(0)), timeout);
-        let seen = as_seen_by(Rank(2), timeout, Rank(0));
-        assert_eq!(seen.blamed(), Some(Rank(0)));
-        assert!(seen.to_string().contains("waiting 30.0s for this rank, 2"), "{seen}");
-        let left = TransportError::PeerLost { rank: Rank(2), reason: "it left".to_owned() };
-        assert_eq!(as_seen_by(Rank(1), left.clone(), Rank(0)), left);
-        assert_eq!(as_seen_by(Rank(2), left, Rank(0)).blamed(), Some(Rank(0)));
     }
 }

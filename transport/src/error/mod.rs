@@ -1,5 +1,7 @@
 //! What can go wrong between ranks, and how a rank can end.
 
+mod text;
+
 use std::any::Any;
 use std::time::Duration;
 

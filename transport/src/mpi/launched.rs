@@ -1,0 +1,63 @@
+//! Who started this process, as far as its environment tells.
+
+use crate::Rank;
+
+/// What a launcher says about this process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Launched {
+    /// How many ranks it has started.
+    pub size: usize,
+    /// Which of them this is.
+    pub rank: Rank,
+}
+
+/// What the launcher says, if there was one that says it: `mpirun` of Open MPI or of MPICH and those like it, or `srun`.
+///
+/// If its number of ranks is not the [size](crate::Transport::size) of the run, the program was started by the launcher of
+/// another MPI than the one that it was built with.
+pub fn launched() -> Option<Launched> {
+    launched_in(|name| std::env::var(name).ok())
+}
+
+/// Whether a launcher of MPI started this process, or another one in a way that MPI understands, so that it can join
+/// others.
+pub fn can_join_others() -> bool {
+    ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"].iter().any(|name| std::env::var_os(name).is_some())
+}
+
+fn launched_in(variable: impl Fn(&str) -> Option<String>) -> Option<Launched> {
+    let number = |name| variable(name)?.parse().ok();
+    let names = [
+        ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
+        ("PMI_SIZE", "PMI_RANK"),
+        // The last, as a launcher within a job of Slurm may have been started by srun itself.
+        ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
+    ];
+    let found = |(size, rank)| Some(Launched { size: number(size)? as usize, rank: Rank(number(rank)?) });
+    names.into_iter().find_map(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn launchers_say_how_many_ranks_there_are_and_which_this_is() {
+        let with = |variables: &'static [(&str, &str)]| {
+            launched_in(move |asked| Some(variables.iter().find(|(name, _)| *name == asked)?.1.to_owned()))
+        };
+        let launched = |size, rank| Some(Launched { size, rank: Rank(rank) });
+        assert_eq!(with(&[("OMPI_COMM_WORLD_SIZE", "4"), ("OMPI_COMM_WORLD_RANK", "3")]), launched(4, 3));
+        assert_eq!(with(&[("PMI_SIZE", "8"), ("PMI_RANK", "0")]), launched(8, 0));
+        let within_slurm = &[
+            ("SLURM_STEP_NUM_TASKS", "2"),
+            ("SLURM_PROCID", "1"),
+            ("OMPI_COMM_WORLD_SIZE", "16"),
+            ("OMPI_COMM_WORLD_RANK", "9"),
+        ];
+        assert_eq!(with(&within_slurm[..2]), launched(2, 1));
+        assert_eq!(with(within_slurm), launched(16, 9));
+        assert_eq!(with(&[("PMI_SIZE", "many"), ("PMI_RANK", "0")]), None);
+        assert_eq!(with(&[("HOME", "1")]), None);
+    }
+}
