@@ -94,6 +94,6 @@ pub use state::hash::Hashes;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
-pub use tiling::blueprint::Blueprint;
+pub use tiling::blueprint::{Blueprint, halo_width};
 pub use tiling::partition::{Region, TileGrid};
 pub use world::World;

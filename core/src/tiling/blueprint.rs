@@ -23,6 +23,18 @@ pub struct Blueprint {
     pub statics: Vec<StaticBody>,
 }
 
+/// The largest bounding radius of a dynamic body, in meters.
+pub(crate) fn largest_radius(kinds: &[Kind]) -> f32 {
+    kinds.iter().map(|kind| kind.shape.bounding_radius()).fold(0.0, |most, radius| math::max(radius, most))
+}
+
+/// The width of the halo in meters, a little more than what the ghost rule asks for: bodies this near a tile's region may
+/// matter to it. The largest bounding radius of a dynamic body and the greatest margin.
+pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
+    // A thousandth more, so that the rounding of a sum never decides who sees a contact.
+    f64::from(largest_radius(kinds) + params.margin_cap) * 1.001
+}
+
 /// The blueprint, made ready.
 #[derive(Debug)]
 pub(crate) struct Setup {
@@ -83,9 +95,7 @@ impl Setup {
         if let Some(pair) = static_names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(SetupError::BadStatic { id: pair[0] });
         }
-        let largest = kinds[..dynamic_kinds].iter().fold(0.0, |most, kind| math::max(kind.bounding_radius, most));
-        // A thousandth more than the rule asks for, so that the rounding of a sum never decides who sees a contact.
-        let halo_width = f64::from(largest + params.margin_cap) * 1.001;
+        let halo_width = halo_width(&blueprint.kinds, &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         Ok(Self {
             grid: blueprint.grid.clone(),

@@ -1,5 +1,6 @@
 //! The domain cut into tiles: what stands in it for good, which point is whose, and what a tile holds.
 
 pub(crate) mod blueprint;
+mod memory;
 pub(crate) mod partition;
 pub(crate) mod tile;

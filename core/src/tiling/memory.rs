@@ -1,0 +1,26 @@
+//! How much memory a world takes, before it is built.
+
+use super::blueprint::{Blueprint, halo_width, largest_radius};
+use super::tile::Tile;
+
+/// Bytes of a body with its contacts, its share of what a step derives, and some to spare.
+const PER_BODY: u64 = 200;
+/// Bytes of a ghost: on its way in two buffers, in the lists of who sends and receives it, and where it is held.
+const PER_GHOST: f64 = 300.0;
+
+impl Blueprint {
+    /// About how many bytes a world of every tile takes, with so many bodies spread evenly over the domain. Measured on
+    /// the scene `rooms`, with 5000 bodies in a tile and with 450 tiles for a body.
+    pub fn memory(&self, bodies: u64) -> u64 {
+        let reach = halo_width(&self.kinds, &self.params)
+            + f64::from(largest_radius(&self.kinds))
+            + 0.5 * f64::from(self.params.margin_floor + self.params.margin_cap);
+        let size = self.grid.tile_size();
+        // How many tiles a body's grown AABB and the halo around it meet, along an axis.
+        let met = |tiles: usize, side: f64| (1.0 + 2.0 * reach / side).min(tiles as f64);
+        let copies = met(self.grid.columns(), size.x) * met(self.grid.rows(), size.y) - 1.0;
+        let ghosts = (bodies as f64 * copies * PER_GHOST) as u64;
+        let tiles = self.grid.tiles() as u64 * (size_of::<Tile>() as u64 + 64);
+        bodies.saturating_mul(PER_BODY).saturating_add(ghosts).saturating_add(tiles)
+    }
+}

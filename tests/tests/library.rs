@@ -1,0 +1,89 @@
+//! The library as somebody uses it who has all tiles in one process: `atoll_core` without a halo of one's own.
+
+use atoll_core::{
+    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, SetupError, Solver,
+    StepError, TileGrid, TileId, World, finish, measure, step,
+};
+use atoll_tests::program;
+use atoll_tests::scenes;
+use glam::DVec2;
+
+/// Looking at a world changes nothing of what comes, and shows what it would end with.
+#[test]
+fn a_world_can_be_measured_at_any_step() {
+    for (tiles, exchange, solver) in [
+        ((1, 1), Exchange::Step, Solver::SoftStep),
+        ((3, 2), Exchange::Step, Solver::Pgs),
+        ((3, 2), Exchange::Substep, Solver::SoftStep),
+    ] {
+        let mut scene = scenes::pile(12, 8);
+        scene.params = Params { solver, ..scene.params };
+        let (mut looked_at, mut left_alone) =
+            (scene.start_on(tiles, exchange).world, scene.start_on(tiles, exchange).world);
+        let mut contacts = 0;
+        for _ in 0..60 {
+            // Before the first step, after the last one, and in between.
+            let facts = Facts::total(measure(&looked_at, &mut Loopback).unwrap());
+            assert_eq!(facts.bodies, 96);
+            contacts += facts.contacts;
+            assert_eq!(step(&mut looked_at, &mut Loopback).unwrap(), step(&mut left_alone, &mut Loopback).unwrap());
+        }
+        assert!(contacts > 1000, "only {contacts} contacts in all steps");
+        assert_eq!(looked_at.hashes(), left_alone.hashes());
+        assert_ne!(looked_at.hashes(), Hashes::default());
+        assert_eq!(measure(&looked_at, &mut Loopback), finish(left_alone, &mut Loopback));
+    }
+}
+
+fn two_tiles() -> Blueprint {
+    let scene = scenes::room(4, 1);
+    scene.blueprint((2, 1), Exchange::Step)
+}
+
+#[test]
+fn a_halo_that_delivers_on_the_spot_refuses_half_a_world() {
+    let mut half = World::new(&two_tiles(), &[TileId(0)]).unwrap();
+    let middle = two_tiles().grid.region(TileId(0)).max.x;
+    assert!(half.add(Body::at_rest(GlobalId(9), KindId(0), DVec2::new(middle - 0.1, 2.0))).unwrap());
+    let refused = step(&mut half, &mut Loopback).unwrap_err();
+    assert_eq!(refused, StepError::Halo(NotHere { tile: TileId(1) }));
+    assert!(refused.to_string().contains("tile 1"), "{refused}");
+}
+
+#[test]
+fn a_name_is_given_once() {
+    let mut world = World::whole(&two_tiles()).unwrap();
+    let (low, high) = (two_tiles().grid.min(), two_tiles().grid.max());
+    let at = |id, part| Body::at_rest(GlobalId(id), KindId(0), low + (high - low) * part);
+    for id in [10, 11, u64::MAX] {
+        assert!(world.add(at(id, 0.3)).unwrap());
+    }
+    // Another place, another tile, is no excuse.
+    for (id, part) in [(10, 0.3), (11, 0.8), (u64::MAX, 0.8)] {
+        assert_eq!(world.add(at(id, part)), Err(SetupError::NameTaken { id: GlobalId(id) }));
+    }
+    // A static's.
+    assert_eq!(world.add(at(0, 0.5)), Err(SetupError::BadBody { id: GlobalId(0) }));
+    assert_eq!(world.bodies().count(), 3);
+}
+
+/// What a blueprint says of memory is what a run takes, within a factor of two: few tiles, or many more than bodies.
+#[test]
+fn memory_is_foreseen() {
+    for (bodies, tiles) in [(200_000_u64, 6_u32), (20_000, 300), (2_000, 700)] {
+        let folder = tempfile::tempdir().unwrap();
+        let (json, toml) = (folder.path().join("run.json"), format!("--tiles={tiles}x{tiles}"));
+        let mut command = program::command_of(program::Profile::Release);
+        command.args(["run", "configs/normal.toml", "--steps", "2", "--quiet", &toml]);
+        let peak =
+            program::run_to_summary(command.args(["--bodies", &bodies.to_string()]), &json)["peak_rss_bytes"].as_u64();
+        let side = 1210.0 * (bodies as f64 / 700_000.0).sqrt();
+        let mut blueprint = scenes::room(4, 1).blueprint((1, 1), Exchange::Step);
+        blueprint.grid = TileGrid::new(DVec2::splat(-10.0), DVec2::splat(side - 10.0), tiles, tiles).unwrap();
+        let (foreseen, peak) = (blueprint.memory(bodies) as f64, peak.unwrap() as f64);
+        assert!(
+            foreseen < 2.0 * peak && peak < 1.3 * foreseen,
+            "{bodies} bodies: {foreseen:e} foreseen, {peak:e} taken"
+        );
+    }
+}
