@@ -6,50 +6,45 @@
 //!
 //! No input or output here, no transport, and no clock in any result. All quantities are in SI units.
 //!
-//! # A world of two tiles
+//! # A box falls on a floor
 //!
-//! The same as `examples/two_tiles.rs`: a halo of one's own, and a disc that flies from one tile into the other.
+//! The same as `examples/hello.rs`:
 //!
 //! ```
 //! use atoll_core::*;
 //! use glam::{DVec2, Vec2};
 //!
-//! struct Loopback; // both tiles live here: every message is delivered on the spot
-//!
-//! impl Halo for Loopback {
-//!     type Error = std::convert::Infallible;
-//!     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Self::Error> {
-//!         outbox.deliver(inbox);
-//!         Ok(())
-//!     }
+//! let solid = |width, height| Kind { shape: Shape::rectangle(width, height), material: Material::default() };
+//! let blueprint = Blueprint {
+//!     params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
+//!     grid: TileGrid::new(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
+//!     kinds: vec![solid(1.0, 1.0)],
+//!     statics: vec![StaticBody::new(GlobalId(0), solid(20.0, 2.0), DVec2::new(5.0, -1.0))],
+//! };
+//! let mut world = World::whole(&blueprint)?;
+//! world.add(Body::at_rest(GlobalId(1), KindId(0), DVec2::new(5.0, 4.5)))?;
+//! for _ in 0..120 {
+//!     step(&mut world, &mut Loopback)?;
 //! }
-//!
-//! let grid = TileGrid::new(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1)?;
-//! let disc = Kind { shape: Shape::circle(0.2), material: Material::default() };
-//! let blueprint = Blueprint { params: Params::default(), grid, kinds: vec![disc], statics: vec![] };
-//! let mut world = World::new(&blueprint, &[TileId(0), TileId(1)])?;
-//! world.add(Body {
-//!     id: GlobalId(0),
-//!     position: DVec2::new(9.0, 5.0),
-//!     rotation: Rot::IDENTITY,
-//!     velocity: Vec2::new(3.0, 0.0),
-//!     angular_velocity: 0.0,
-//!     kind: KindId(0),
-//! })?;
-//! let mut migrations = 0;
-//! for _ in 0..60 {
-//!     migrations += step(&mut world, &mut Loopback)?.migrations;
-//! }
-//! assert_eq!(migrations, 1);
-//! assert!((world.bodies().next().unwrap().position.x - 12.0).abs() < 1e-5);
+//! let facts = Facts::total(measure(&world, &mut Loopback)?);
+//! assert_eq!(facts.contacts, 1);
+//! assert!((world.bodies().next().unwrap().position.y - 0.5).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Threads
+//!
+//! [`step`], [`measure`], [`World::save`] and [`World::hashes`] work on the threads of the rayon pool they are called in:
+//! outside of any pool, the global one, which has a thread for each core unless `RAYON_NUM_THREADS` says otherwise. A pool
+//! of one's own sets their number: `ThreadPoolBuilder::new().num_threads(4).build()?.install(|| step(…))`. How many there
+//! are changes no bit of a result.
+//!
 //! # Several ranks
 //!
-//! Give each rank's [`World`] its own tiles, and write a halo that hands what [`Outbox::deliver`] leaves to the other
-//! ranks as bytes ([`Frames`], [`Inbox::decode`]) and the [`Verdict`] of each to all. At the end of a run [`finish`]
-//! makes the closing exchange.
+//! Give each rank's [`World`] its own tiles, and write a [`Halo`] that turns what is for tiles of other ranks into bytes
+//! ([`Frames`], [`Inbox::decode`]), delivers the rest ([`Outbox::deliver`]), and brings the [`Verdict`] of each to all;
+//! `examples/two_tiles.rs` has a halo of its own, if for one rank. At the end of a run [`finish`] makes the closing
+//! exchange.
 //!
 //! # Saving
 //!
@@ -60,8 +55,8 @@
 //!
 //! # What determinism promises
 //!
-//! For one tile grid and one set of parameters: the same bits in debug and release builds, on every x86-64 processor,
-//! at any vector width, on any ranks and threads. Other tile grids agree physically, not bitwise.
+//! For one tile grid and one set of parameters: the same bits in debug and release builds, on every x86-64 and aarch64
+//! processor, at any vector width, on any ranks and threads. Other tile grids agree physically, not bitwise.
 
 #![deny(unsafe_code)]
 

@@ -44,7 +44,8 @@ pub struct StepReport {
 /// Makes one step of this rank's part of the world.
 ///
 /// Every rank of a run calls it equally often, with the same blueprint behind its world. The result depends on the tile
-/// grid and not on how its tiles are spread over ranks and threads.
+/// grid and not on how its tiles are spread over ranks and threads. The threads are those of the rayon pool it is called
+/// in, or of the global one.
 ///
 /// # Errors
 /// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
