@@ -1,8 +1,9 @@
 //! Why a run ended early, and with which exit code.
 
 use crate::config::ConfigError;
-use crate::snapshot::SnapshotError;
-use crate::trajectory::TrajectoryError;
+use crate::folder::recording::TrajectoryError;
+use crate::folder::snapshot::SnapshotError;
+use crate::folder::{EndedError, FolderError};
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
 use std::path::PathBuf;
@@ -83,15 +84,8 @@ pub enum RunError {
         reason: String,
     },
     /// A folder for the run's output that cannot be used.
-    #[error("{option} {}: {reason}", .path.display())]
-    BadFolder {
-        /// What it was given with.
-        option: &'static str,
-        /// The folder.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        reason: String,
-    },
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// A run that is to go on and is at its end.
     #[error("all {steps} steps of this run are made already, see {}; give more --steps to go on", .summary.display())]
     Complete {
@@ -100,6 +94,9 @@ pub enum RunError {
         /// How many it was to make.
         steps: u64,
     },
+    /// A summary that cannot be read.
+    #[error(transparent)]
+    Ended(#[from] EndedError),
     /// A recording that cannot be written or read.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
@@ -254,7 +251,8 @@ impl RunError {
             | Self::Setup(_)
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
-            | Self::BadFolder { .. }
+            | Self::Folder(_)
+            | Self::Ended(_)
             | Self::Snapshot(_)
             | Self::Trajectory(_)
             | Self::TooLarge { .. }

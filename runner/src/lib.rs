@@ -14,38 +14,23 @@
 
 #![forbid(unsafe_code)]
 
-pub mod args;
-pub mod assignment;
-pub mod backend;
-pub mod cmd;
+pub mod cli;
+pub mod compare;
 pub mod config;
-pub mod diff;
-pub mod drive;
 pub mod error;
-pub mod exchange;
-pub mod handshake;
-pub mod interrupt;
-pub mod output;
+pub mod folder;
+pub mod launch;
 pub mod plan;
-pub mod progress;
-pub mod recorder;
-#[cfg(feature = "iceoryx2")]
-pub mod report;
-pub mod run_folder;
+pub mod rank;
 pub mod scene;
-pub mod snapshot;
 pub mod summary;
-pub mod telemetry;
-pub mod tiles;
-pub mod timings;
-pub mod trajectory;
 
 pub use config::Config;
 pub use error::RunError;
 pub use summary::Summary;
 
-use drive::Observer;
 use plan::Plan;
+use rank::Observer;
 
 /// Runs a configuration from start to end in this process and returns its summary. Prints nothing.
 ///
@@ -61,5 +46,5 @@ pub fn run(config: &Config) -> Result<Summary, RunError> {
 /// # Errors
 /// As [`run`].
 pub fn run_with(config: &Config, observer: &Observer) -> Result<Summary, RunError> {
-    backend::run(&Plan::new(config)?, observer)
+    launch::run(&Plan::new(config)?, observer)
 }

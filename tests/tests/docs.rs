@@ -1,6 +1,6 @@
 //! What the documentation tells people to type is understood by the program, and the files it names are there.
 
-use atoll::args::{Cli, Command};
+use atoll::cli::args::{Cli, Command};
 use atoll::config::{Config, ConfigError};
 use atoll::plan::Plan;
 use atoll_tests::program::root;

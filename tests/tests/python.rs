@@ -3,7 +3,7 @@
 //!
 //! Needs an interpreter with polars, pandas, pyarrow and DuckDB: the one that `ATOLL_PYTHON` names, else `python3`.
 
-use atoll::trajectory::{Row, Trajectory};
+use atoll::folder::recording::{Row, Trajectory};
 use atoll_tests::program::{self, root};
 use serde_json::Value;
 use std::ffi::{OsStr, OsString};

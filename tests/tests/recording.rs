@@ -1,6 +1,6 @@
 //! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
 
-use atoll::trajectory::{Row, Trajectory};
+use atoll::folder::recording::{Row, Trajectory};
 use atoll_tests::program::{self, diff};
 use atoll_tests::ways::Way;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};

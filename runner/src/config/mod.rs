@@ -16,9 +16,9 @@ mod words;
 pub use difference::{Difference, differences, other_run};
 pub use error::{ConfigError, OneLine, Origin, Place};
 pub use resolved::{identity, is_resolved};
-pub use scene::{SceneConfig, SceneKind};
 pub use settings::Override;
 
+use crate::scene::{SceneKind, SceneSpec};
 use atoll_core::{Params, SetupError};
 use settings::Settings;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub(crate) const MOST_TILES: u32 = 65_535;
 #[derive(Clone, PartialEq, Debug)]
 pub struct Config {
     /// What there is at the start.
-    pub scene: SceneConfig,
+    pub scene: SceneSpec,
     /// How long, and on what.
     pub run: RunConfig,
     /// The numbers of a step.
@@ -149,7 +149,7 @@ impl Config {
         has: fn(TransportKind) -> bool,
     ) -> Result<Self, ConfigError> {
         let mut settings = Settings::new(name, text, overrides)?;
-        let scene = SceneConfig::read(&mut settings)?;
+        let scene = scene::read(&mut settings)?;
         let run = read_run(&mut settings, has)?;
         let params = read_params(&mut settings, scene.kind)?;
         let output = read_output(&mut settings)?;

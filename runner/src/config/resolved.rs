@@ -1,8 +1,8 @@
 //! What a configuration comes to once every default is filled in: as a file that repeats the run, and as the text and
 //! the hash of what its result depends on.
 
-use super::words::{self, word_for};
-use super::{Config, OutputConfig, RunConfig};
+use super::words::{self, whole, word_for};
+use super::{Config, OutputConfig, RunConfig, scene};
 use atoll_core::Params;
 use std::fmt::Write as _;
 use toml::Value;
@@ -66,7 +66,7 @@ impl Config {
         } = *params;
         let OutputConfig { record_every, checkpoint_every } = *output;
 
-        let mut entries = scene.entries();
+        let mut entries = scene::entries(scene);
         entries.extend([
             ("run.steps", whole(steps)),
             ("run.ranks", whole(ranks as u64)),
@@ -144,11 +144,6 @@ impl Config {
     pub fn hash(&self, tiles: [u32; 2]) -> String {
         format!("{:032x}", xxhash_rust::xxh3::xxh3_128(self.canonical(tiles).as_bytes()))
     }
-}
-
-/// A number of things as TOML has it. No key takes more than TOML can say.
-pub(super) fn whole(number: u64) -> Value {
-    Value::Integer(number.try_into().unwrap_or(i64::MAX))
 }
 
 /// The shortest decimal that is read as this number.

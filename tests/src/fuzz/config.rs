@@ -2,8 +2,8 @@
 
 use super::assert_one_line;
 use atoll::Config;
-use atoll::config::SceneKind;
 use atoll::plan::Plan;
+use atoll::scene::SceneKind;
 
 /// What a target has time to plan: bodies, ranks, and tiles along both axes together.
 const SMALL: (u64, usize, u32) = (2000, 64, 128);

@@ -1,7 +1,7 @@
 //! Segments of recordings, as `Trajectory` reads them.
 
 use super::assert_one_line;
-use atoll::trajectory::{Record, Row, RunFacts, Trajectory, TrajectoryError, TrajectoryWriter, rank_folder};
+use atoll::folder::recording::{Record, Row, RunFacts, Trajectory, TrajectoryError, TrajectoryWriter, rank_folder};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use std::fs;
