@@ -1,8 +1,11 @@
 //! What is accepted, and what is said about everything else.
 
 use super::*;
-use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
+use crate::scene::{SceneKind, SceneSpec};
+use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
 use glam::Vec2;
+use std::path::Path;
+use std::time::Duration;
 
 /// What a scene may be called.
 const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack" or "slope""#;

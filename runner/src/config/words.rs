@@ -1,8 +1,7 @@
 //! The words that a configuration may say, one table each, for reading and for writing.
 
-use super::{MpiExchange, TransportKind};
+use super::sections::{MpiExchange, TransportKind};
 use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
-use toml::Value;
 
 /// Words and what they mean.
 pub(super) type Words<T> = &'static [(&'static str, T)];
@@ -49,9 +48,4 @@ pub(super) const GHOSTS: Words<Ghosts> = &[("dynamic", Ghosts::Dynamic), ("froze
 /// The word for a value.
 pub(super) fn word_for<T: PartialEq>(words: Words<T>, value: T) -> &'static str {
     words.iter().find(|(_, meant)| *meant == value).expect("every value has a word").0
-}
-
-/// A number of things as TOML has it. No key takes more than TOML can say.
-pub(super) fn whole(number: u64) -> Value {
-    Value::Integer(number.try_into().unwrap_or(i64::MAX))
 }

@@ -48,7 +48,25 @@ pub enum SceneKind {
     },
 }
 
+impl SceneSpec {
+    /// What is usual for a kind of scene.
+    pub fn usual(kind: SceneKind) -> Self {
+        Self { kind, bodies: kind.usual_bodies(), seed: 1 }
+    }
+}
+
 impl SceneKind {
+    /// Every kind, with what is usual for what only it has.
+    pub const USUAL: [Self; 7] = [
+        Self::Rooms { power: 1.0 },
+        Self::Pile { jitter: 0.01 },
+        Self::Pyramids { base: 10 },
+        Self::Sparse,
+        Self::SingleIsland,
+        Self::Stack,
+        Self::Slope { angle: 25.0, friction: 0.6 },
+    ];
+
     /// As a configuration calls it.
     pub fn name(self) -> &'static str {
         match self {
