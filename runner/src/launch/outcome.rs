@@ -15,36 +15,51 @@ pub(super) type Ends = Vec<Result<RankEnd, RankFailure>>;
 pub(super) fn outcome(plan: &Plan, ends: Ends, before: u64) -> Result<Summary, RunError> {
     let steps = plan.config.run.steps;
     let complete = ends.iter().flatten().map(|end| end.complete).min().unwrap_or(before);
-    let (mut summary, mut errors, mut outlived) = (None, Vec::new(), Vec::new());
+    let (mut summary, mut errors) = (None, Vec::new());
     for end in ends {
         match end.map(|end| end.result) {
             Ok(Ok(None)) => {}
             Ok(Ok(Some(gathered))) => summary = Some(Summary::new(plan, gathered)),
-            Ok(Err(error)) => errors.push(told(error, complete, steps)),
+            Ok(Err(error)) => errors.push((Nearness::of_error(&error), told(error, complete, steps))),
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
-                // One that had to be killed may be the lost one itself, or not: the others know better.
-                let errors = if matches!(failure, RankFailure::Outlived { .. }) { &mut outlived } else { &mut errors };
-                errors.push(RunError::PeerLost { rank, complete, steps, reason });
+                let error = RunError::PeerLost { rank, complete, steps, reason };
+                errors.push((Nearness::of_failure(&failure), error));
             }
         }
     }
-    // Stable: among equals, the lowest rank's.
-    errors.sort_by_key(|error| match error {
-        RunError::NonFinite { .. }
-        | RunError::Protocol { .. }
-        | RunError::FloatMode { .. }
-        | RunError::Setup(_)
-        | RunError::Threads { .. }
-        | RunError::Relayed { .. } => 0,
-        // A rank that says itself how it ended, before those that merely miss it.
-        RunError::PeerLost { rank, reason, .. } if reason.starts_with(&format!("rank {rank} ")) => 1,
-        _ => 2,
-    });
-    match (errors.into_iter().chain(outlived).next(), summary) {
-        (Some(error), _) => Err(error),
+    // Among equals, the lowest rank's.
+    match (errors.into_iter().min_by_key(|(nearness, _)| *nearness), summary) {
+        (Some((_, error)), _) => Err(error),
         (None, Some(summary)) => Ok(summary),
         (None, None) => unreachable!("a run without errors has a summary from rank 0"),
+    }
+}
+
+/// How near to the cause of a run's end is what one rank says of it; the nearest is told.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Nearness {
+    /// It names the cause, or what all ranks have agreed on.
+    Cause,
+    /// Of a rank that is lost it says how that ended, or what it sent.
+    Witness,
+    /// It merely misses another rank.
+    Misses,
+    /// It had to be killed: it may be the lost one itself, or not, and the others know better.
+    Killed,
+}
+
+impl Nearness {
+    fn of_error(error: &RankError) -> Self {
+        match error {
+            RankError::Step(StepError::Halo(ExchangeError::Frame { .. })) => Self::Witness,
+            error if error.transport().is_some() => Self::Misses,
+            _ => Self::Cause,
+        }
+    }
+
+    fn of_failure(failure: &RankFailure) -> Self {
+        if matches!(failure, RankFailure::Outlived { .. }) { Self::Killed } else { Self::Witness }
     }
 }
 
@@ -77,6 +92,7 @@ pub(super) fn told(error: RankError, complete: u64, steps: u64) -> RunError {
 mod tests {
     use super::*;
     use crate::config::Config;
+    use crate::error::Exit;
     use crate::rank::{self, Observer};
     use atoll_core::GlobalId;
     use atoll_transport::channel::{self, ChannelOptions};
@@ -102,6 +118,30 @@ mod tests {
         let error = outcome(&plan(), vec![failed(4, lost(1)), Err(panicked), failed(3, lost(1))], 9).unwrap_err();
         assert_eq!(error.to_string(), "rank 1 was lost after 3 of 9 steps: rank 1 panicked: boom");
         assert_eq!(error.exit() as u8, 3);
+    }
+
+    #[test]
+    fn the_nearest_to_the_cause_is_told_and_of_equals_the_lowest_rank() {
+        let aborted = |rank| Err(RankFailure::Aborted { rank: Rank(rank), reason: "no more".to_owned() });
+        let killed = |rank| Err(RankFailure::Outlived { rank: Rank(rank) });
+        let agreed = || failed(2, RankError::Agreed { text: "the disk is full".to_owned(), exit: Exit::Output });
+        let usage = TransportError::Usage { message: "rank 1 was asked twice".to_owned() };
+        let refused = || failed(2, RankError::Transport(usage.clone()));
+        for (ends, expected) in [
+            (
+                vec![killed(0), failed(2, lost(1)), aborted(1)],
+                "rank 1 was lost after 2 of 9 steps: rank 1 aborted: no more",
+            ),
+            (vec![killed(0), failed(2, lost(1)), killed(2)], "rank 1 was lost after 2 of 9 steps: it panicked"),
+            (vec![killed(0), killed(1)], "rank 0 was lost after 2 of 9 steps: rank 0 was killed, as it did not"),
+            (vec![aborted(0), aborted(1), agreed()], "the disk is full"),
+            // What it says is not what makes it a witness.
+            (vec![refused(), failed(2, lost(2))], "the transport refused after 2 of 9 steps: rank 1 was asked twice"),
+            (vec![failed(2, lost(2)), refused()], "rank 2 was lost after 2 of 9 steps: it panicked"),
+        ] {
+            let told = outcome(&plan(), ends, 2).unwrap_err().to_string();
+            assert!(told.starts_with(expected), "{told}");
+        }
     }
 
     #[test]
