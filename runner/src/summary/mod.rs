@@ -114,16 +114,14 @@ pub struct Summary {
 impl Summary {
     /// Joins what the ranks and the tiles have to say.
     pub fn new(plan: &Plan, Gathered { ranks, tiles }: Gathered) -> Self {
-        let sum = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).sum::<u64>();
-        let most = |field: fn(&RankFacts) -> u64| ranks.iter().map(field).max().unwrap_or(0);
+        let all = ranks.iter().copied().reduce(RankFacts::join).unwrap_or_default();
         let facts = Facts::total(tiles);
-        let hashes = ranks.iter().map(|rank| Hashes::from_words(rank.hashes)).fold(Hashes::default(), Hashes::merge);
-        let (steps, resumed_at) = (most(|rank| rank.steps), most(|rank| rank.resumed_at));
-        let made = steps - resumed_at;
+        let hashes = Hashes::from_words(all.hashes);
+        let made = all.steps - all.resumed_at;
         let threads = plan.config.run.threads;
         let timings: Vec<_> =
             ranks.iter().enumerate().map(|(rank, facts)| RankTimings::new(rank, threads, facts)).collect();
-        let wall_s = most(|rank| rank.wall_nanos) as f64 * 1e-9;
+        let wall_s = all.wall_nanos as f64 * 1e-9;
         let fraction = |part: u64, whole: u64| if whole > 0 { part as f64 / whole as f64 } else { 0.0 };
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -131,30 +129,30 @@ impl Summary {
             seed: plan.config.scene.seed,
             config_hash: plan.config.hash(plan.tiles),
             bodies: plan.scene.bodies(),
-            steps,
-            resumed_at,
-            interrupted: most(|rank| rank.interrupted) > 0,
+            steps: all.steps,
+            resumed_at: all.resumed_at,
+            interrupted: all.interrupted > 0,
             ranks: ranks.len(),
             threads,
             tiles: plan.tiles,
             transport: plan.transport.name(),
-            build_s: most(|rank| rank.build_nanos) as f64 * 1e-9,
+            build_s: all.build_nanos as f64 * 1e-9,
             wall_s,
             ms_per_step: wall_s * 1e3 / made.max(1) as f64,
             state_hash: format!("{:032x}", hashes.state),
             contact_hash: format!("{:032x}", hashes.contact),
             bodies_lost: plan.scene.bodies() as i64 - facts.bodies as i64,
-            escaped: sum(|rank| rank.escaped),
+            escaped: all.escaped,
             contacts: facts.contacts,
             border_contact_fraction: fraction(facts.border_contacts, facts.contacts),
-            ghosts: sum(|rank| rank.ghosts),
-            migrations: sum(|rank| rank.migrations),
-            islands: sum(|rank| rank.islands),
-            largest_island: most(|rank| rank.largest_island),
-            asleep: sum(|rank| rank.asleep),
-            colors: most(|rank| rank.colors),
-            bytes_sent: sum(|rank| rank.bytes_sent),
-            messages_sent: sum(|rank| rank.messages_sent),
+            ghosts: all.ghosts,
+            migrations: all.migrations,
+            islands: all.islands,
+            largest_island: all.largest_island,
+            asleep: all.asleep,
+            colors: all.colors,
+            bytes_sent: all.bytes_sent,
+            messages_sent: all.messages_sent,
             mass: facts.mass,
             kinetic_energy: facts.kinetic_energy,
             mean_half_v2: facts.mean_half_v2,
@@ -165,7 +163,7 @@ impl Summary {
             constraint_violation: facts.mean_violation,
             max_constraint_violation: facts.max_violation,
             phases: phases(&timings),
-            peak_rss_bytes: sum(|rank| rank.peak_rss_bytes),
+            peak_rss_bytes: all.peak_rss_bytes,
             timings,
         }
     }
