@@ -1,9 +1,10 @@
 //! Why a run ended early, and with which exit code.
 
-use crate::config::ConfigError;
-use crate::folder::recording::TrajectoryError;
-use crate::folder::snapshot::SnapshotError;
-use crate::folder::{EndedError, FolderError};
+pub use crate::config::ConfigError;
+pub use crate::folder::recording::RecordingError;
+pub use crate::folder::snapshot::SnapshotError;
+pub use crate::folder::{EndedError, FolderError};
+
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
 use std::path::PathBuf;
@@ -99,7 +100,7 @@ pub enum RunError {
     Ended(#[from] EndedError),
     /// A recording that cannot be written or read.
     #[error(transparent)]
-    Trajectory(#[from] TrajectoryError),
+    Recording(#[from] RecordingError),
     /// A snapshot that cannot be used.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
@@ -244,7 +245,7 @@ impl RunError {
     /// The exit code that tells of this error.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Trajectory(TrajectoryError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
+            Self::Recording(RecordingError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
                 Exit::Output
             }
             Self::Config(_)
@@ -254,7 +255,7 @@ impl RunError {
             | Self::Folder(_)
             | Self::Ended(_)
             | Self::Snapshot(_)
-            | Self::Trajectory(_)
+            | Self::Recording(_)
             | Self::TooLarge { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }

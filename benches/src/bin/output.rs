@@ -7,12 +7,10 @@
 //! NORMAL on one rank of one thread, in turns: writing nothing, a record every tenth step, a snapshot every hundredth. The
 //! time is that of all steps and of waiting until everything is written. Folders are made where temporary files go (`TMPDIR`).
 
+use atoll::Observer;
 use atoll::compare;
 use atoll::config::Config;
-use atoll::folder::RunFolder;
-use atoll::launch;
-use atoll::plan::Plan;
-use atoll::rank::Observer;
+use atoll::internals::{Plan, RunFolder, run_plan};
 use atoll_benches::{NORMAL, arguments, median};
 use serde_json::json;
 use std::fs;
@@ -82,7 +80,7 @@ fn run_into(folder: &Path, every: Option<(&str, &str)>, steps: u64) -> Result<at
         None => Plan::new(&config)?,
     };
     let _claim = plan.output.as_ref().map(|output| output.claim(None)).transpose()?;
-    launch::run(&plan, &Observer::default())
+    run_plan(&plan, &Observer::default())
 }
 
 /// Bytes of all files in a folder.

@@ -4,7 +4,7 @@ use super::args::InfoArgs;
 use super::output;
 use crate::config::{Config, OneLine};
 use crate::error::{Exit, RunError};
-use crate::folder::recording::{Segment, Trajectory, TrajectoryError};
+use crate::folder::recording::{Recording, RecordingError, Segment};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::folder::{Ended, EndedError, RunFolder};
 use std::ffi::OsStr;
@@ -77,13 +77,13 @@ fn state(folder: &RunFolder, steps: u64) -> Result<String, EndedError> {
 
 fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
     let Some(every) = every else { return Ok("none".to_owned()) };
-    let trajectory = match Trajectory::open(folder) {
-        Err(TrajectoryError::Nothing { .. }) => return Ok(format!("every {every} steps, none complete")),
-        trajectory => trajectory?,
+    let recording = match Recording::open(folder) {
+        Err(RecordingError::Nothing { .. }) => return Ok(format!("every {every} steps, none complete")),
+        recording => recording?,
     };
-    let (steps, files) = (trajectory.steps(), trajectory.files());
+    let (steps, files) = (recording.steps(), recording.files());
     let mut rows = Vec::new();
-    steps.iter().try_for_each(|&step| trajectory.read(step, &mut rows))?;
+    steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
     Ok(format!("{count} records, steps 0 to {last}, every {every}; {size} in {} files", files.len()))
@@ -119,7 +119,7 @@ fn blocks<'a>(text: &mut String, files: impl Iterator<Item = &'a SnapshotFile> +
     row(text, "contact hash", &format!("{:032x}", hashes.contact));
 }
 
-fn of_segment(path: &Path) -> Result<String, TrajectoryError> {
+fn of_segment(path: &Path) -> Result<String, RecordingError> {
     let segment = Segment::open(path)?;
     let (facts, records) = (&segment.facts, &segment.records);
     let mut text = format!(

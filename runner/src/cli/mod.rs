@@ -1,6 +1,6 @@
 //! The program as a person meets it: the command line, the verbs, one file each, and what goes to the terminal.
 
-pub mod args;
+pub(crate) mod args;
 mod console;
 mod diff;
 mod info;

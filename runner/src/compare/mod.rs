@@ -14,7 +14,7 @@ pub use plot::svg;
 
 use crate::config;
 use crate::folder::Ended;
-use crate::folder::recording::{Row, Trajectory, TrajectoryError};
+use crate::folder::recording::{Recording, RecordingError, Row};
 use atoll_core::TileGrid;
 use glam::DVec2;
 use serde::{Serialize, Serializer};
@@ -119,9 +119,9 @@ pub fn compare(
     b: &Path,
     tolerance: Option<f64>,
     mut compared: impl FnMut(usize, usize),
-) -> Result<Comparison, TrajectoryError> {
-    let (a, b) = (Trajectory::open(a)?, Trajectory::open(b)?);
-    let only = |one: &Trajectory, other: &Trajectory| {
+) -> Result<Comparison, RecordingError> {
+    let (a, b) = (Recording::open(a)?, Recording::open(b)?);
+    let only = |one: &Recording, other: &Recording| {
         one.steps().iter().copied().filter(|step| other.steps().binary_search(step).is_err()).collect::<Vec<_>>()
     };
     let (only_in_a, only_in_b) = (only(&a, &b), only(&b, &a));
@@ -154,8 +154,8 @@ pub fn compare(
 }
 
 /// The rows of a record by the names of their bodies.
-fn read_sorted(trajectory: &Trajectory, step: u64, rows: &mut Vec<Row>) -> Result<(), TrajectoryError> {
-    trajectory.read(step, rows)?;
+fn read_sorted(recording: &Recording, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
+    recording.read(step, rows)?;
     rows.sort_unstable_by_key(|row| row.id);
     Ok(())
 }
@@ -170,13 +170,13 @@ impl Comparison {
 }
 
 impl Side {
-    fn new(trajectory: &Trajectory) -> Self {
+    fn new(recording: &Recording) -> Self {
         Self {
-            folder: trajectory.folder().to_owned(),
-            version: trajectory.facts().version.clone(),
-            records: trajectory.steps().len(),
-            incomplete: trajectory.incomplete(),
-            ended: trajectory.ended().cloned(),
+            folder: recording.folder().to_owned(),
+            version: recording.facts().version.clone(),
+            records: recording.steps().len(),
+            incomplete: recording.incomplete(),
+            ended: recording.ended().cloned(),
         }
     }
 }
@@ -199,7 +199,7 @@ fn in_letters<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Err
 }
 
 impl Difference {
-    fn new(step: u64, rows: [&[Row]; 2], sides: [&Trajectory; 2]) -> Self {
+    fn new(step: u64, rows: [&[Row]; 2], sides: [&Recording; 2]) -> Self {
         let [a, b] = [0, 1].map(|i| rows[i].first().map(|row| State::new(row, sides[i])));
         let id = rows.iter().find_map(|rows| rows.first()).map_or(0, |row| row.id);
         let times = rows.map(<[Row]>::len);
@@ -210,8 +210,8 @@ impl Difference {
 }
 
 impl State {
-    fn new(row: &Row, trajectory: &Trajectory) -> Self {
-        let facts = trajectory.facts();
+    fn new(row: &Row, recording: &Recording) -> Self {
+        let facts = recording.facts();
         let [low, high] = facts.domain;
         // A domain that makes no grid comes from no run.
         let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).ok();

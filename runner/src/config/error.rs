@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
 /// control characters becomes a space.
 #[derive(Clone, Copy, Debug)]
-pub struct OneLine<'a>(pub &'a str);
+pub(crate) struct OneLine<'a>(pub &'a str);
 
 impl fmt::Display for OneLine<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

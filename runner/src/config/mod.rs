@@ -1,6 +1,7 @@
 //! What to run: the scene, the physics, and how to spread it. Read from TOML, with the command line winning over it.
 //!
-//! [`keys`] is the table from which reading and writing follow; to add a key, begin there.
+//! `configs/normal.toml` shows all keys with their defaults. They stand in one table, in `keys.rs`, from which reading and
+//! writing follow; to add a key, begin there.
 
 mod difference;
 mod error;
@@ -15,9 +16,10 @@ mod spelling;
 mod tests;
 mod words;
 
-pub use difference::{Difference, differences, other_run};
-pub use error::{ConfigError, Given, OneLine, Origin};
-pub use resolved::{identity, is_resolved};
+pub(crate) use difference::{Difference, differences, other_run};
+pub(crate) use error::OneLine;
+pub use error::{ConfigError, Given, Origin};
+pub(crate) use resolved::{identity, is_resolved};
 pub(crate) use sections::MOST_TILES;
 pub use sections::{Config, MpiExchange, OutputConfig, RunConfig, TransportKind};
 pub use settings::Override;

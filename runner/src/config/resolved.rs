@@ -49,7 +49,7 @@ impl Config {
 
     /// What all parts of one run have in common, a `key = value` line each: [`canonical`](Self::canonical), and how often it
     /// is recorded. [`other_run`](super::other_run) compares two.
-    pub fn identity(&self, tiles: [u32; 2]) -> String {
+    pub(crate) fn identity(&self, tiles: [u32; 2]) -> String {
         identity(self.output.record_every, &self.canonical(tiles))
     }
 
@@ -60,12 +60,12 @@ impl Config {
 }
 
 /// Whether a text is a configuration that a run wrote, and not one that a person did.
-pub fn is_resolved(text: &str) -> bool {
+pub(crate) fn is_resolved(text: &str) -> bool {
     text.starts_with(HEADING)
 }
 
 /// As [`Config::identity`].
-pub fn identity(record_every: Option<u64>, canonical: &str) -> String {
+pub(crate) fn identity(record_every: Option<u64>, canonical: &str) -> String {
     let every = record_every.map_or("nothing".to_owned(), |every| every.to_string());
     format!("output.record_every = {every}\n{canonical}")
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// What the system says. What was begun is removed then.
-pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+pub(crate) fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let temporary = temporary(path);
     let written = File::create(&temporary).and_then(|mut file| {
         write(&mut file)?;
@@ -23,7 +23,7 @@ pub fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()
 ///
 /// # Errors
 /// What the system says.
-pub fn create_folder_durably(path: &Path) -> io::Result<()> {
+pub(crate) fn create_folder_durably(path: &Path) -> io::Result<()> {
     let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
     let missing: Vec<&Path> = path.ancestors().take_while(is_missing).collect();
     fs::create_dir_all(path)?;
@@ -34,7 +34,7 @@ pub fn create_folder_durably(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// If the system says that it is not.
-pub fn sync_folder_of(path: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
     sync_folder(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
@@ -42,7 +42,7 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// If the system says that they are not.
-pub fn sync_folder(folder: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     match File::open(folder).map(|folder| folder.sync_all()) {
         Ok(Err(error)) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
         _ => Ok(()),
@@ -50,7 +50,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 }
 
 /// Whether a file of that name is what somebody who was killed left who would have written `path`.
-pub fn is_temporary(name: &OsStr, path: &Path) -> bool {
+pub(crate) fn is_temporary(name: &OsStr, path: &Path) -> bool {
     let parts = name.to_str().zip(path.file_name().and_then(OsStr::to_str));
     parts.is_some_and(|(name, of)| name.starts_with(&format!(".{of}.")) && name.ends_with(".tmp"))
 }

@@ -8,11 +8,11 @@
 //! DIR/snapshots/      (snapshot/)
 //! ```
 
-pub mod durable;
+pub(crate) mod durable;
 mod ended;
 mod error;
-pub mod recording;
-pub mod snapshot;
+pub(crate) mod recording;
+pub(crate) mod snapshot;
 
 pub use ended::{Ended, EndedError};
 pub use error::FolderError;

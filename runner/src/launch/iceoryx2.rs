@@ -4,7 +4,8 @@ use super::outcome::{Ends, outcome, told};
 use super::rank_report;
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
-use crate::rank::handshake::{self, Refusal};
+use crate::rank::handshake::agree;
+use crate::rank::trouble::Refusal;
 use crate::rank::{self, Observer, RankEnd, RankError, StopFlag};
 use crate::summary::Summary;
 use atoll_transport::iceoryx2::{self, Control, LaunchError, LaunchOptions, RankExit};
@@ -25,7 +26,7 @@ const GOES_ON: &str = "ATOLL_GOES_ON";
 
 /// What a user asks of a launcher.
 #[derive(Clone, Default, Debug)]
-pub struct Wishes {
+pub(crate) struct Wishes {
     /// That the ranks stop.
     pub stop: StopFlag,
     /// That they are ended.
@@ -36,7 +37,7 @@ pub struct Wishes {
 ///
 /// # Errors
 /// If not.
-pub fn check(plan: &Plan, config: &Path) -> Result<(), RunError> {
+pub(crate) fn check(plan: &Plan, config: &Path) -> Result<(), RunError> {
     if !config.is_file() {
         // What can be read but once would leave nothing for the ranks.
         let config = config.display();
@@ -52,7 +53,7 @@ pub fn check(plan: &Plan, config: &Path) -> Result<(), RunError> {
 ///
 /// # Errors
 /// The one that ended the run, whichever and however many ranks it ended.
-pub fn run(plan: &Plan, wishes: &Wishes, goes_on: bool) -> Result<Summary, RunError> {
+pub(crate) fn run(plan: &Plan, wishes: &Wishes, goes_on: bool) -> Result<Summary, RunError> {
     let program = env::current_exe()
         .map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))?;
     let control = || match (wishes.quit.is_requested(), wishes.stop.is_requested()) {
@@ -94,22 +95,22 @@ fn end(exit: &RankExit) -> (Result<RankEnd, RankFailure>, u64) {
 
 /// This process as a rank that the launcher started.
 #[derive(Debug)]
-pub struct RankProcess(());
+pub(crate) struct RankProcess(());
 
 impl RankProcess {
     /// If it is one.
-    pub fn of_this() -> Option<Self> {
+    pub(crate) fn of_this() -> Option<Self> {
         iceoryx2::is_rank_process().then_some(Self(()))
     }
 
     /// Whether it goes on with what others, who were lost, began.
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         env::var_os(GOES_ON).is_some()
     }
 
     /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end. The plan
     /// is given, as ranks wait for each other no longer than the peer timeout once they have joined.
-    pub fn run(self, plan: Result<Plan, RunError>, observer: Observer) -> Exit {
+    pub(crate) fn run(self, plan: Result<Plan, RunError>, observer: Observer) -> Exit {
         let rank = iceoryx2::process_rank().unwrap_or_default();
         let observer = Observer { stop: observer.stop.asking(iceoryx2::stop_requested), ..observer };
         // The endpoint is dropped while a panic unwinds, which tells the other ranks.
@@ -145,7 +146,7 @@ fn take_part(plan: Result<Plan, RunError>, observer: &Observer) -> RankEnd {
         let changed = || RunError::Ranks("the configuration was changed while the ranks were started".to_owned());
         if is_meant(&plan) { Ok(plan) } else { Err(changed()) }
     });
-    let plan = match handshake::agree(&mut endpoint, prepared, |plan| plan) {
+    let plan = match agree(&mut endpoint, prepared, |plan| plan) {
         Ok(plan) => plan,
         Err(Refusal::Transport(error)) => return ended(0, RankError::Transport(error)),
         Err(Refusal::Known(error)) => {

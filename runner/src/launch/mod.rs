@@ -4,10 +4,10 @@
 //! [`crate::cli`].
 
 #[cfg(feature = "iceoryx2")]
-pub mod iceoryx2;
+pub(crate) mod iceoryx2;
 mod in_process;
 #[cfg(feature = "mpi")]
-pub mod mpi;
+pub(crate) mod mpi;
 mod outcome;
 #[cfg(feature = "iceoryx2")]
 mod rank_report;

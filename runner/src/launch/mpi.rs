@@ -4,7 +4,8 @@ use super::outcome::told;
 use crate::config::{Config, MpiExchange};
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
-use crate::rank::handshake::{self, Refusal};
+use crate::rank::handshake::agree;
+use crate::rank::trouble::{Refusal, all_well};
 use crate::rank::{self, Observer, RankError};
 use crate::summary::Summary;
 use atoll_core::StepError;
@@ -28,7 +29,7 @@ const TIME_TO_SPEAK: Duration = Duration::from_secs(5);
 /// What goes wrong on every rank alike is told by rank 0 and ends all of them orderly; what goes wrong on this one alone
 /// is told here and ends the whole job, as MPI has no other way to reach the ranks that wait.
 #[derive(Debug)]
-pub struct Job {
+pub(crate) struct Job {
     endpoint: Mpi,
     complain: fn(&dyn Display),
 }
@@ -38,7 +39,7 @@ impl Job {
     ///
     /// # Errors
     /// If MPI cannot be used as it must be, or the launcher is that of another MPI.
-    pub fn join(complain: fn(&dyn Display)) -> Result<Self, RunError> {
+    pub(crate) fn join(complain: fn(&dyn Display)) -> Result<Self, RunError> {
         let options = MpiOptions { peer_timeout: AGREEMENT_TIMEOUT, ..MpiOptions::default() };
         let endpoint = Mpi::init(options).map_err(|error| RunError::Ranks(error.to_string()))?;
         match mpi::launched() {
@@ -61,7 +62,7 @@ impl Job {
     }
 
     /// Whether this is the rank that speaks for all.
-    pub fn speaks(&self) -> bool {
+    pub(crate) fn speaks(&self) -> bool {
         self.endpoint.rank() == Rank(0)
     }
 
@@ -69,7 +70,7 @@ impl Job {
     ///
     /// # Errors
     /// If the command line asks for another number.
-    pub fn adapt(&mut self, mut config: Config) -> Result<Config, RunError> {
+    pub(crate) fn adapt(&mut self, mut config: Config) -> Result<Config, RunError> {
         if config.run.peer_timeout > AGREEMENT_TIMEOUT {
             // The world may be so large that working out the plan takes longer.
             self.set_peer_timeout(config.run.peer_timeout);
@@ -90,12 +91,12 @@ impl Job {
     ///
     /// # Errors
     /// What keeps them from it, told by rank 0.
-    pub fn agree<T>(
+    pub(crate) fn agree<T>(
         &mut self,
         prepared: Result<T, RunError>,
         plan_of: impl FnOnce(&T) -> &Plan,
     ) -> Result<T, RunError> {
-        match handshake::agree(&mut self.endpoint, prepared, plan_of) {
+        match agree(&mut self.endpoint, prepared, plan_of) {
             Ok(prepared) => Ok(prepared),
             Err(Refusal::Known(error)) => Err(self.common(&error)),
             Err(Refusal::Transport(error)) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
@@ -106,8 +107,8 @@ impl Job {
     ///
     /// # Errors
     /// What is not, told by rank 0.
-    pub fn all_well<T>(&mut self, result: Result<T, RunError>) -> Result<T, RunError> {
-        match handshake::all_well(&mut self.endpoint, result.as_ref().err()) {
+    pub(crate) fn all_well<T>(&mut self, result: Result<T, RunError>) -> Result<T, RunError> {
+        match all_well(&mut self.endpoint, result.as_ref().err()) {
             Ok(()) => result,
             Err(Refusal::Known(error)) => Err(self.common(&error)),
             Err(Refusal::Transport(error)) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
@@ -118,7 +119,7 @@ impl Job {
     ///
     /// # Errors
     /// What ended the run on every rank alike, told by rank 0. Anything else ends the job.
-    pub fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
+    pub(crate) fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
         let run = &plan.config.run;
         self.set_peer_timeout(run.peer_timeout);
         self.endpoint.set_method(match run.mpi_exchange {
@@ -160,7 +161,7 @@ impl Job {
     }
 
     /// Leaves the job, together with all other ranks.
-    pub fn close(mut self) {
+    pub(crate) fn close(mut self) {
         if let Err(error) = self.endpoint.close() {
             self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost);
         }
@@ -175,12 +176,12 @@ impl Job {
     }
 
     /// Ends this process at once, which makes the launcher end the others.
-    pub fn quit() -> ! {
+    pub(crate) fn quit() -> ! {
         Mpi::exit_at_once(Exit::Interrupted as i32)
     }
 
     /// Whether a launcher started this process to join others.
-    pub fn is_launched() -> bool {
+    pub(crate) fn is_launched() -> bool {
         mpi::can_join_others() && mpi::launched().is_some_and(|launched| launched.size > 1)
     }
 }

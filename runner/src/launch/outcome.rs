@@ -77,7 +77,9 @@ pub(super) fn told(error: RankError, complete: u64, steps: u64) -> RunError {
         RankError::Setup(error) => RunError::Setup(error),
         RankError::Threads { rank, threads, reason } => RunError::Threads { rank, threads, reason },
         RankError::Transport(error) => transport(error),
-        RankError::Agreed { text, exit } | RankError::Told { text, exit } => RunError::Relayed { text, exit },
+        RankError::Agreed { text, exit } => RunError::Relayed { text, exit },
+        #[cfg(feature = "iceoryx2")]
+        RankError::Told { text, exit } => RunError::Relayed { text, exit },
         RankError::Step(StepError::NonFinite { step, id }) => RunError::NonFinite { step, id },
         RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
         RankError::Step(StepError::FloatMode { step }) => RunError::FloatMode { step },

@@ -3,9 +3,9 @@
 mod advice;
 mod assignment;
 mod memory;
-pub mod tiles;
+pub(crate) mod tiles;
 
-pub use assignment::Assignment;
+pub(crate) use assignment::Assignment;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;

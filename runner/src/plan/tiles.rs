@@ -14,7 +14,7 @@ const BODIES_PER_TILE: f64 = 5000.0;
 const HALOS_PER_TILE: f64 = 4.0;
 
 /// Columns and rows of tiles: those given, else the default for the scene.
-pub fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
+pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
     config.run.tiles.unwrap_or_else(|| {
         if config.params.sleep {
             return [1, 1]; // islands sleep within one tile only
@@ -25,7 +25,7 @@ pub fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
 }
 
 /// The width of the halo in meters: the largest bounding radius of a dynamic body and the greatest margin.
-pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
+pub(crate) fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
     let radii = kinds.iter().map(|kind| f64::from(kind.shape.bounding_radius()));
     radii.fold(0.0, f64::max) + f64::from(params.margin_cap)
 }

@@ -1,6 +1,6 @@
 //! How a rank begins: with its part of the scene, or of a snapshot.
 
-use super::handshake::{self, Refusal};
+use super::trouble::{Refusal, all_well};
 use super::{Observer, RankError};
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
@@ -28,8 +28,8 @@ pub(super) fn build(
         let restored = restore(plan, rank, snapshot)?.map_err(RunError::Snapshot);
         let is_damage = |error: &&RunError| matches!(error, RunError::Snapshot(error) if error.is_damage());
         // What cannot be read just now is no reason to give it up.
-        handshake::all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
-        let error = match (handshake::all_well(transport, restored.as_ref().err()), restored) {
+        all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
+        let error = match (all_well(transport, restored.as_ref().err()), restored) {
             (Ok(()), Ok(world)) => return Ok(Beginning { world, resumed: Some(snapshot.step()) }),
             (Ok(()), Err(error)) | (Err(Refusal::Known(error)), _) => error,
             (Err(refusal), _) => return Err(refusal.into()),

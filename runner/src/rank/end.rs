@@ -1,7 +1,8 @@
 //! The beginning and the end of what a rank writes, which ranks come to together.
 
 use super::recorder::Recorder;
-use super::{Observer, RankError, handshake};
+use super::trouble::all_well;
+use super::{Observer, RankError};
 use crate::error::RunError;
 use crate::folder::{RunFolder, snapshot};
 use crate::plan::{Output, Plan};
@@ -28,13 +29,13 @@ pub(super) fn start<'a>(
     let token = transport.all_gather(&token).map_err(RankError::Transport)?.swap_remove(0);
     // Others wait for the one that waits.
     let claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2)).map_err(RunError::Folder);
-    handshake::all_well(transport, claim.as_ref().err())?;
+    all_well(transport, claim.as_ref().err())?;
     let removed = if rank == Rank(0) { output.folder.remove_after(resumed) } else { Ok(()) };
     // Nobody writes before it is done.
     let trouble = removed.err().map(|error| RunError::Folder(output.folder.not_writable(&error)));
-    handshake::all_well(transport, trouble.as_ref())?;
+    all_well(transport, trouble.as_ref())?;
     let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
-    handshake::all_well(transport, recorder.as_ref().err())?;
+    all_well(transport, recorder.as_ref().err())?;
     Ok(recorder.ok())
 }
 
@@ -63,7 +64,7 @@ pub(super) fn finish(
         steps: plan.config.run.steps,
         folder: folder.path().to_owned(),
     });
-    handshake::all_well(transport, trouble.as_ref())?;
+    all_well(transport, trouble.as_ref())?;
     if let (Rank(0), Some(kept)) = (transport.rank(), kept)
         && let Err(error) = snapshot::remove_before(&folder.snapshots(), kept)
     {

@@ -5,7 +5,7 @@ use atoll_core::{Hashes, Phase, StepReport, TileFacts, World};
 use bytemuck::{Pod, Zeroable};
 
 /// How many phases a step has.
-pub const PHASES: usize = Phase::ALL.len();
+pub(crate) const PHASES: usize = Phase::ALL.len();
 
 /// What one rank brings to the summary. Plain data, so that it travels as bytes.
 #[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// Why a sync point failed.
 #[derive(Clone, PartialEq, Debug, Error)]
-pub enum ExchangeError {
+pub(crate) enum ExchangeError {
     /// The bytes did not come through.
     #[error(transparent)]
     Transport(#[from] TransportError),
@@ -24,7 +24,7 @@ pub enum ExchangeError {
 
 /// One rank's halo.
 #[derive(Debug)]
-pub struct RankHalo<'a, T> {
+pub(crate) struct RankHalo<'a, T> {
     transport: T,
     assignment: &'a Assignment,
     /// What goes to each rank; kept for its memory.
@@ -36,17 +36,17 @@ pub struct RankHalo<'a, T> {
 
 impl<'a, T: Transport> RankHalo<'a, T> {
     /// A halo that finds tiles by `assignment`, which every rank must hold alike.
-    pub fn new(transport: T, assignment: &'a Assignment) -> Self {
+    pub(crate) fn new(transport: T, assignment: &'a Assignment) -> Self {
         Self { transport, assignment, frames: Frames::default(), incoming: Incoming::default(), waited: Duration::ZERO }
     }
 
     /// How long this rank has waited for others in all sync points.
-    pub fn waited(&self) -> Duration {
+    pub(crate) fn waited(&self) -> Duration {
         self.waited
     }
 
     /// The transport, for what ranks do together outside of steps.
-    pub fn transport(&mut self) -> &mut T {
+    pub(crate) fn transport(&mut self) -> &mut T {
         &mut self.transport
     }
 }

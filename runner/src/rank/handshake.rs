@@ -1,11 +1,11 @@
 //! What processes tell each other before they run together: whether each is ready, and that all mean the same run.
 
-use crate::config::OneLine;
-use crate::error::{Exit, RunError};
+use super::trouble::{Refusal, in_words, relayed};
+use crate::error::RunError;
 use crate::folder::FolderError;
 use crate::folder::snapshot::Snapshot;
 use crate::plan::Plan;
-use atoll_transport::{Collective, Rank, Transport, TransportError};
+use atoll_transport::{Collective, Rank, Transport};
 use std::collections::BTreeMap;
 
 /// Stands in front of the words of a rank that is not ready.
@@ -14,21 +14,12 @@ const ERROR: &str = "error";
 /// Stands in front of the words of a rank that speaks for all: which rank it is makes no difference.
 const COMMON_ERROR: &str = "common error";
 
-/// Why ranks do not run together.
-#[derive(Debug)]
-pub enum Refusal {
-    /// Some rank is not ready, or not like the others. Every rank has the same.
-    Known(RunError),
-    /// They could not even talk.
-    Transport(TransportError),
-}
-
 /// Tells all ranks whether this one is ready and hears the same of them. Gives back what was prepared where all are
 /// ready for the same run.
 ///
 /// # Errors
 /// Whatever is wrong with any of them, the same on every rank.
-pub fn agree<T>(
+pub(crate) fn agree<T>(
     transport: &mut impl Transport,
     prepared: Result<T, RunError>,
     plan_of: impl FnOnce(&T) -> &Plan,
@@ -105,32 +96,6 @@ fn refusal(hellos: &[Hello]) -> Option<RunError> {
         }
     }
     None
-}
-
-/// Lets all ranks hear whether any of them is in trouble, and which: that of the lowest. Every rank gets the same, and none
-/// before all were asked.
-///
-/// # Errors
-/// The trouble, or that they cannot talk.
-pub fn all_well(transport: &mut impl Transport, trouble: Option<&RunError>) -> Result<(), Refusal> {
-    let own = trouble.map(in_words).unwrap_or_default();
-    let words = transport.all_gather(own.as_bytes()).map_err(Refusal::Transport)?;
-    match words.into_iter().find(|words| !words.is_empty()) {
-        Some(words) => Err(Refusal::Known(relayed(&String::from_utf8_lossy(&words), None))),
-        None => Ok(()),
-    }
-}
-
-/// Exit code and words of an error, on one line.
-fn in_words(error: &RunError) -> String {
-    format!("{} {}", error.exit() as u8, OneLine(&error.to_string()))
-}
-
-/// The error that was put in words, which is that of one rank or of all.
-fn relayed(error: &str, rank: Option<usize>) -> RunError {
-    let (code, text) = error.split_once(' ').unwrap_or(("", error));
-    let text = rank.map_or(text.to_owned(), |rank| format!("rank {rank}: {text}"));
-    RunError::Relayed { text, exit: code.parse().map_or(Exit::Usage, Exit::from_code) }
 }
 
 #[cfg(test)]

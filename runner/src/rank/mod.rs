@@ -4,13 +4,17 @@ mod begin;
 mod end;
 mod facts;
 mod halo;
-pub mod handshake;
+// Threads are started alike as it is.
+#[cfg(any(test, feature = "iceoryx2", feature = "mpi"))]
+pub(crate) mod handshake;
 mod observer;
 mod recorder;
+pub(crate) mod trouble;
 
-pub use facts::{Gathered, PHASES, RankFacts};
-pub use halo::{ExchangeError, RankHalo};
+pub(crate) use facts::{Gathered, PHASES, RankFacts};
+pub(crate) use halo::{ExchangeError, RankHalo};
 pub use observer::{Listener, Observer, PanicAt, StopFlag};
+use trouble::Refusal;
 
 use crate::error::Exit;
 use crate::plan::Plan;
@@ -18,7 +22,6 @@ use atoll_core::{SetupError, StepError, StepReport, TileFacts};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use begin::Beginning;
 use bytemuck::Pod;
-use handshake::Refusal;
 use rayon::ThreadPoolBuilder;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -26,7 +29,7 @@ use tracing::{debug, info_span};
 
 /// Why a rank ended early.
 #[derive(Debug)]
-pub enum RankError {
+pub(crate) enum RankError {
     /// Its world could not be built.
     Setup(SetupError),
     /// Its threads could not be started.
@@ -50,6 +53,7 @@ pub enum RankError {
         exit: Exit,
     },
     /// It said so itself, in a process of its own.
+    #[cfg(feature = "iceoryx2")]
     Told {
         /// Its words.
         text: String,
@@ -69,7 +73,7 @@ impl From<Refusal> for RankError {
 
 impl RankError {
     /// What the transport said, if it was the transport.
-    pub fn transport(&self) -> Option<&TransportError> {
+    pub(crate) fn transport(&self) -> Option<&TransportError> {
         match self {
             Self::Transport(error) | Self::Step(StepError::Halo(ExchangeError::Transport(error))) => Some(error),
             _ => None,
@@ -79,7 +83,7 @@ impl RankError {
 
 /// How a rank ended.
 #[derive(Debug)]
-pub struct RankEnd {
+pub(crate) struct RankEnd {
     /// Steps it completed.
     pub complete: u64,
     /// What all ranks have to say, of rank 0.
@@ -88,7 +92,7 @@ pub struct RankEnd {
 
 /// Runs one rank, with a pool of threads of its own that this thread becomes part of. `leads_process` is true for one
 /// rank of each process.
-pub fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads_process: bool) -> RankEnd {
+pub(crate) fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads_process: bool) -> RankEnd {
     let (rank, threads) = (transport.rank(), plan.config.run.threads);
     let _span = info_span!("rank", rank = rank.0).entered();
     let pool = ThreadPoolBuilder::new()

@@ -1,13 +1,13 @@
 //! What became of a run: the figures of all ranks joined. Its fields are the JSON file; [`table`] is for people.
 
 mod table;
-pub mod timings;
+pub(crate) mod timings;
 
 use crate::plan::Plan;
 use crate::rank::{Gathered, RankFacts};
 use atoll_core::{Facts, Hashes};
 use serde::{Serialize, Serializer};
-use timings::RankTimings;
+pub use timings::RankTimings;
 
 /// The time of one phase.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]

@@ -50,7 +50,7 @@ impl RankTimings {
 
 /// The table: a header, then for each rank a line per phase and one for the whole `step`. `mean_ms` is per step, in
 /// milliseconds; `share` is the part of the rank's time, 0 to 1.
-pub fn to_csv(ranks: &[RankTimings]) -> String {
+pub(crate) fn to_csv(ranks: &[RankTimings]) -> String {
     let mut text = format!("{HEADER}\n");
     for one in ranks {
         let RankTimings { rank, threads, steps, wall_nanos, .. } = *one;

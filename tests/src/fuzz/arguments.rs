@@ -3,7 +3,7 @@
 use super::assert_one_line;
 use crate::program;
 use atoll::Config;
-use atoll::cli::args::{Cli, Command, one_line};
+use atoll::internals::{Cli, Command, one_line};
 use clap::Parser;
 use clap::error::ErrorKind;
 use std::ffi::OsString;

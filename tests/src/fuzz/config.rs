@@ -2,7 +2,7 @@
 
 use super::assert_one_line;
 use atoll::Config;
-use atoll::plan::Plan;
+use atoll::internals::Plan;
 use atoll::scene::SceneKind;
 
 /// What a target has time to plan: bodies, ranks, and tiles along both axes together.

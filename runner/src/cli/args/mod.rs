@@ -4,8 +4,8 @@
 mod recordings;
 mod run;
 
-pub use recordings::{DiffArgs, InfoArgs};
-pub use run::RunArgs;
+pub(crate) use recordings::{DiffArgs, InfoArgs};
+pub(crate) use run::RunArgs;
 
 use crate::config::OneLine;
 use clap::error::{ContextKind, ContextValue, ErrorKind};

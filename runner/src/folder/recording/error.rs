@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// A recording that cannot be written or read.
 #[derive(Debug, Error)]
-pub enum TrajectoryError {
+pub enum RecordingError {
     /// The system refused to write.
     #[error("cannot write {}: {reason}", .path.display())]
     Write {

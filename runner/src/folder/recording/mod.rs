@@ -34,18 +34,18 @@ pub(crate) mod testing;
 mod tests;
 mod writer;
 
-pub use error::TrajectoryError;
+pub use error::RecordingError;
 pub use facts::RunFacts;
-pub use reader::Trajectory;
+pub use reader::Recording;
 pub use record::{Record, Row};
-pub use remove::remove_after;
-pub use segment::{RecordEntry, Segment};
-pub use writer::TrajectoryWriter;
+pub(crate) use remove::remove_after;
+pub(crate) use segment::Segment;
+pub use writer::RecordingWriter;
 
 use std::path::{Path, PathBuf};
 
 /// Records in a segment, at most.
-pub const RECORDS_PER_SEGMENT: usize = 10;
+pub(crate) const RECORDS_PER_SEGMENT: usize = 10;
 
 /// The folder of a rank within that of a run.
 pub fn rank_folder(run: &Path, rank: u32) -> PathBuf {

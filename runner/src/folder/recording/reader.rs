@@ -3,7 +3,7 @@
 use super::facts::RunFacts;
 use super::record::Row;
 use super::segment::Segment;
-use super::{TrajectoryError, rank_folder, rank_of_folder, steps_of_segment};
+use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
 use crate::folder::ended::Ended;
 use std::fs;
 use std::io;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A recording. Its files are opened as they are needed, never all at once.
 #[derive(Clone, Debug)]
-pub struct Trajectory {
+pub struct Recording {
     folder: PathBuf,
     facts: RunFacts,
     files: Vec<PathBuf>,
@@ -33,13 +33,13 @@ struct Part {
     file: usize,
 }
 
-impl Trajectory {
+impl Recording {
     /// Reads what all segments say about themselves, and no rows.
     ///
     /// # Errors
     /// If there are no records, a file cannot be read, files do not go together, or one is missing. What is missing after
     /// the last complete record is what a killed run lost, and no error, unless the run's summary says that it came further.
-    pub fn open(folder: &Path) -> Result<Self, TrajectoryError> {
+    pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let (mut files, mut parts) = (Vec::new(), Vec::new());
         // Of the first file, to compare with, and of the last step, which is what the run came to be.
         let (mut first, mut last) = (None, None);
@@ -47,12 +47,12 @@ impl Trajectory {
             let segment = Segment::open(&path)?;
             if segment.rank != rank {
                 let reason = format!("it is of rank {}", segment.rank);
-                return Err(TrajectoryError::BadSegment { path, reason });
+                return Err(RecordingError::BadSegment { path, reason });
             }
             let first = first.get_or_insert_with(|| segment.facts.clone());
             if let Some(what) = first.other_run(&segment.facts) {
                 let paths = [files.swap_remove(0), path];
-                return Err(TrajectoryError::OtherRun { paths, what });
+                return Err(RecordingError::OtherRun { paths, what });
             }
             let (ranks, file) = (segment.ranks, files.len());
             parts.extend(segment.records.iter().map(|record| {
@@ -65,13 +65,13 @@ impl Trajectory {
             }
             files.push(path);
         }
-        let nothing = || TrajectoryError::Nothing { path: folder.to_owned() };
+        let nothing = || RecordingError::Nothing { path: folder.to_owned() };
         let (_, facts) = last.ok_or_else(nothing)?;
         parts.sort_by_key(|part| (part.step, part.rank));
         let (folder, ended) = (folder.to_owned(), Ended::read(folder)?);
-        let mut trajectory = Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended };
-        (trajectory.steps, trajectory.incomplete) = trajectory.find_complete()?;
-        if trajectory.steps.is_empty() { Err(nothing()) } else { Ok(trajectory) }
+        let mut recording = Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended };
+        (recording.steps, recording.incomplete) = recording.find_complete()?;
+        if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
     }
 
     /// The folder it is in.
@@ -108,17 +108,17 @@ impl Trajectory {
     ///
     /// # Errors
     /// If there is no such record, or its files are damaged.
-    pub fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), TrajectoryError> {
+    pub fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
         rows.clear();
         if self.steps.binary_search(&step).is_err() {
-            return Err(TrajectoryError::NoSuchStep { path: self.folder.clone(), step });
+            return Err(RecordingError::NoSuchStep { path: self.folder.clone(), step });
         }
         let parts = &self.parts[self.parts_of(step)];
         let count = parts.iter().try_fold(0_u64, |sum, part| sum.checked_add(part.rows));
         let fits = count.and_then(|count| rows.try_reserve_exact(usize::try_from(count).ok()?).ok());
         fits.ok_or_else(|| {
             let reason = format!("step {step} has more rows than this machine can hold");
-            TrajectoryError::Read { path: self.folder.clone(), reason }
+            RecordingError::Read { path: self.folder.clone(), reason }
         })?;
         for part in parts.iter().filter(|part| part.rows > 0) {
             Segment::open(&self.files[part.file])?.read(step, rows)?;
@@ -132,7 +132,7 @@ impl Trajectory {
     }
 
     /// The steps that all ranks hold, none of which may be missing, and how many only some hold.
-    fn find_complete(&self) -> Result<(Vec<u64>, usize), TrajectoryError> {
+    fn find_complete(&self) -> Result<(Vec<u64>, usize), RecordingError> {
         let (mut complete, mut incomplete) = (Vec::new(), 0);
         for parts in self.parts.chunk_by(|a, b| a.step == b.step) {
             self.check_together(parts)?;
@@ -149,21 +149,21 @@ impl Trajectory {
         let unbroken = complete.iter().zip(0..).take_while(|(step, count)| **step == count * every).count();
         let missing = unbroken as u64 * every;
         if last.is_some_and(|last| missing <= last) {
-            return Err(TrajectoryError::Missing { folder: self.place_of_missing(missing), step: missing });
+            return Err(RecordingError::Missing { folder: self.place_of_missing(missing), step: missing });
         }
         Ok((complete, incomplete))
     }
 
     /// Whether the parts of one step are those of different ranks of one run.
-    fn check_together(&self, parts: &[Part]) -> Result<(), TrajectoryError> {
+    fn check_together(&self, parts: &[Part]) -> Result<(), RecordingError> {
         for pair in parts.windows(2) {
             let (step, paths) = (pair[0].step, || [0, 1].map(|i| self.files[pair[i].file].clone()));
             let ranks = [pair[0].ranks, pair[1].ranks];
             if ranks[0] != ranks[1] {
-                return Err(TrajectoryError::OtherRanks { paths: paths(), ranks, step });
+                return Err(RecordingError::OtherRanks { paths: paths(), ranks, step });
             }
             if pair[0].rank == pair[1].rank {
-                return Err(TrajectoryError::Twice { paths: paths(), step });
+                return Err(RecordingError::Twice { paths: paths(), step });
             }
         }
         Ok(())
@@ -178,7 +178,7 @@ impl Trajectory {
 }
 
 /// All complete segments of a run, with the ranks in whose folders they are, in a fixed order.
-fn segments(folder: &Path) -> Result<Vec<(u32, PathBuf)>, TrajectoryError> {
+fn segments(folder: &Path) -> Result<Vec<(u32, PathBuf)>, RecordingError> {
     let mut segments = Vec::new();
     for name in names(folder)? {
         let Some(rank) = rank_of_folder(&name) else { continue };
@@ -191,12 +191,12 @@ fn segments(folder: &Path) -> Result<Vec<(u32, PathBuf)>, TrajectoryError> {
 }
 
 /// The names in a folder, in order. Whatever is not Unicode is not ours.
-fn names(folder: &Path) -> Result<Vec<String>, TrajectoryError> {
+fn names(folder: &Path) -> Result<Vec<String>, RecordingError> {
     let read = || {
         let entries = fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().into_string().ok()));
         let mut names: Vec<String> = entries.filter_map(io::Result::transpose).collect::<io::Result<_>>()?;
         names.sort();
         Ok(names)
     };
-    read().map_err(|error: io::Error| TrajectoryError::Read { path: folder.to_owned(), reason: error.to_string() })
+    read().map_err(|error: io::Error| RecordingError::Read { path: folder.to_owned(), reason: error.to_string() })
 }

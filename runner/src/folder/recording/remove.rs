@@ -9,7 +9,7 @@ use std::{fs, io};
 ///
 /// # Errors
 /// What the system says.
-pub fn remove_after(run: &Path, step: Option<u64>) -> io::Result<()> {
+pub(crate) fn remove_after(run: &Path, step: Option<u64>) -> io::Result<()> {
     for folder in fs::read_dir(run)? {
         let folder = folder?;
         if folder.file_name().to_str().and_then(rank_of_folder).is_none() {

@@ -8,7 +8,7 @@
 use super::error::reason;
 use super::facts::{RunFacts, parse};
 use super::record::Row;
-use super::{TrajectoryError, layout, quiet, steps_of_segment};
+use super::{RecordingError, layout, quiet, steps_of_segment};
 use parquet::column::reader::ColumnReaderImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -30,7 +30,7 @@ const START: u64 = 4;
 
 /// A complete segment.
 #[derive(Debug)]
-pub struct Segment {
+pub(crate) struct Segment {
     path: PathBuf,
     /// The run it is of.
     pub facts: RunFacts,
@@ -46,7 +46,7 @@ pub struct Segment {
 
 /// A record, as the metadata tells of it.
 #[derive(Debug)]
-pub struct RecordEntry {
+pub(crate) struct RecordEntry {
     /// The step.
     pub step: u64,
     /// Bodies of the rank.
@@ -64,9 +64,9 @@ impl Segment {
     ///
     /// # Errors
     /// If it cannot be read, or is no segment, or a damaged one.
-    pub fn open(path: &Path) -> Result<Self, TrajectoryError> {
-        let bad = |reason| TrajectoryError::BadSegment { path: path.to_owned(), reason };
-        let failed = |error: io::Error| TrajectoryError::Read { path: path.to_owned(), reason: error.to_string() };
+    pub(crate) fn open(path: &Path) -> Result<Self, RecordingError> {
+        let bad = |reason| RecordingError::BadSegment { path: path.to_owned(), reason };
+        let failed = |error: io::Error| RecordingError::Read { path: path.to_owned(), reason: error.to_string() };
         let file = File::open(path).map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len();
         let columns = Arc::new(SchemaDescriptor::new(layout::schema()));
@@ -123,8 +123,8 @@ impl Segment {
     }
 
     /// Appends the rows of a record to `rows`.
-    pub(super) fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), TrajectoryError> {
-        let bad = |reason| TrajectoryError::BadSegment { path: self.path.clone(), reason };
+    pub(super) fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
+        let bad = |reason| RecordingError::BadSegment { path: self.path.clone(), reason };
         let record = self.records.iter().find(|record| record.step == step);
         let record = record.ok_or_else(|| bad(format!("it no longer holds step {step}")))?;
         if record.rows == 0 {
@@ -132,7 +132,7 @@ impl Segment {
         }
         let checksum = self.checksum(record);
         let checksum =
-            checksum.map_err(|error| TrajectoryError::Read { path: self.path.clone(), reason: error.to_string() })?;
+            checksum.map_err(|error| RecordingError::Read { path: self.path.clone(), reason: error.to_string() })?;
         if checksum != record.checksum {
             return Err(bad(format!("the bytes of step {step} are not those that were written")));
         }

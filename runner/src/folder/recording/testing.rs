@@ -1,6 +1,6 @@
 //! Small recordings for tests.
 
-use super::{Record, RunFacts, TrajectoryWriter, rank_folder};
+use super::{Record, RecordingWriter, RunFacts, rank_folder};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(crate) fn record(
     bodies: impl Fn(u64) -> Vec<Body>,
 ) {
     for rank in 0..ranks {
-        let mut writer = TrajectoryWriter::new(rank_folder(folder, rank), rank, ranks, facts).unwrap();
+        let mut writer = RecordingWriter::new(rank_folder(folder, rank), rank, ranks, facts).unwrap();
         let mut record = Record::default();
         for step in steps.clone() {
             let all = bodies(step);

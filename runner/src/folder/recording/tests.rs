@@ -32,19 +32,19 @@ fn sorted(mut rows: Vec<Row>) -> Vec<Row> {
     rows
 }
 
-fn read(trajectory: &Trajectory, step: u64) -> Vec<Row> {
+fn read(recording: &Recording, step: u64) -> Vec<Row> {
     let mut rows = Vec::new();
-    trajectory.read(step, &mut rows).unwrap();
+    recording.read(step, &mut rows).unwrap();
     rows
 }
 
 /// What is wrong with a recording, of which something is wrong.
 fn complaint(folder: &Path) -> String {
-    let error = match Trajectory::open(folder) {
+    let error = match Recording::open(folder) {
         Err(error) => error,
-        Ok(trajectory) => {
+        Ok(recording) => {
             let mut rows = Vec::new();
-            let read = trajectory.steps().iter().map(|step| trajectory.read(*step, &mut rows));
+            let read = recording.steps().iter().map(|step| recording.read(*step, &mut rows));
             read.collect::<Result<Vec<_>, _>>().unwrap_err()
         }
     };
@@ -54,10 +54,10 @@ fn complaint(folder: &Path) -> String {
 }
 
 /// All that can be read, by step.
-fn everything(folder: &Path) -> Result<BTreeMap<u64, Vec<Row>>, TrajectoryError> {
-    let trajectory = Trajectory::open(folder)?;
+fn everything(folder: &Path) -> Result<BTreeMap<u64, Vec<Row>>, RecordingError> {
+    let recording = Recording::open(folder)?;
     let mut rows = Vec::new();
-    trajectory.steps().iter().map(|&step| trajectory.read(step, &mut rows).map(|()| (step, rows.clone()))).collect()
+    recording.steps().iter().map(|&step| recording.read(step, &mut rows).map(|()| (step, rows.clone()))).collect()
 }
 
 #[test]
@@ -75,13 +75,13 @@ fn states_come_back_bit_for_bit_in_their_order() {
         bodies
     };
     record(folder.path(), &facts(1), 1, 0..3, odd);
-    let trajectory = Trajectory::open(folder.path()).unwrap();
+    let recording = Recording::open(folder.path()).unwrap();
     for step in 0..3 {
         let expected: Vec<Row> = odd(step).into_iter().map(row).collect();
-        let read = read(&trajectory, step);
+        let read = read(&recording, step);
         assert_eq!(bytemuck::cast_slice::<_, u8>(&read), bytemuck::cast_slice::<_, u8>(&expected));
     }
-    assert_eq!(trajectory.facts(), &facts(1));
+    assert_eq!(recording.facts(), &facts(1));
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn many_rows_take_several_pages() {
     let folder = folder();
     let many = |step| (0..150_000).map(|id| body(id, step)).collect();
     record(folder.path(), &facts(1), 1, 0..1, many);
-    let trajectory = Trajectory::open(folder.path()).unwrap();
-    assert_eq!(read(&trajectory, 0), many(0).into_iter().map(row).collect::<Vec<_>>());
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!(read(&recording, 0), many(0).into_iter().map(row).collect::<Vec<_>>());
 }
 
 #[test]
@@ -102,13 +102,13 @@ fn a_segment_holds_ten_records_and_the_last_the_rest() {
         let names: Vec<_> = names.into_iter().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names, ["steps-0000000000-0000000045.parquet", "steps-0000000050-0000000060.parquet"]);
     }
-    let trajectory = Trajectory::open(folder.path()).unwrap();
-    assert_eq!((trajectory.steps().len(), trajectory.incomplete()), (13, 0));
-    for &step in trajectory.steps() {
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!((recording.steps().len(), recording.incomplete()), (13, 0));
+    for &step in recording.steps() {
         let expected: Vec<Row> = bodies(step).into_iter().map(row).collect();
-        assert_eq!(sorted(read(&trajectory, step)), sorted(expected));
+        assert_eq!(sorted(read(&recording, step)), sorted(expected));
     }
-    let error = trajectory.read(7, &mut Vec::new()).unwrap_err();
+    let error = recording.read(7, &mut Vec::new()).unwrap_err();
     assert!(error.to_string().ends_with("has no record of step 7"), "{error}");
 }
 
@@ -116,9 +116,9 @@ fn a_segment_holds_ten_records_and_the_last_the_rest() {
 fn idle_ranks_record_as_well() {
     let folder = folder();
     record(folder.path(), &facts(1), 3, 0..12, |step| vec![body(9, step)]);
-    let trajectory = Trajectory::open(folder.path()).unwrap();
-    assert_eq!(trajectory.steps().len(), 12);
-    assert_eq!(read(&trajectory, 11), [row(body(9, 11))]);
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!(recording.steps().len(), 12);
+    assert_eq!(read(&recording, 11), [row(body(9, 11))]);
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn only_closed_segments_have_a_name_and_can_be_synced() {
         let names = fs::read_dir(&rank).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
         names.collect::<Vec<_>>()
     };
-    let mut writer = TrajectoryWriter::new(rank.clone(), 0, 1, &facts(10)).unwrap();
+    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(10)).unwrap();
     let mut record = Record::default();
     writer.sync().unwrap();
     writer.close_segment().unwrap();
@@ -143,7 +143,7 @@ fn only_closed_segments_have_a_name_and_can_be_synced() {
     record.fill(10, bodies(10).into_iter());
     writer.write(&record).unwrap();
     drop(writer);
-    assert_eq!(Trajectory::open(folder.path()).unwrap().steps(), [0]);
+    assert_eq!(Recording::open(folder.path()).unwrap().steps(), [0]);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_segment_that_cannot_be_closed_leaves_nothing() {
     let rank = rank_folder(folder.path(), 0);
     // In the way of the name it would have.
     fs::create_dir_all(rank.join("steps-0000000000-0000000003.parquet/in-the-way")).unwrap();
-    let mut writer = TrajectoryWriter::new(rank.clone(), 0, 1, &facts(1)).unwrap();
+    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(1)).unwrap();
     let mut record = Record::default();
     for step in 0..4 {
         record.fill(step, bodies(step).into_iter());
@@ -168,7 +168,7 @@ fn a_segment_that_cannot_be_closed_leaves_nothing() {
     assert!(rank.join("steps-0000000003-0000000003.parquet").is_file());
 
     fs::write(folder.path().join("file"), "").unwrap();
-    let error = TrajectoryWriter::new(folder.path().join("file/rank-00000"), 0, 1, &facts(1)).unwrap_err();
+    let error = RecordingWriter::new(folder.path().join("file/rank-00000"), 0, 1, &facts(1)).unwrap_err();
     assert!(error.to_string().contains("file/rank-00000: Not a directory"), "{error}");
 }
 
@@ -179,7 +179,7 @@ fn a_full_disk_is_an_error_and_no_segment() {
         return;
     }
     let folder = folder();
-    let mut writer = TrajectoryWriter::new(folder.path().join("r"), 0, 1, &facts(1)).unwrap();
+    let mut writer = RecordingWriter::new(folder.path().join("r"), 0, 1, &facts(1)).unwrap();
     let open = folder.path().join("r").join(open_segment_name(0));
     std::os::unix::fs::symlink("/dev/full", &open).unwrap();
     let mut record = Record::default();
@@ -196,11 +196,11 @@ fn a_run_may_go_on_with_other_ranks_and_more_steps() {
     let more = RunFacts { canonical: facts(2).canonical.replace("steps = 100", "steps = 200"), ..facts(2) };
     record(folder.path(), &more, 3, (10..=14).step_by(2), bodies);
     record(folder.path(), &facts(2), 1, (16..=18).step_by(2), bodies);
-    let trajectory = Trajectory::open(folder.path()).unwrap();
-    assert_eq!(trajectory.steps(), [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]);
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!(recording.steps(), [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]);
     for step in [8, 10, 18] {
         let expected: Vec<Row> = bodies(step).into_iter().map(row).collect();
-        assert_eq!(sorted(read(&trajectory, step)), sorted(expected));
+        assert_eq!(sorted(read(&recording, step)), sorted(expected));
     }
 }
 
@@ -249,12 +249,12 @@ fn what_is_missing_is_named() {
     // The tail of a run that was killed.
     let folder = recorded();
     remove(&folder, 0, second);
-    let trajectory = Trajectory::open(folder.path()).unwrap();
-    assert_eq!((trajectory.steps().last(), trajectory.incomplete()), (Some(&45), 3));
+    let recording = Recording::open(folder.path()).unwrap();
+    assert_eq!((recording.steps().last(), recording.incomplete()), (Some(&45), 3));
     // Of one that ended there.
     let told = |text: &str| fs::write(folder.path().join("summary.json"), text).unwrap();
     told(r#"{"steps": 49, "interrupted": true}"#);
-    assert_eq!(Trajectory::open(folder.path()).unwrap().steps().len(), 10);
+    assert_eq!(Recording::open(folder.path()).unwrap().steps().len(), 10);
     told(r#"{"steps": 50, "interrupted": true}"#);
     assert!(complaint(folder.path()).starts_with("DIR/rank-00000: the segment that holds step 50 is missing"));
     remove(&folder, 1, second);
@@ -377,7 +377,7 @@ fn no_body_takes_less_than_a_byte() {
     let alike = folder();
     let count = 100_000;
     record(alike.path(), &facts(1), 1, 0..1, |_| vec![body(1, 0); count]);
-    assert_eq!(read(&Trajectory::open(alike.path()).unwrap(), 0).len(), count);
+    assert_eq!(read(&Recording::open(alike.path()).unwrap(), 0).len(), count);
 
     // In an encoding for which a row is next to nothing.
     let forged = folder();

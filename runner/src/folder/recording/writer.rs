@@ -3,7 +3,7 @@
 use super::error::reason;
 use super::facts::RunFacts;
 use super::record::Record;
-use super::{RECORDS_PER_SEGMENT, TrajectoryError, layout, open_segment_name, segment_name};
+use super::{RECORDS_PER_SEGMENT, RecordingError, layout, open_segment_name, segment_name};
 use crate::folder::durable::{sync_folder, sync_folder_of};
 use parquet::column::writer::ColumnWriterImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
@@ -25,7 +25,7 @@ const CHUNK: usize = 8192;
 /// The folder of one rank, to which records are added in the order of their steps. Whoever drops it without
 /// [`close_segment`](Self::close_segment) loses the records of the segment under way, and nothing else.
 #[derive(Debug)]
-pub struct TrajectoryWriter {
+pub struct RecordingWriter {
     folder: PathBuf,
     schema: TypePtr,
     properties: WriterPropertiesPtr,
@@ -34,12 +34,12 @@ pub struct TrajectoryWriter {
     named: bool,
 }
 
-impl TrajectoryWriter {
+impl RecordingWriter {
     /// Creates the folder, or goes on in one that is there.
     ///
     /// # Errors
     /// If the folder cannot be had.
-    pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &RunFacts) -> Result<Self, TrajectoryError> {
+    pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &RunFacts) -> Result<Self, RecordingError> {
         fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
         let mut texts = facts.to_pairs();
         texts.push(("atoll.rank".to_owned(), rank.to_string()));
@@ -53,7 +53,7 @@ impl TrajectoryWriter {
     ///
     /// # Errors
     /// If it cannot be written. The segment under way is then given up, with all of its records.
-    pub fn write(&mut self, record: &Record) -> Result<(), TrajectoryError> {
+    pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let mut segment = match self.open.take() {
             Some(segment) => segment,
             None => self.begin(record.step)?,
@@ -71,7 +71,7 @@ impl TrajectoryWriter {
     ///
     /// # Errors
     /// If it cannot be written. The segment is then given up.
-    pub fn close_segment(&mut self) -> Result<(), TrajectoryError> {
+    pub fn close_segment(&mut self) -> Result<(), RecordingError> {
         let Some(mut segment) = self.open.take() else { return Ok(()) };
         let path = self.folder.join(segment_name(segment.first.into(), segment.last.into()));
         let finished = segment.finish().and_then(|()| Ok(fs::rename(&segment.path, &path)?));
@@ -86,7 +86,7 @@ impl TrajectoryWriter {
     ///
     /// # Errors
     /// If the system does not say so. They are waited for again the next time.
-    pub fn sync(&mut self) -> Result<(), TrajectoryError> {
+    pub fn sync(&mut self) -> Result<(), RecordingError> {
         if !self.named {
             return Ok(());
         }
@@ -98,7 +98,7 @@ impl TrajectoryWriter {
         Ok(())
     }
 
-    fn begin(&self, step: u32) -> Result<OpenSegment, TrajectoryError> {
+    fn begin(&self, step: u32) -> Result<OpenSegment, RecordingError> {
         let path = self.folder.join(open_segment_name(step.into()));
         let file = File::create(&path).map_err(|error| failed(&path, &error))?;
         let output = Checked { file, hash: Box::default() };
@@ -107,7 +107,7 @@ impl TrajectoryWriter {
             Ok(file) => Ok(OpenSegment { file, path, first: step, last: step, records: 0, steps: String::new() }),
             Err(error) => {
                 let _ = fs::remove_file(&path);
-                Err(TrajectoryError::Write { path, reason: reason(&error) })
+                Err(RecordingError::Write { path, reason: reason(&error) })
             }
         }
     }
@@ -155,11 +155,11 @@ impl OpenSegment {
     }
 
     /// Leaves nothing behind.
-    fn give_up(self, error: &ParquetError) -> TrajectoryError {
+    fn give_up(self, error: &ParquetError) -> RecordingError {
         let Self { file, path, .. } = self;
         drop(file);
         let _ = fs::remove_file(&path);
-        TrajectoryError::Write { path, reason: reason(error) }
+        RecordingError::Write { path, reason: reason(error) }
     }
 }
 
@@ -223,6 +223,6 @@ fn write<T: DataType>(column: &mut ColumnWriterImpl<'_, T>, values: &[T::T]) -> 
     column.write_batch(values, None, None).map(drop)
 }
 
-fn failed(path: &Path, error: &io::Error) -> TrajectoryError {
-    TrajectoryError::Write { path: path.to_owned(), reason: error.to_string() }
+fn failed(path: &Path, error: &io::Error) -> RecordingError {
+    RecordingError::Write { path: path.to_owned(), reason: error.to_string() }
 }

@@ -74,13 +74,13 @@ impl Block {
 
 /// Writes the files of one rank.
 #[derive(Debug)]
-pub struct SnapshotWriter {
+pub(crate) struct SnapshotWriter {
     facts: Facts,
 }
 
 impl SnapshotWriter {
     /// Writes what a rank of so many has to save; `tiles` and `identity` are those of the whole run.
-    pub fn new(rank: u32, ranks: u32, tiles: [u32; 2], identity: String) -> Self {
+    pub(crate) fn new(rank: u32, ranks: u32, tiles: [u32; 2], identity: String) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
         Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, identity } }
     }
@@ -90,7 +90,7 @@ impl SnapshotWriter {
     ///
     /// # Errors
     /// What the system says, with the file.
-    pub fn write(
+    pub(crate) fn write(
         &mut self,
         snapshots: &Path,
         step: u64,

@@ -14,15 +14,15 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use file::{Block, Facts, SnapshotFile, SnapshotWriter};
-pub use set::Snapshot;
-pub use store::{Found, find, remove_after, remove_before};
+pub(crate) use file::{SnapshotFile, SnapshotWriter};
+pub(crate) use set::Snapshot;
+pub(crate) use store::{Found, find, remove_after, remove_before};
 
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// What to do where a damaged snapshot was the last hope.
-pub const NO_OTHER: &str = "no other snapshot is whole: begin anew with --out and --overwrite";
+pub(crate) const NO_OTHER: &str = "no other snapshot is whole: begin anew with --out and --overwrite";
 
 /// Why a snapshot cannot be used, or found.
 #[derive(Debug, Error)]

@@ -73,7 +73,7 @@ pub struct Found {
 ///
 /// # Errors
 /// If there are some and all are damaged, or the newest that is not cannot be read, or is of another version or run.
-pub fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, SnapshotError> {
+pub(crate) fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, SnapshotError> {
     let mut found = Found::default();
     let folders = folders(snapshots).map_err(|error| SnapshotError::read(snapshots, &error))?;
     for (&step, folder) in folders.iter().rev() {
@@ -105,7 +105,7 @@ pub fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, 
 ///
 /// # Errors
 /// What the system says.
-pub fn remove_before(snapshots: &Path, step: u64) -> io::Result<()> {
+pub(crate) fn remove_before(snapshots: &Path, step: u64) -> io::Result<()> {
     remove(snapshots, |found| found < step)
 }
 
@@ -114,7 +114,7 @@ pub fn remove_before(snapshots: &Path, step: u64) -> io::Result<()> {
 ///
 /// # Errors
 /// What the system says.
-pub fn remove_after(snapshots: &Path, step: Option<u64>) -> io::Result<()> {
+pub(crate) fn remove_after(snapshots: &Path, step: Option<u64>) -> io::Result<()> {
     remove(snapshots, |found| step.is_none_or(|step| found > step))
 }
 

@@ -1,7 +1,7 @@
 //! The thread that writes what a rank recorded and saved, in the order in which it did.
 
 use crate::error::RunError;
-use crate::folder::recording::{Record, RunFacts, TrajectoryWriter};
+use crate::folder::recording::{Record, RecordingWriter, RunFacts};
 use crate::folder::snapshot::{self, SnapshotWriter};
 use crate::plan::{Output, Plan};
 use atoll_core::{SavedTile, World};
@@ -38,7 +38,7 @@ impl Saved {
 }
 
 pub(super) struct Writer {
-    trajectory: Option<TrajectoryWriter>,
+    recording: Option<RecordingWriter>,
     snapshot: SnapshotWriter,
     snapshots: PathBuf,
     /// After the first failure nothing is written any more, so that what is there is of one piece.
@@ -55,11 +55,11 @@ impl Writer {
         let (ranks, identity) = (plan.config.run.ranks as u32, plan.config.identity(plan.tiles));
         let recording = |every| {
             let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, every);
-            TrajectoryWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
+            RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
         };
-        let trajectory = output.every.record_every.map(recording).transpose()?;
+        let recording = output.every.record_every.map(recording).transpose()?;
         let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, identity);
-        Ok(Self { trajectory, snapshot, snapshots: output.folder.snapshots(), failure })
+        Ok(Self { recording, snapshot, snapshots: output.folder.snapshots(), failure })
     }
 
     /// Does what it is asked for until nobody can ask any more, and gives the buffers back.
@@ -101,8 +101,8 @@ impl Writer {
     }
 
     fn record(&mut self, record: &Record) -> Result<(), RunError> {
-        let trajectory = self.trajectory.as_mut().expect("records come where there is a recording");
-        Ok(trajectory.write(record)?)
+        let recording = self.recording.as_mut().expect("records come where there is a recording");
+        Ok(recording.write(record)?)
     }
 
     /// Whoever goes on from a snapshot finds everything that was recorded before it, and in segments of its own.
@@ -116,9 +116,9 @@ impl Writer {
 
     /// Completes what was recorded so far.
     fn close(&mut self) -> Result<(), RunError> {
-        if let Some(trajectory) = &mut self.trajectory {
-            trajectory.close_segment()?;
-            trajectory.sync()?;
+        if let Some(recording) = &mut self.recording {
+            recording.close_segment()?;
+            recording.sync()?;
         }
         Ok(())
     }
