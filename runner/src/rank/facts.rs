@@ -53,7 +53,7 @@ pub struct RankFacts {
 
 /// What all ranks have to say at the end of a run.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Gathered {
+pub(crate) struct Gathered {
     /// By rank.
     pub ranks: Vec<RankFacts>,
     /// Of all tiles, in no order in particular.

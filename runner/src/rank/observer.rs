@@ -104,3 +104,69 @@ impl FromStr for PanicAt {
         parts.map(|(rank, step)| Self { rank, step }).ok_or("write RANK@STEP, such as 2@100")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    /// Writes down what it hears.
+    #[derive(Debug, Default)]
+    struct Heard(Mutex<Vec<String>>);
+
+    impl Heard {
+        fn add(&self, what: String) {
+            self.0.lock().unwrap().push(what);
+        }
+    }
+
+    impl Listener for Heard {
+        fn begins(&self, from: u64, steps: u64) {
+            self.add(format!("from {from} to {steps}"));
+        }
+
+        fn made(&self, steps: u64) {
+            self.add(format!("made {steps}"));
+        }
+
+        fn ends(&self) {
+            self.add("ends".to_owned());
+        }
+
+        fn note(&self, text: &str) {
+            self.add(text.to_owned());
+        }
+    }
+
+    #[test]
+    fn a_listener_hears_of_rank_0_alone_and_of_the_end_however_it_comes() {
+        let heard = Arc::new(Heard::default());
+        let observer = Observer { listener: Some(heard.clone()), ..Observer::default() };
+        observer.note("on the way");
+        for (speaks, from) in [(true, 3), (false, 5)] {
+            let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                let told = observer.steps(speaks, from, 9);
+                told.made(from + 1);
+                std::panic::resume_unwind(Box::new("in the middle"));
+            }));
+            assert!(failed.is_err());
+        }
+        assert_eq!(*heard.0.lock().unwrap(), ["on the way", "from 3 to 9", "made 4", "ends"]);
+    }
+
+    #[test]
+    fn whoever_asks_first_is_told_so() {
+        let flag = StopFlag::default();
+        assert!(!flag.is_requested());
+        assert!(flag.request() && !flag.clone().request() && flag.is_requested());
+        assert!(StopFlag::default().asking(|| true).is_requested());
+    }
+
+    #[test]
+    fn where_to_panic_is_a_rank_and_a_step() {
+        assert_eq!("2@100".parse(), Ok(PanicAt { rank: 2, step: 100 }));
+        for text in ["2", "2@", "@100", "two@100", "2@-1"] {
+            assert!(text.parse::<PanicAt>().is_err(), "{text}");
+        }
+    }
+}

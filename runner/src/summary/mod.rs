@@ -3,11 +3,12 @@
 mod table;
 pub(crate) mod timings;
 
+pub use timings::RankTimings;
+
 use crate::plan::Plan;
 use crate::rank::{Gathered, RankFacts};
 use atoll_core::{Facts, Hashes};
 use serde::{Serialize, Serializer};
-pub use timings::RankTimings;
 
 /// The time of one phase.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -113,7 +114,7 @@ pub struct Summary {
 
 impl Summary {
     /// Joins what the ranks and the tiles have to say.
-    pub fn new(plan: &Plan, Gathered { ranks, tiles }: Gathered) -> Self {
+    pub(crate) fn new(plan: &Plan, Gathered { ranks, tiles }: Gathered) -> Self {
         let all = ranks.iter().copied().reduce(RankFacts::join).unwrap_or_default();
         let facts = Facts::total(tiles);
         let hashes = Hashes::from_words(all.hashes);
