@@ -1,8 +1,10 @@
 //! Why a run ended early, and with which exit code.
 
-use crate::config::ConfigError;
-use crate::snapshot::SnapshotError;
-use crate::trajectory::TrajectoryError;
+pub use crate::config::ConfigError;
+pub use crate::folder::recording::RecordingError;
+pub use crate::folder::snapshot::SnapshotError;
+pub use crate::folder::{EndedError, FolderError};
+
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
 use std::path::PathBuf;
@@ -83,15 +85,8 @@ pub enum RunError {
         reason: String,
     },
     /// A folder for the run's output that cannot be used.
-    #[error("{option} {}: {reason}", .path.display())]
-    BadFolder {
-        /// What it was given with.
-        option: &'static str,
-        /// The folder.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        reason: String,
-    },
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// A run that is to go on and is at its end.
     #[error("all {steps} steps of this run are made already, see {}; give more --steps to go on", .summary.display())]
     Complete {
@@ -100,9 +95,12 @@ pub enum RunError {
         /// How many it was to make.
         steps: u64,
     },
+    /// A summary that cannot be read.
+    #[error(transparent)]
+    Ended(#[from] EndedError),
     /// A recording that cannot be written or read.
     #[error(transparent)]
-    Trajectory(#[from] TrajectoryError),
+    Recording(#[from] RecordingError),
     /// A snapshot that cannot be used.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
@@ -247,16 +245,17 @@ impl RunError {
     /// The exit code that tells of this error.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Trajectory(TrajectoryError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
+            Self::Recording(RecordingError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
                 Exit::Output
             }
             Self::Config(_)
             | Self::Setup(_)
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
-            | Self::BadFolder { .. }
+            | Self::Folder(_)
+            | Self::Ended(_)
             | Self::Snapshot(_)
-            | Self::Trajectory(_)
+            | Self::Recording(_)
             | Self::TooLarge { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }

@@ -11,40 +11,34 @@
 //! assert_eq!(one.bodies_lost, 0);
 //! # Ok::<(), atoll::RunError>(())
 //! ```
+//!
+//! What there is to use:
+//!
+//! - [`Config`] says what to run, by the [keys](config) of a file; [`scene`] which bodies there are at the start.
+//! - [`run`], and [`run_with`] an [`Observer`]: a [`Listener`] hears how it goes, a [`StopFlag`] ends it early. What comes of it
+//!   is a [`Summary`] or a [`RunError`].
+//! - [`recording`] reads what `atoll run --out` has recorded, [`compare`] says whether two recordings hold the same.
+//! - [`main`] is the program itself, for a binary that brings it along.
 
 #![forbid(unsafe_code)]
 
-pub mod args;
-pub mod assignment;
-pub mod backend;
-pub mod cmd;
+mod cli;
+pub mod compare;
 pub mod config;
-pub mod diff;
-pub mod drive;
 pub mod error;
-pub mod exchange;
-pub mod handshake;
-pub mod interrupt;
-pub mod output;
-pub mod plan;
-pub mod progress;
-pub mod recorder;
-#[cfg(feature = "iceoryx2")]
-pub mod report;
-pub mod run_folder;
+mod folder;
+mod launch;
+mod plan;
+mod rank;
 pub mod scene;
-pub mod snapshot;
-pub mod summary;
-pub mod telemetry;
-pub mod tiles;
-pub mod timings;
-pub mod trajectory;
+mod summary;
 
-pub use config::Config;
-pub use error::RunError;
-pub use summary::Summary;
+pub use cli::main;
+pub use config::{Config, ConfigError, Override};
+pub use error::{Exit, RunError};
+pub use rank::{Listener, Observer, StopFlag};
+pub use summary::{PhaseTime, RankTimings, Summary};
 
-use drive::Observer;
 use plan::Plan;
 
 /// Runs a configuration from start to end in this process and returns its summary. Prints nothing.
@@ -56,10 +50,50 @@ pub fn run(config: &Config) -> Result<Summary, RunError> {
     run_with(config, &Observer::default())
 }
 
-/// As [`run`], with progress shown and a way to stop early.
+/// As [`run`], with somebody who hears how it goes and a way to stop early.
+///
+/// ```
+/// use std::sync::{Arc, Mutex};
+///
+/// #[derive(Debug, Default)]
+/// struct Steps(Mutex<Vec<u64>>);
+///
+/// impl atoll::Listener for Steps {
+///     fn begins(&self, _from: u64, _steps: u64) {}
+///     fn made(&self, steps: u64) {
+///         self.0.lock().unwrap().push(steps);
+///     }
+///     fn ends(&self) {}
+///     fn note(&self, _text: &str) {}
+/// }
+///
+/// let text = "[scene]\nkind = \"stack\"\n[run]\nsteps = 3\nranks = 2\n";
+/// let steps = Arc::new(Steps::default());
+/// let observer = atoll::Observer { listener: Some(steps.clone()), ..atoll::Observer::default() };
+/// atoll::run_with(&atoll::Config::from_toml_str("example", text, &[])?, &observer)?;
+/// assert_eq!(*steps.0.lock().unwrap(), [1, 2, 3]);
+/// # Ok::<(), atoll::RunError>(())
+/// ```
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_with(config: &Config, observer: &Observer) -> Result<Summary, RunError> {
-    backend::run(&Plan::new(config)?, observer)
+    launch::run(&Plan::new(config)?, observer)
+}
+
+/// Reading what a run has recorded: `atoll run --out DIR --record-every K`.
+pub mod recording {
+    pub use crate::folder::Ended;
+    pub use crate::folder::recording::{Recording, RecordingError, Row, RunFacts};
+}
+
+/// What the tests, benchmarks and fuzz targets of this workspace need beside the face of the crate. It may change at any time.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::cli::args::{Cli, Command, one_line};
+    pub use crate::folder::RunFolder;
+    pub use crate::folder::recording::{Record, RecordingWriter, rank_folder};
+    pub use crate::launch::run as run_plan;
+    pub use crate::plan::Plan;
+    pub use crate::rank::PanicAt;
 }

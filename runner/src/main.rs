@@ -1,5 +1,5 @@
 //! Starts the program; everything else is in the library.
 
 fn main() -> std::process::ExitCode {
-    atoll::cmd::main()
+    atoll::main()
 }

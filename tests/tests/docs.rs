@@ -1,8 +1,8 @@
 //! What the documentation tells people to type is understood by the program, and the files it names are there.
 
-use atoll::args::{Cli, Command};
 use atoll::config::{Config, ConfigError};
-use atoll::plan::Plan;
+use atoll::internals::Plan;
+use atoll::internals::{Cli, Command};
 use atoll_tests::program::root;
 use clap::{CommandFactory, Parser};
 use std::fs;

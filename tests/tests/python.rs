@@ -3,7 +3,7 @@
 //!
 //! Needs an interpreter with polars, pandas, pyarrow and DuckDB: the one that `ATOLL_PYTHON` names, else `python3`.
 
-use atoll::trajectory::{Row, Trajectory};
+use atoll::recording::{Recording, Row};
 use atoll_tests::program::{self, root};
 use serde_json::Value;
 use std::ffi::{OsStr, OsString};
@@ -117,7 +117,7 @@ fn examples_print_what_the_program_tells() {
     command.args(["--ranks", "3", "--record-every", "5", "--checkpoint-every", "40", "--out"]).arg(&run);
     let summary = program::run_to_summary(&mut command, &folder.path().join("summary.json"));
 
-    let trajectory = Trajectory::open(&run).unwrap();
+    let trajectory = Recording::open(&run).unwrap();
     let mut records = Vec::new();
     for &step in trajectory.steps() {
         let mut rows = Vec::new();

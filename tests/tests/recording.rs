@@ -1,6 +1,6 @@
 //! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
 
-use atoll::trajectory::{Row, Trajectory};
+use atoll::recording::{Recording, Row};
 use atoll_tests::program::{self, diff};
 use atoll_tests::ways::Way;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
@@ -131,7 +131,7 @@ fn the_last_bit_of_one_number_in_a_file_is_found() {
 
     let rows = |run: &Path| {
         let mut rows = Vec::new();
-        Trajectory::open(run).and_then(|trajectory| trajectory.read(30, &mut rows)).map(|()| rows)
+        Recording::open(run).and_then(|trajectory| trajectory.read(30, &mut rows)).map(|()| rows)
     };
     let before: Vec<Row> = rows(&whole).unwrap();
     // The lowest bytes of the positions come first, behind a header whose length nobody tells.

@@ -16,7 +16,7 @@ fn main() -> ExitCode {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = given.iter().map(String::as_str).collect();
     let result = match words[..] {
-        ["run", ..] => return atoll::cmd::main(),
+        ["run", ..] => return atoll::main(),
         ["--rank", name, ranks] => match (Method::of_name(name), ranks.parse()) {
             (Some(method), Ok(ranks)) => rank_program(method, ranks),
             _ => Err(format!("there is no method {name} on {ranks} ranks")),

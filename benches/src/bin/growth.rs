@@ -9,7 +9,7 @@
 //! slower meanwhile does so for all of them; the first table gives medians, and the ratio to the smallest world.
 //!
 //! A tile should fit into a core's cache, and have few ghosts for its bodies: small tiles pay for the one, large ones for
-//! the other. The second table shows what the default size (see `atoll::tiles`) is worth: its ratio is to the cheapest.
+//! the other. The second table shows what the default size (`runner/src/plan/tiles.rs`) is worth: its ratio is to the cheapest.
 
 use atoll_benches::{median, normal, part_and_arguments};
 use std::process::ExitCode;

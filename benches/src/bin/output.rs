@@ -7,12 +7,10 @@
 //! NORMAL on one rank of one thread, in turns: writing nothing, a record every tenth step, a snapshot every hundredth. The
 //! time is that of all steps and of waiting until everything is written. Folders are made where temporary files go (`TMPDIR`).
 
-use atoll::backend;
+use atoll::Observer;
+use atoll::compare;
 use atoll::config::Config;
-use atoll::diff;
-use atoll::drive::Observer;
-use atoll::plan::Plan;
-use atoll::run_folder::RunFolder;
+use atoll::internals::{Plan, RunFolder, run_plan};
 use atoll_benches::{NORMAL, arguments, median};
 use serde_json::json;
 use std::fs;
@@ -63,7 +61,7 @@ fn run() -> Result<(), String> {
     if repeats > 1 {
         let start = Instant::now();
         let [a, b] = [0, 1].map(|which| folder("records", which));
-        let same = diff::compare(&a, &b, None, |_, _| {}).map_err(|error| error.to_string())?.identical;
+        let same = compare::compare(&a, &b, None, |_, _| {}).map_err(|error| error.to_string())?.identical;
         let (seconds, run) = (start.elapsed().as_secs_f64(), medians[1] * 1e-3 * steps as f64);
         let told = if same { "identical" } else { "different" };
         eprintln!("diff       {seconds:>8.2} s, a run {run:.2} s: {told}");
@@ -82,7 +80,7 @@ fn run_into(folder: &Path, every: Option<(&str, &str)>, steps: u64) -> Result<at
         None => Plan::new(&config)?,
     };
     let _claim = plan.output.as_ref().map(|output| output.claim(None)).transpose()?;
-    backend::run(&plan, &Observer::default())
+    run_plan(&plan, &Observer::default())
 }
 
 /// Bytes of all files in a folder.

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use ::atoll::Config;
-use ::atoll::plan::Plan;
+use ::atoll::internals::Plan;
 use clap::ValueEnum;
 use std::fmt;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// A key that two configurations give different values.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Its full path.
     pub key: String,
     /// The value in the first, as TOML, or `nothing`.
@@ -15,7 +15,7 @@ pub struct Difference {
 
 /// All keys in which two texts as of [`Config::canonical`](super::Config::canonical) differ: those of the first in its
 /// order, then those that are in the second alone. The texts may come from anywhere.
-pub fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
+pub(crate) fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
     if ours == theirs {
         return Vec::new();
     }
@@ -36,7 +36,7 @@ pub fn differences(ours: &str, theirs: &str) -> Vec<Difference> {
 
 /// The first key in which two texts as of [`Config::identity`](super::Config::identity) differ that cannot be of one run:
 /// one that goes on may make more steps, or fewer.
-pub fn other_run(ours: &str, theirs: &str) -> Option<Difference> {
+pub(crate) fn other_run(ours: &str, theirs: &str) -> Option<Difference> {
     differences(ours, theirs).into_iter().find(|difference| difference.key != "run.steps")
 }
 

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
 /// control characters becomes a space.
 #[derive(Clone, Copy, Debug)]
-pub struct OneLine<'a>(pub &'a str);
+pub(crate) struct OneLine<'a>(pub &'a str);
 
 impl fmt::Display for OneLine<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -36,7 +36,7 @@ pub enum Origin {
 
 /// A value and where it came from, as a person would point at it.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Place {
+pub struct Given {
     /// Where from.
     pub origin: Origin,
     /// Full path of the key, or what was written in its place.
@@ -45,7 +45,7 @@ pub struct Place {
     pub value: String,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Given {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (origin, key, value) = (&self.origin, OneLine(&self.key), OneLine(&self.value));
         match origin {
@@ -79,10 +79,10 @@ pub enum ConfigError {
         message: String,
     },
     /// There is no such key.
-    #[error("{place}: unknown key{}", did_you_mean(.suggestion))]
+    #[error("{given}: unknown key{}", did_you_mean(.suggestion))]
     UnknownKey {
         /// The key in question.
-        place: Place,
+        given: Given,
         /// The nearest key that exists, if any is near.
         suggestion: Option<String>,
     },
@@ -97,10 +97,10 @@ pub enum ConfigError {
         suggestion: Option<String>,
     },
     /// The last part of more than one key.
-    #[error("{place}: ambiguous, write one of {}", .candidates.join(", "))]
+    #[error("{given}: ambiguous, write one of {}", .candidates.join(", "))]
     AmbiguousKey {
         /// The key in question.
-        place: Place,
+        given: Given,
         /// All that it may mean.
         candidates: Vec<String>,
     },
@@ -121,10 +121,10 @@ pub enum ConfigError {
         must: String,
     },
     /// A value of the wrong type or out of range.
-    #[error("{place}: must be {must}{}", did_you_mean(.suggestion))]
+    #[error("{given}: must be {must}{}", did_you_mean(.suggestion))]
     BadValue {
         /// The value.
-        place: Place,
+        given: Given,
         /// What it may be.
         must: String,
         /// The nearest allowed word, if any is near.
@@ -132,20 +132,20 @@ pub enum ConfigError {
     },
     /// A transport that this program was built without.
     #[error(
-        "{place}: this program was built without it; build it again with `cargo build --release --features {feature}`, \
+        "{given}: this program was built without it; build it again with `cargo build --release --features {feature}`, \
          or use \"local\" or \"channel\""
     )]
     NotBuiltIn {
         /// The value.
-        place: Place,
+        given: Given,
         /// The feature of the package that brings it.
         feature: &'static str,
     },
     /// A key that means nothing beside another value.
-    #[error("{place}: {reason}")]
+    #[error("{given}: {reason}")]
     Inapplicable {
         /// The value.
-        place: Place,
+        given: Given,
         /// Why it means nothing, and what to do.
         reason: String,
     },

@@ -1,149 +1,206 @@
-//! The names of all keys, and what a misspelt one may have meant.
+//! The table of all keys: how each is called, whether results depend on it, where its value is kept and what it may be.
+//!
+//! All else follows from it: how a configuration is read and written, the text that its hash is of, the order of both, and what
+//! a misspelt key may have meant. To add a key, add a field to what keeps it ([`super::sections`], [`Params`] or [`SceneKind`]),
+//! with its default, and a line here.
+//!
+//! [`Params`]: atoll_core::Params
 
-use super::error::{ConfigError, Origin, Place};
+use super::error::ConfigError;
+use super::forms::{
+    Flag, Float, Form, Hertz, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Tiles, Whole, Word,
+};
+use super::sections::Config;
+use super::settings::Settings;
+use super::words;
+use crate::scene::SceneKind;
+use Concern::{How, What};
+use toml::Value;
 
-/// Every key there is, as `section.name`.
-pub(super) const KEYS: &[&str] = &[
-    "scene.kind",
-    "scene.bodies",
-    "scene.seed",
-    "scene.power",
-    "scene.jitter",
-    "scene.base",
-    "scene.angle",
-    "scene.friction",
-    "run.steps",
-    "run.ranks",
-    "run.threads",
-    "run.transport",
-    "run.tiles",
-    "run.peer_timeout",
-    "run.mpi_exchange",
-    "physics.hertz",
-    "physics.substeps",
-    "physics.gravity",
-    "physics.linear_damping",
-    "physics.angular_damping",
-    "physics.max_linear_speed",
-    "physics.max_angular_speed",
-    "physics.contact_hertz",
-    "physics.contact_damping_ratio",
-    "physics.push_out_speed",
-    "physics.speculative_distance",
-    "physics.recycle_distance",
-    "physics.restitution_threshold",
-    "physics.margin_floor",
-    "physics.margin_cap",
-    "physics.sort_interval",
-    "physics.broad_phase",
-    "physics.solver",
-    "physics.iterations",
-    "physics.baumgarte",
-    "physics.linear_slop",
-    "physics.islands",
-    "physics.parallel",
-    "physics.exchange",
-    "physics.ghosts",
-    "physics.sleep",
-    "physics.sleep_speed",
-    "physics.sleep_time",
-    "output.record_every",
-    "output.checkpoint_every",
+/// What a key is about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Concern {
+    /// What is computed: results depend on it.
+    What,
+    /// How it is computed, or what is written meanwhile: it changes no bit of a result.
+    How,
+}
+
+/// A key.
+pub(super) struct Key {
+    /// Its full path.
+    pub(super) name: &'static str,
+    /// Whether results depend on it.
+    pub(super) concern: Concern,
+    value: &'static dyn Form,
+}
+
+impl Key {
+    /// Takes its value, if it was given.
+    pub(super) fn read(&self, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        self.value.read(self.name, settings, config)
+    }
+
+    /// Its value as a file would say it; none where there is nothing to say. The configuration stays as it is.
+    pub(super) fn write(&self, config: &mut Config) -> Option<Value> {
+        self.value.write(config)
+    }
+}
+
+const fn key(name: &'static str, concern: Concern, value: &'static dyn Form) -> Key {
+    Key { name, concern, value }
+}
+
+/// More bodies than this are taken for a slip of the finger.
+const MOST_BODIES: u64 = 10_000_000_000;
+
+/// Steps are counted in 32 bits where they are recorded.
+const MOST_STEPS: u64 = u32::MAX as u64;
+
+/// Every key there is, in the order of the documentation.
+pub(super) static KEYS: &[Key] = &[
+    key("scene.kind", What, &SceneWord),
+    key("scene.bodies", What, &Whole(|c| Some(&mut c.scene.bodies), |c| c.scene.kind.least_bodies()..=MOST_BODIES)),
+    key("scene.seed", What, &Whole(|c| Some(&mut c.scene.seed), |_| 0..=i64::MAX as u64)),
+    key("scene.power", What, &Number(power, 0.1..=10.0)),
+    key("scene.jitter", What, &Number(jitter, 0.0..=0.25)),
+    key("scene.base", What, &Whole(base, |_| 2..=100)),
+    key("scene.angle", What, &Number(angle, 0.0..=60.0)),
+    key("scene.friction", What, &Number(friction, 0.0..=2.0)),
+    key("run.steps", What, &Whole(|c| Some(&mut c.run.steps), |_| 1..=MOST_STEPS)),
+    key("run.ranks", How, &Ranks),
+    key("run.threads", How, &Whole(|c| Some(&mut c.run.threads), |_| 1..=1024)),
+    key("run.transport", How, &OptionalWord(|c| &mut c.run.transport, words::TRANSPORT)),
+    key("run.tiles", What, &Tiles),
+    key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),
+    key("run.mpi_exchange", How, &Word(|c| &mut c.run.mpi_exchange, words::MPI_EXCHANGE)),
+    // Of numbers without bounds here, the physics checks them.
+    key("physics.hertz", What, &Hertz),
+    key("physics.substeps", What, &Whole(|c| Some(&mut c.params.substeps), |_| 0..=u64::from(u32::MAX))),
+    key("physics.gravity", What, &Pair(|c| &mut c.params.gravity)),
+    key("physics.linear_damping", What, &Float(|c| &mut c.params.linear_damping)),
+    key("physics.angular_damping", What, &Float(|c| &mut c.params.angular_damping)),
+    key("physics.max_linear_speed", What, &Float(|c| &mut c.params.max_linear_speed)),
+    key("physics.max_angular_speed", What, &Float(|c| &mut c.params.max_angular_speed)),
+    key("physics.contact_hertz", What, &Float(|c| &mut c.params.contact_hertz)),
+    key("physics.contact_damping_ratio", What, &Float(|c| &mut c.params.contact_damping_ratio)),
+    key("physics.push_out_speed", What, &Float(|c| &mut c.params.push_out_speed)),
+    key("physics.speculative_distance", What, &Float(|c| &mut c.params.speculative_distance)),
+    key("physics.recycle_distance", What, &Float(|c| &mut c.params.recycle_distance)),
+    key("physics.restitution_threshold", What, &Float(|c| &mut c.params.restitution_threshold)),
+    key("physics.margin_floor", What, &Float(|c| &mut c.params.margin_floor)),
+    key("physics.margin_cap", What, &Float(|c| &mut c.params.margin_cap)),
+    key("physics.sort_interval", What, &Whole(|c| Some(&mut c.params.sort_interval), |_| 0..=u64::from(u32::MAX))),
+    key("physics.broad_phase", How, &Word(|c| &mut c.params.broad_phase, words::BROAD_PHASE)),
+    key("physics.solver", What, &Word(|c| &mut c.params.solver, words::SOLVER)),
+    key("physics.iterations", What, &Whole(|c| Some(&mut c.params.iterations), |_| 0..=u64::from(u32::MAX))),
+    key("physics.baumgarte", What, &Float(|c| &mut c.params.baumgarte)),
+    key("physics.linear_slop", What, &Float(|c| &mut c.params.linear_slop)),
+    key("physics.islands", How, &Word(|c| &mut c.params.island_search, words::ISLANDS)),
+    key("physics.parallel", How, &Word(|c| &mut c.params.parallel, words::PARALLEL)),
+    key("physics.exchange", What, &Word(|c| &mut c.params.exchange, words::EXCHANGE)),
+    key("physics.ghosts", What, &Word(|c| &mut c.params.ghosts, words::GHOSTS)),
+    key("physics.sleep", What, &Flag(|c| &mut c.params.sleep)),
+    key("physics.sleep_speed", What, &Float(|c| &mut c.params.sleep_speed)),
+    key("physics.sleep_time", What, &Float(|c| &mut c.params.sleep_time)),
+    key("output.record_every", How, &OptionalWhole(|c| &mut c.output.record_every, 1..=MOST_STEPS)),
+    key("output.checkpoint_every", How, &OptionalWhole(|c| &mut c.output.checkpoint_every, 1..=MOST_STEPS)),
 ];
 
-/// The sections of a file.
-pub(super) const SECTIONS: &[&str] = &["scene", "run", "physics", "output"];
+// What only some scenes have.
 
-/// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
-const SIMILAR: f64 = 0.6;
-
-/// The key that `text` names: a full path, or the last part of exactly one.
-pub(super) fn resolve(
-    keys: &'static [&'static str],
-    text: &str,
-    value: &str,
-    origin: Origin,
-) -> Result<&'static str, ConfigError> {
-    if let Some(key) = keys.iter().find(|&&key| key == text) {
-        return Ok(key);
-    }
-    let candidates: Vec<&str> = keys.iter().filter(|key| last_part(key) == text).copied().collect();
-    let place = || Place { origin: origin.clone(), key: text.to_owned(), value: value.to_owned() };
-    match candidates[..] {
-        [key] => Ok(key),
-        [] => Err(ConfigError::UnknownKey { place: place(), suggestion: nearest_key(keys, text) }),
-        _ => {
-            let candidates = candidates.iter().map(|&key| key.to_owned()).collect();
-            Err(ConfigError::AmbiguousKey { place: place(), candidates })
-        }
-    }
+fn power(config: &mut Config) -> Option<&mut f64> {
+    if let SceneKind::Rooms { power } = &mut config.scene.kind { Some(power) } else { None }
 }
 
-/// The key whose last part is most like that of `text`; of several, the one most alike in whole.
-pub(super) fn nearest_key(keys: &[&str], text: &str) -> Option<String> {
-    let likeness = |key: &str| {
-        let part = strsim::normalized_damerau_levenshtein(last_part(key), last_part(text));
-        part + 0.01 * strsim::normalized_damerau_levenshtein(key, text)
-    };
-    nearest_by(keys.iter().copied(), likeness)
+fn jitter(config: &mut Config) -> Option<&mut f64> {
+    if let SceneKind::Pile { jitter } = &mut config.scene.kind { Some(jitter) } else { None }
 }
 
-/// The word most like `text`.
-pub(super) fn nearest<'a>(words: impl Iterator<Item = &'a str>, text: &str) -> Option<String> {
-    nearest_by(words, |word| strsim::normalized_damerau_levenshtein(word, text))
+fn base(config: &mut Config) -> Option<&mut u64> {
+    if let SceneKind::Pyramids { base } = &mut config.scene.kind { Some(base) } else { None }
 }
 
-fn nearest_by<'a>(words: impl Iterator<Item = &'a str>, likeness: impl Fn(&str) -> f64) -> Option<String> {
-    let best = words.map(|word| (likeness(word), word)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 >= SIMILAR).then(|| best.1.to_owned())
+fn angle(config: &mut Config) -> Option<&mut f64> {
+    if let SceneKind::Slope { angle, .. } = &mut config.scene.kind { Some(angle) } else { None }
 }
 
-fn last_part(key: &str) -> &str {
-    key.rsplit_once('.').map_or(key, |(_, part)| part)
+fn friction(config: &mut Config) -> Option<&mut f64> {
+    if let SceneKind::Slope { friction, .. } = &mut config.scene.kind { Some(friction) } else { None }
+}
+
+/// The names of all keys, in the order of the documentation.
+pub(super) fn names() -> impl Iterator<Item = &'static str> + Clone {
+    KEYS.iter().map(|key| key.name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
-    fn named(text: &str) -> Result<&'static str, ConfigError> {
-        resolve(KEYS, text, "1", Origin::Set)
+    /// Everything that a configuration keeps, a line for each figure, as `Debug` tells it.
+    fn kept(config: &Config) -> Vec<String> {
+        format!("{config:#?}").lines().map(|line| line.trim().to_owned()).collect()
+    }
+
+    fn config(kind: &str, overrides: &[(&str, &str)]) -> Config {
+        let text = format!("[scene]\nkind = \"{kind}\"\n");
+        Config::from_toml_str("test", &text, overrides).unwrap()
     }
 
     #[test]
-    fn full_paths_and_unambiguous_last_parts_are_found() {
-        assert_eq!(named("physics.solver"), Ok("physics.solver"));
-        assert_eq!(named("solver"), Ok("physics.solver"));
-        assert_eq!(named("steps"), Ok("run.steps"));
-    }
-
-    #[test]
-    fn ambiguous_last_parts_are_refused_with_all_they_may_mean() {
-        const DOUBLE: &[&str] = &["scene.size", "run.size", "run.other"];
-        let error = resolve(DOUBLE, "size", "1", Origin::Set).unwrap_err();
-        assert_eq!(error.to_string(), "--set size=1: ambiguous, write one of scene.size, run.size");
-        assert_eq!(resolve(DOUBLE, "run.size", "1", Origin::Set), Ok("run.size"));
-    }
-
-    #[test]
-    fn unknown_keys_come_with_the_nearest_one() {
-        for (typed, meant) in [
-            ("sovler", "physics.solver"),
-            ("physics.substep", "physics.substeps"),
-            ("run.bodies", "scene.bodies"),
-            ("scene.knid", "scene.kind"),
-        ] {
-            let error = named(typed).unwrap_err().to_string();
-            assert_eq!(error, format!("--set {typed}=1: unknown key; did you mean {meant}?"));
-        }
-        assert_eq!(named("zzz").unwrap_err().to_string(), "--set zzz=1: unknown key");
-    }
-
-    #[test]
-    fn every_key_is_in_a_section() {
+    fn names_are_in_sections_and_told_once() {
         for key in KEYS {
-            let (section, name) = key.split_once('.').unwrap();
-            assert!(SECTIONS.contains(&section) && !name.contains('.'), "{key}");
+            let (section, name) = key.name.split_once('.').unwrap();
+            assert!(["scene", "run", "physics", "output"].contains(&section) && !name.contains('.'), "{}", key.name);
+            assert!(section != "output" || key.concern == How, "{}", key.name);
         }
+        assert_eq!(names().collect::<BTreeSet<_>>().len(), KEYS.len());
+    }
+
+    /// Whoever adds a field and forgets its key is told here: some other value of each key changes a figure of its own, and
+    /// no figure is left that none changes.
+    #[test]
+    fn every_figure_that_a_configuration_keeps_has_a_key() {
+        let others = [
+            ("run.steps", "7"),
+            ("run.ranks", "2"),
+            ("run.threads", "3"),
+            ("run.transport", "channel"),
+            ("run.tiles", "[4, 5]"),
+            ("run.peer_timeout", "2.5"),
+            ("run.mpi_exchange", "sparse"),
+            ("physics.gravity", "[1, -9]"),
+            ("physics.broad_phase", "quadtree"),
+            ("physics.solver", "pgs"),
+            ("physics.islands", "dfs"),
+            ("physics.parallel", "serial"),
+            ("physics.exchange", "substep"),
+            ("physics.ghosts", "frozen"),
+            ("physics.sleep", "true"),
+            ("physics.baumgarte", "0.5"),
+            ("physics.margin_floor", "0.07"),
+            ("physics.margin_cap", "0.7"),
+        ];
+        let usual = config("rooms", &[]);
+        let (mut changed, before) = (BTreeSet::new(), kept(&usual));
+        for key in KEYS.iter().filter(|key| key.name.split_once('.').is_some_and(|(section, _)| section != "scene")) {
+            let value = others.iter().find(|(name, _)| *name == key.name).map_or("11", |(_, value)| value);
+            let other = config("rooms", &[(key.name, value)]);
+            assert_ne!(usual, other, "{} changes nothing", key.name);
+            let after = kept(&other);
+            // Options and pairs take more lines; the first that differs names the field.
+            let first = before.iter().zip(&after).position(|(a, b)| a != b).unwrap();
+            assert!(changed.insert(first), "{} changes the figure of another key: {}", key.name, before[first]);
+        }
+        let start = before.iter().position(|line| line.starts_with("run:")).unwrap();
+        let is_figure = |line: &str| line.split_once(": ").is_some_and(|(_, value)| !value.ends_with(['{', '(']));
+        let forgotten: Vec<_> = (start..before.len())
+            .filter(|at| is_figure(&before[*at]) && !changed.contains(at))
+            .map(|at| before[at].as_str())
+            .collect();
+        // Where the number of ranks comes from is part of that key.
+        assert_eq!(forgotten, ["ranks_asked_for: false,"]);
     }
 }

@@ -1,23 +1,10 @@
 //! What a configuration comes to once every default is filled in: as a file that repeats the run, and as the text and
 //! the hash of what its result depends on.
 
-use super::words::{self, word_for};
-use super::{Config, OutputConfig, RunConfig};
-use atoll_core::Params;
+use super::keys::{Concern, KEYS};
+use super::sections::Config;
 use std::fmt::Write as _;
 use toml::Value;
-
-/// Keys that say how a result is computed and change no bit of it. All of `[output]` is of that kind too.
-const HOW: &[&str] = &[
-    "run.ranks",
-    "run.threads",
-    "run.transport",
-    "run.peer_timeout",
-    "run.mpi_exchange",
-    "physics.broad_phase",
-    "physics.islands",
-    "physics.parallel",
-];
 
 /// Stands at the beginning of the file.
 const HEADING: &str = "# The configuration of this run, every key with the value that was used. `atoll run` this file \
@@ -30,85 +17,9 @@ impl Config {
     /// A file of these entries gives the same configuration, bit for bit, as long as `dt` is the inverse of some
     /// `hertz`, as it is after reading.
     pub fn entries(&self, tiles: [u32; 2]) -> Vec<(&'static str, Value)> {
-        // All by name, so that what is added later cannot be forgotten here.
-        let Self { scene, run, params, output } = self;
-        let RunConfig { steps, ranks, ranks_asked_for: _, threads, transport, tiles: _, peer_timeout, mpi_exchange } =
-            *run;
-        let Params {
-            dt,
-            substeps,
-            gravity,
-            linear_damping,
-            angular_damping,
-            max_linear_speed,
-            max_angular_speed,
-            contact_hertz,
-            contact_damping_ratio,
-            push_out_speed,
-            speculative_distance,
-            recycle_distance,
-            restitution_threshold,
-            margin_floor,
-            margin_cap,
-            sort_interval,
-            exchange,
-            broad_phase,
-            solver,
-            iterations,
-            baumgarte,
-            linear_slop,
-            island_search,
-            parallel,
-            ghosts,
-            sleep,
-            sleep_speed,
-            sleep_time,
-        } = *params;
-        let OutputConfig { record_every, checkpoint_every } = *output;
-
-        let mut entries = scene.entries();
-        entries.extend([
-            ("run.steps", whole(steps)),
-            ("run.ranks", whole(ranks as u64)),
-            ("run.threads", whole(threads as u64)),
-        ]);
-        entries.extend(transport.map(|kind| ("run.transport", word_for(words::TRANSPORT, kind).into())));
-        entries.extend([
-            ("run.tiles", tiles.map(Value::from).to_vec().into()),
-            ("run.peer_timeout", peer_timeout.as_secs_f64().into()),
-            ("run.mpi_exchange", word_for(words::MPI_EXCHANGE, mpi_exchange).into()),
-            ("physics.hertz", float(hertz(dt))),
-            ("physics.substeps", substeps.into()),
-            ("physics.gravity", gravity.to_array().map(float).to_vec().into()),
-            ("physics.linear_damping", float(linear_damping)),
-            ("physics.angular_damping", float(angular_damping)),
-            ("physics.max_linear_speed", float(max_linear_speed)),
-            ("physics.max_angular_speed", float(max_angular_speed)),
-            ("physics.contact_hertz", float(contact_hertz)),
-            ("physics.contact_damping_ratio", float(contact_damping_ratio)),
-            ("physics.push_out_speed", float(push_out_speed)),
-            ("physics.speculative_distance", float(speculative_distance)),
-            ("physics.recycle_distance", float(recycle_distance)),
-            ("physics.restitution_threshold", float(restitution_threshold)),
-            ("physics.margin_floor", float(margin_floor)),
-            ("physics.margin_cap", float(margin_cap)),
-            ("physics.sort_interval", sort_interval.into()),
-            ("physics.broad_phase", word_for(words::BROAD_PHASE, broad_phase).into()),
-            ("physics.solver", word_for(words::SOLVER, solver).into()),
-            ("physics.iterations", iterations.into()),
-            ("physics.baumgarte", float(baumgarte)),
-            ("physics.linear_slop", float(linear_slop)),
-            ("physics.islands", word_for(words::ISLANDS, island_search).into()),
-            ("physics.parallel", word_for(words::PARALLEL, parallel).into()),
-            ("physics.exchange", word_for(words::EXCHANGE, exchange).into()),
-            ("physics.ghosts", word_for(words::GHOSTS, ghosts).into()),
-            ("physics.sleep", sleep.into()),
-            ("physics.sleep_speed", float(sleep_speed)),
-            ("physics.sleep_time", float(sleep_time)),
-        ]);
-        entries.extend(record_every.map(|steps| ("output.record_every", whole(steps))));
-        entries.extend(checkpoint_every.map(|steps| ("output.checkpoint_every", whole(steps))));
-        entries
+        let mut config = self.clone();
+        config.run.tiles = Some(tiles);
+        KEYS.iter().filter_map(|key| Some((key.name, key.write(&mut config)?))).collect()
     }
 
     /// [`entries`](Self::entries) as a file that repeats the run.
@@ -129,14 +40,16 @@ impl Config {
     /// Everything that the result depends on, a line `key = value` each: not ranks, threads or transport, nor the ways
     /// of computing that change no bit. `tiles` is the grid that is really used.
     pub fn canonical(&self, tiles: [u32; 2]) -> String {
-        let matters = |key: &str| !HOW.contains(&key) && !key.starts_with("output.");
-        let entries = self.entries(tiles).into_iter().filter(|(key, _)| matters(key));
+        let mut config = self.clone();
+        config.run.tiles = Some(tiles);
+        let what = KEYS.iter().filter(|key| key.concern == Concern::What);
+        let entries = what.filter_map(|key| Some((key.name, key.write(&mut config)?)));
         entries.map(|(key, value)| format!("{key} = {value}\n")).collect()
     }
 
     /// What all parts of one run have in common, a `key = value` line each: [`canonical`](Self::canonical), and how often it
     /// is recorded. [`other_run`](super::other_run) compares two.
-    pub fn identity(&self, tiles: [u32; 2]) -> String {
+    pub(crate) fn identity(&self, tiles: [u32; 2]) -> String {
         identity(self.output.record_every, &self.canonical(tiles))
     }
 
@@ -146,42 +59,19 @@ impl Config {
     }
 }
 
-/// A number of things as TOML has it. No key takes more than TOML can say.
-pub(super) fn whole(number: u64) -> Value {
-    Value::Integer(number.try_into().unwrap_or(i64::MAX))
-}
-
-/// The shortest decimal that is read as this number.
-fn float(number: f32) -> Value {
-    let shortest: f64 = number.to_string().parse().expect("a number is written as one");
-    // A file's numbers are rounded twice, to 64 bits and then to 32. Of all numbers, 7.038531e-26 alone ends elsewhere.
-    let same = (shortest as f32).to_bits() == number.to_bits();
-    Value::Float(if same { shortest } else { number.into() })
-}
-
-/// The steps per second that a step of this length came from. Of several, the one that is shortest to write.
-fn hertz(dt: f32) -> f32 {
-    let nearest = 1.0 / dt;
-    // Each of two divisions rounds by at most half a unit. For every number there is, that makes one unit at most.
-    let near = [nearest, nearest.next_down(), nearest.next_up()];
-    let exact = near.into_iter().filter(|hertz| hertz.is_finite() && 1.0 / hertz == dt);
-    exact.min_by_key(|hertz| hertz.to_string().len()).unwrap_or(nearest)
-}
-
 /// Whether a text is a configuration that a run wrote, and not one that a person did.
-pub fn is_resolved(text: &str) -> bool {
+pub(crate) fn is_resolved(text: &str) -> bool {
     text.starts_with(HEADING)
 }
 
 /// As [`Config::identity`].
-pub fn identity(record_every: Option<u64>, canonical: &str) -> String {
+pub(crate) fn identity(record_every: Option<u64>, canonical: &str) -> String {
     let every = record_every.map_or("nothing".to_owned(), |every| every.to_string());
     format!("output.record_every = {every}\n{canonical}")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::keys::KEYS;
     use super::*;
     use crate::scene::SplitMix64;
     use std::collections::BTreeSet;
@@ -293,7 +183,7 @@ mod tests {
 
     #[test]
     fn every_key_is_given_in_its_order() {
-        let position = |key: &str| KEYS.iter().position(|&known| known == key).unwrap();
+        let position = |key: &str| KEYS.iter().position(|known| known.name == key).unwrap();
         let overrides = [("transport", "channel"), ("record_every", "1"), ("checkpoint_every", "1")];
         let mut seen = BTreeSet::new();
         for kind in KINDS {
@@ -303,7 +193,6 @@ mod tests {
             seen.extend(keys);
         }
         assert_eq!(seen.len(), KEYS.len(), "a key is never given");
-        assert!(HOW.iter().all(|key| KEYS.contains(key)), "{HOW:?}");
     }
 
     #[test]
@@ -313,7 +202,8 @@ mod tests {
         let expected = "scene.kind = \"stack\"\nscene.bodies = 10\nscene.seed = 1\nrun.steps = 600\nrun.tiles = [3, 2]\n\
                         physics.hertz = 60.0\n";
         assert!(text.starts_with(expected), "{text}");
-        // Five keys of other scenes, and two of [output].
-        assert_eq!(text.lines().count(), KEYS.len() - 5 - HOW.len() - 2, "{text}");
+        // Five are of other scenes.
+        let what = KEYS.iter().filter(|key| key.concern == Concern::What).count();
+        assert_eq!(text.lines().count(), what - 5, "{text}");
     }
 }

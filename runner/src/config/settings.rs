@@ -1,7 +1,7 @@
-//! What a file and the command line say, key by key, and reading it with types and ranges.
+//! What a file and the command line say, key by key, and reading it with types and ranges. What nobody gave is `None`.
 
-use super::error::{ConfigError, Origin, Place};
-use super::keys::{self, KEYS, SECTIONS};
+use super::error::{ConfigError, Given, Origin};
+use super::spelling;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -36,27 +36,35 @@ impl Override {
 }
 
 /// One value and where it came from.
-struct Given {
+struct Setting {
     value: Value,
-    place: Place,
+    given: Given,
     read: bool,
 }
 
 /// Everything that was given.
 pub(super) struct Settings {
     file: String,
-    given: BTreeMap<&'static str, Given>,
+    /// The keys there are.
+    keys: Vec<&'static str>,
+    all: BTreeMap<&'static str, Setting>,
 }
 
 impl Settings {
-    pub(super) fn new(file: &str, text: &str, overrides: &[Override]) -> Result<Self, ConfigError> {
+    /// `keys` are the full paths of all keys there are; what is none of them is refused.
+    pub(super) fn new(
+        file: &str,
+        text: &str,
+        overrides: &[Override],
+        keys: impl Iterator<Item = &'static str>,
+    ) -> Result<Self, ConfigError> {
         let table: Table = text.parse().map_err(|error| syntax_error(file, text, &error))?;
-        let mut settings = Self { file: file.to_owned(), given: BTreeMap::new() };
+        let mut settings = Self { file: file.to_owned(), keys: keys.collect(), all: BTreeMap::new() };
         for (section, content) in table {
             settings.add_section(&section, content)?;
         }
         for one in overrides {
-            let key = keys::resolve(KEYS, &one.key, &one.value, one.origin.clone())?;
+            let key = spelling::resolve(&settings.keys, &one.key, &one.value, one.origin.clone())?;
             // What is no TOML value is a string without its quotes.
             let value = one.value.parse().unwrap_or_else(|_| Value::String(one.value.clone()));
             settings.insert(key, value, one.value.clone(), one.origin.clone());
@@ -65,15 +73,16 @@ impl Settings {
     }
 
     fn add_section(&mut self, section: &str, content: Value) -> Result<(), ConfigError> {
-        let file = self.file.clone();
+        let (file, keys) = (self.file.clone(), self.keys.clone());
         let unknown = |key: String, value: &Value| {
-            let suggestion = keys::nearest_key(KEYS, &key);
-            let place = Place { origin: Origin::File(file.clone()), key, value: one_line(value) };
-            ConfigError::UnknownKey { place, suggestion }
+            let suggestion = spelling::nearest_key(&keys, &key);
+            let given = Given { origin: Origin::File(file.clone()), key, value: one_line(value) };
+            ConfigError::UnknownKey { given, suggestion }
         };
         let Value::Table(content) = content else { return Err(unknown(section.to_owned(), &content)) };
-        if !SECTIONS.contains(&section) {
-            let suggestion = keys::nearest(SECTIONS.iter().copied(), section).map(|word| format!("[{word}]"));
+        let sections = || keys.iter().map(|key| key.split_once('.').map_or(*key, |(section, _)| section));
+        if !sections().any(|known| known == section) {
+            let suggestion = spelling::nearest(sections(), section).map(|word| format!("[{word}]"));
             return Err(ConfigError::UnknownSection {
                 file: self.file.clone(),
                 section: section.to_owned(),
@@ -82,7 +91,7 @@ impl Settings {
         }
         for (name, value) in content {
             let path = format!("{section}.{name}");
-            let key = KEYS.iter().find(|&&key| key == path).ok_or_else(|| unknown(path, &value))?;
+            let key = keys.iter().find(|&&key| key == path).ok_or_else(|| unknown(path, &value))?;
             let written = one_line(&value);
             self.insert(key, value, written, Origin::File(self.file.clone()));
         }
@@ -90,27 +99,27 @@ impl Settings {
     }
 
     fn insert(&mut self, key: &'static str, value: Value, written: String, origin: Origin) {
-        let place = Place { origin, key: key.to_owned(), value: written };
-        self.given.insert(key, Given { value, place, read: false });
+        let given = Given { origin, key: key.to_owned(), value: written };
+        self.all.insert(key, Setting { value, given, read: false });
     }
 
     /// Refuses whatever was given and never read.
     pub(super) fn finish(self, reason: impl Fn(&str) -> String) -> Result<(), ConfigError> {
-        match self.given.into_iter().find(|(_, given)| !given.read) {
-            Some((key, given)) => Err(ConfigError::Inapplicable { place: given.place, reason: reason(key) }),
+        match self.all.into_iter().find(|(_, setting)| !setting.read) {
+            Some((key, setting)) => Err(ConfigError::Inapplicable { given: setting.given, reason: reason(key) }),
             None => Ok(()),
         }
     }
 
-    /// Where a key was given.
-    pub(super) fn place(&self, key: &str) -> Option<&Place> {
-        self.given.get(key).map(|given| &given.place)
+    /// What was given for a key, and where.
+    pub(super) fn given(&self, key: &str) -> Option<&Given> {
+        self.all.get(key).map(|setting| &setting.given)
     }
 
     /// That the value of `key`, which was given, must be something else.
     pub(super) fn refusal(&self, key: &str, must: impl Display) -> ConfigError {
-        let place = self.place(key).expect("only values that were given are refused").clone();
-        ConfigError::BadValue { place, must: must.to_string(), suggestion: None }
+        let given = self.given(key).expect("only values that were given are refused").clone();
+        ConfigError::BadValue { given, must: must.to_string(), suggestion: None }
     }
 
     pub(super) fn missing(&self, key: &'static str, must: String) -> ConfigError {
@@ -123,24 +132,14 @@ impl Settings {
         must: impl Display,
         convert: impl FnOnce(&Value) -> Option<T>,
     ) -> Result<Option<T>, ConfigError> {
-        debug_assert!(KEYS.contains(&key), "{key} is not in the list of keys");
-        let Some(given) = self.given.get_mut(key) else { return Ok(None) };
-        given.read = true;
-        convert(&given.value).map(Some).ok_or_else(|| self.refusal(key, must))
+        debug_assert!(self.keys.contains(&key), "{key} is not in the list of keys");
+        let Some(setting) = self.all.get_mut(key) else { return Ok(None) };
+        setting.read = true;
+        convert(&setting.value).map(Some).ok_or_else(|| self.refusal(key, must))
     }
 
     /// A whole number; `1e6` counts as one.
     pub(super) fn integer(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<u64>,
-        default: u64,
-    ) -> Result<u64, ConfigError> {
-        Ok(self.optional_integer(key, range)?.unwrap_or(default))
-    }
-
-    /// A whole number that need not be there; `1e6` counts as one.
-    pub(super) fn optional_integer(
         &mut self,
         key: &'static str,
         range: RangeInclusive<u64>,
@@ -151,29 +150,24 @@ impl Settings {
     }
 
     /// A number within bounds.
-    pub(super) fn number(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
-        default: f64,
-    ) -> Result<f64, ConfigError> {
+    pub(super) fn number(&mut self, key: &'static str, range: RangeInclusive<f64>) -> Result<Option<f64>, ConfigError> {
         let must = format!("a number within {} to {}", range.start(), range.end());
         let within = |value: &Value| value_as_f64(value).filter(|number| range.contains(number));
-        Ok(self.get(key, must, within)?.unwrap_or(default))
+        self.get(key, must, within)
     }
 
     /// A number whose bounds are checked where it is used.
-    pub(super) fn float(&mut self, key: &'static str, default: f32) -> Result<f32, ConfigError> {
-        Ok(self.get(key, "a number of at most 3.4e38", value_as_f32)?.unwrap_or(default))
+    pub(super) fn float(&mut self, key: &'static str) -> Result<Option<f32>, ConfigError> {
+        self.get(key, "a number of at most 3.4e38", value_as_f32)
     }
 
     /// Two numbers, `[x, y]`.
-    pub(super) fn pair(&mut self, key: &'static str, default: [f32; 2]) -> Result<[f32; 2], ConfigError> {
+    pub(super) fn pair(&mut self, key: &'static str) -> Result<Option<[f32; 2]>, ConfigError> {
         let pair = |value: &Value| match value.as_array()?.as_slice() {
             [x, y] => Some([value_as_f32(x)?, value_as_f32(y)?]),
             _ => None,
         };
-        Ok(self.get(key, "two numbers, such as [0, -10]", pair)?.unwrap_or(default))
+        self.get(key, "two numbers, such as [0, -10]", pair)
     }
 
     /// `"auto"`, `[columns, rows]` or `"COLUMNSxROWS"`; `None` stands for auto.
@@ -196,8 +190,8 @@ impl Settings {
     }
 
     /// Yes or no.
-    pub(super) fn flag(&mut self, key: &'static str, default: bool) -> Result<bool, ConfigError> {
-        Ok(self.get(key, "true or false", Value::as_bool)?.unwrap_or(default))
+    pub(super) fn flag(&mut self, key: &'static str) -> Result<Option<bool>, ConfigError> {
+        self.get(key, "true or false", Value::as_bool)
     }
 
     /// One of some words.
@@ -207,8 +201,8 @@ impl Settings {
         if let Some((_, value)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(Some(*value));
         }
-        let suggestion = keys::nearest(words.iter().map(|(word, _)| *word), &text);
-        Err(ConfigError::BadValue { place: self.given[key].place.clone(), must, suggestion })
+        let suggestion = spelling::nearest(words.iter().map(|(word, _)| *word), &text);
+        Err(ConfigError::BadValue { given: self.all[key].given.clone(), must, suggestion })
     }
 }
 

@@ -1,8 +1,11 @@
 //! What is accepted, and what is said about everything else.
 
 use super::*;
-use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
+use crate::scene::{SceneKind, SceneSpec};
+use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
 use glam::Vec2;
+use std::path::Path;
+use std::time::Duration;
 
 /// What a scene may be called.
 const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack" or "slope""#;
@@ -130,7 +133,7 @@ fn every_key_can_be_given() {
         checkpoint_every = 100
     "#;
     let config = read(text, &[]).unwrap();
-    assert_eq!(config.scene, SceneConfig { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
+    assert_eq!(config.scene, SceneSpec { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
     assert_eq!((config.run.steps, config.run.ranks, config.run.threads), (7, 2, 3));
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));

@@ -1,6 +1,6 @@
 //! The words that a configuration may say, one table each, for reading and for writing.
 
-use super::{MpiExchange, TransportKind};
+use super::sections::{MpiExchange, TransportKind};
 use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
 
 /// Words and what they mean.

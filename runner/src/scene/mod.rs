@@ -1,24 +1,25 @@
 //! Scenes: which bodies there are at the start, and what stands around them.
 //!
-//! A scene is a function of its section of the configuration. Random numbers come from [`SplitMix64`]; each body takes
+//! A scene is a function of its [`SceneSpec`]. Random numbers come from [`SplitMix64`]; each body takes
 //! a fixed number of draws, in the order of the ids, so any body can be made without making the ones before it, and
 //! nothing depends on tiles, ranks or threads. To add a scene, implement `Layout` in a file of its own and name it in
 //! [`SceneKind`] and [`Scene::new`].
 
+mod kind;
 mod lattice;
 mod pile;
 mod pyramids;
 mod random;
-pub(crate) mod rooms;
+mod rooms;
 mod single_island;
 mod slope;
-pub(crate) mod sparse;
+mod sparse;
 mod stack;
 mod statics;
 
+pub use kind::{SceneKind, SceneSpec};
 pub use random::SplitMix64;
 
-use crate::config::{SceneConfig, SceneKind};
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
 use glam::DVec2;
 
@@ -49,18 +50,19 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The scene a configuration describes.
-    pub fn new(config: &SceneConfig) -> Self {
-        let layout: Box<dyn Layout> = match config.kind {
-            SceneKind::Rooms { power } => Box::new(rooms::Rooms::new(config.bodies, power)),
-            SceneKind::Pile { jitter } => Box::new(pile::Pile::new(config.bodies, jitter)),
-            SceneKind::Pyramids { base } => Box::new(pyramids::Pyramids::new(config.bodies, base)),
-            SceneKind::Sparse => Box::new(sparse::Sparse::new(config.bodies)),
-            SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(config.bodies)),
-            SceneKind::Stack => Box::new(stack::Stack::new(config.bodies)),
-            SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(config.bodies, angle, friction)),
+    /// The scene that is asked for.
+    pub fn new(spec: &SceneSpec) -> Self {
+        let SceneSpec { kind, bodies, seed } = *spec;
+        let layout: Box<dyn Layout> = match kind {
+            SceneKind::Rooms { power } => Box::new(rooms::Rooms::new(bodies, power)),
+            SceneKind::Pile { jitter } => Box::new(pile::Pile::new(bodies, jitter)),
+            SceneKind::Pyramids { base } => Box::new(pyramids::Pyramids::new(bodies, base)),
+            SceneKind::Sparse => Box::new(sparse::Sparse::new(bodies)),
+            SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(bodies)),
+            SceneKind::Stack => Box::new(stack::Stack::new(bodies)),
+            SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(bodies, angle, friction)),
         };
-        Self { statics: layout.statics(), layout, seed: config.seed }
+        Self { statics: layout.statics(), layout, seed }
     }
 
     /// How many dynamic bodies there are.

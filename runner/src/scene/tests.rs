@@ -16,7 +16,7 @@ const KINDS: [(SceneKind, u64); 8] = [
 ];
 
 fn scene(kind: SceneKind) -> Scene {
-    Scene::new(&SceneConfig { kind, bodies: 500, seed: 3 })
+    Scene::new(&SceneSpec { kind, bodies: 500, seed: 3 })
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn nothing_starts_inside_anything_else() {
 #[test]
 fn the_seed_matters_and_the_same_seed_repeats() {
     for kind in [SceneKind::Rooms { power: 1.0 }, SceneKind::Sparse, SceneKind::SingleIsland] {
-        let make = |seed| Scene::new(&SceneConfig { kind, bodies: 100, seed });
+        let make = |seed| Scene::new(&SceneSpec { kind, bodies: 100, seed });
         assert!(make(1).iter().eq(make(1).iter()));
         assert!(!make(1).iter().eq(make(2).iter()), "{kind:?}");
     }

@@ -3,8 +3,8 @@
 use super::{Outcome, assert_one_line};
 use crate::program;
 use atoll::Config;
-use atoll::args::{Cli, Command, one_line};
 use atoll::config::ConfigError;
+use atoll::internals::{Cli, Command, one_line};
 use clap::Parser;
 use clap::error::ErrorKind;
 use std::ffi::OsString;

@@ -2,8 +2,9 @@
 
 use super::{Outcome, assert_one_line};
 use atoll::Config;
-use atoll::config::{ConfigError, SceneKind};
-use atoll::plan::Plan;
+use atoll::config::ConfigError;
+use atoll::internals::Plan;
+use atoll::scene::SceneKind;
 
 /// What a target has time to plan: bodies, ranks, and tiles along both axes together.
 const SMALL: (u64, usize, u32) = (2000, 64, 128);

@@ -1,7 +1,8 @@
-//! Segments of recordings, as `Trajectory` reads them.
+//! Segments of recordings, as `Recording` reads them.
 
 use super::Outcome;
-use atoll::trajectory::{Record, Row, RunFacts, Trajectory, TrajectoryError, TrajectoryWriter, rank_folder};
+use atoll::internals::{Record, RecordingWriter, rank_folder};
+use atoll::recording::{Recording, RecordingError, Row, RunFacts};
 use atoll_core::{Body, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use std::fs;
@@ -41,7 +42,7 @@ impl Run {
         let mut record = Record::default();
         record.fill(0, (0..BODIES).map(body));
         let rank = rank_folder(folder.path(), 0);
-        let mut writer = TrajectoryWriter::new(rank.clone(), 0, 1, &facts).expect("a new folder");
+        let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts).expect("a new folder");
         writer.write(&record).and_then(|()| writer.close_segment()).expect("room for a small file");
         let segment = fs::read_dir(rank).expect("the folder just made").next().expect("its only file");
         let segment = segment.expect("a name").path();
@@ -49,11 +50,11 @@ impl Run {
         Self { folder, segment, genuine }
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<Row>, TrajectoryError> {
+    fn read(&self, bytes: &[u8]) -> Result<Vec<Row>, RecordingError> {
         // A file that is written over goes to the disk at once on some systems, which takes a hundred times as long.
         fs::remove_file(&self.segment).and_then(|()| fs::write(&self.segment, bytes)).expect("room for a small file");
         let mut rows = Vec::new();
-        Trajectory::open(self.folder.path())?.read(0, &mut rows)?;
+        Recording::open(self.folder.path())?.read(0, &mut rows)?;
         Ok(rows)
     }
 }
@@ -95,7 +96,7 @@ fn seal(bytes: &mut [u8]) {
 
 /// A segment is refused in one line, or its bodies are those that were written; with a new checksum it is refused in one
 /// line, or read without a panic, whatever it then says.
-pub fn segment(bytes: &[u8]) -> Outcome<TrajectoryError> {
+pub fn segment(bytes: &[u8]) -> Outcome<RecordingError> {
     RUN.with(|run| {
         let result = run.read(bytes);
         if let Ok(rows) = &result {

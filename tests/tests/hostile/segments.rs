@@ -3,8 +3,8 @@
 use crate::memory::asked;
 use crate::random::{below, noise, one_of, rounds};
 use crate::tally::Tally;
+use atoll::recording::RecordingError;
 use atoll::scene::SplitMix64;
-use atoll::trajectory::TrajectoryError;
 use atoll_tests::fuzz::{self, Outcome};
 
 /// What a segment may be refused for, by words of the reason.
@@ -24,12 +24,12 @@ const NOTHING: &str = "nothing";
 
 /// Other errors need a second file. Other reasons of ours need a second record, or a text of another length together with
 /// what says how long it is.
-fn kind(error: &TrajectoryError) -> &'static str {
+fn kind(error: &RecordingError) -> &'static str {
     match error {
-        TrajectoryError::BadSegment { reason, .. } => {
+        RecordingError::BadSegment { reason, .. } => {
             REASONS.into_iter().find(|known| reason.contains(known)).unwrap_or(OTHER_REASON)
         }
-        TrajectoryError::Nothing { .. } => NOTHING,
+        RecordingError::Nothing { .. } => NOTHING,
         other => panic!("{other}"),
     }
 }
@@ -81,7 +81,7 @@ fn end_segment(bytes: &mut [u8], footer: usize) {
 
 /// Gives a segment to the target. It is read twice, each time through buffers of a fixed size, and a small one costs no more.
 #[track_caller]
-fn read_segment(bytes: &[u8]) -> Outcome<TrajectoryError> {
+fn read_segment(bytes: &[u8]) -> Outcome<RecordingError> {
     let (asked, outcome) = asked(|| fuzz::segment(bytes));
     assert!(asked <= 1 << 20, "{asked} bytes for {}: {bytes:02x?}", bytes.len());
     outcome

@@ -1,0 +1,92 @@
+//! The command line. Values of the configuration stay text here: the configuration checks them, whether they come from
+//! a file or from here.
+
+mod recordings;
+mod run;
+
+pub(crate) use recordings::{DiffArgs, InfoArgs};
+pub(crate) use run::RunArgs;
+
+use crate::config::OneLine;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
+use std::ffi::OsStr;
+
+/// Very large 2-D rigid-body worlds: one trajectory, bit for bit, on one core, one machine or a cluster.
+#[derive(Debug, Parser)]
+#[command(name = "atoll", version, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a scene and report what became of it.
+    Run(Box<RunArgs>),
+    /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
+    Diff(DiffArgs),
+    /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
+    Info(InfoArgs),
+}
+
+/// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.
+pub fn one_line(error: &clap::Error, first: Option<&OsStr>) -> String {
+    let text = error.render().to_string();
+    let said =
+        |line: &&str| !(line.is_empty() || line.starts_with("Usage:") || line.starts_with("For more information"));
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(said).collect();
+    let line = lines.join(" ").replace(" tip: ", "; ");
+    let hint = if lacks_configuration(error) {
+        "; name a configuration such as configs/quickstart.toml, or go on with a run by --resume DIR"
+    } else {
+        ""
+    };
+    let verb = first.and_then(OsStr::to_str).filter(|first| Cli::command().find_subcommand(first).is_some());
+    let verb = verb.map(|verb| format!(" {verb}")).unwrap_or_default();
+    // What was typed is quoted as it was typed.
+    format!("{}{hint}; see atoll{verb} --help", OneLine(line.strip_prefix("error: ").unwrap_or(&line)))
+}
+
+fn lacks_configuration(error: &clap::Error) -> bool {
+    let missing = error.get(ContextKind::InvalidArg).filter(|_| error.kind() == ErrorKind::MissingRequiredArgument);
+    matches!(missing, Some(ContextValue::Strings(names)) if names.iter().any(|name| name == "<CONFIG>"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn complaint(line: &str) -> String {
+        let words = || line.split_whitespace();
+        one_line(&Cli::try_parse_from(words()).unwrap_err(), words().nth(1).map(OsStr::new))
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn bad_usage_takes_one_line() {
+        for (line, expected, help) in [
+            (
+                "atoll run c.toml --rnks 2",
+                "unexpected argument '--rnks' found; a similar argument exists: '--ranks'; see",
+                "atoll run --help",
+            ),
+            ("atoll run c.toml --ranks", "a value is required for '--ranks <N>'", "atoll run --help"),
+            ("atoll run", "the following required arguments were not provided: <CONFIG>", "atoll run --help"),
+            ("atoll runn c.toml", "unrecognized subcommand 'runn'; a similar subcommand exists: 'run'", "atoll --help"),
+        ] {
+            let text = complaint(line);
+            assert!(text.starts_with(expected) && !text.contains('\n'), "{text}");
+            assert!(text.ends_with(&format!("; see {help}")), "{text}");
+        }
+        let error = Cli::try_parse_from(["atoll", "ru\r\u{1b}[2Jn"]).unwrap_err();
+        let text = one_line(&error, None);
+        assert!(text.starts_with("unrecognized subcommand 'ru n'"), "{text}");
+    }
+}

@@ -1,0 +1,166 @@
+//! Options of `atoll run`.
+
+use crate::config::{ConfigError, Override};
+use crate::rank::PanicAt;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Options of `atoll run`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct RunArgs {
+    /// The configuration, a TOML file such as configs/quickstart.toml. May be left out with --resume.
+    #[arg(required_unless_present = "resume")]
+    pub config: Option<PathBuf>,
+    /// Ranks that share the tiles [default: the configuration's, else 1].
+    #[arg(long, value_name = "N")]
+    pub ranks: Option<String>,
+    /// Threads of each rank [default: the configuration's, else 1].
+    #[arg(long, value_name = "T")]
+    pub threads: Option<String>,
+    /// What carries bytes between ranks: local, channel, iceoryx2 or mpi [default: local for one rank, else channel].
+    #[arg(long, value_name = "NAME")]
+    pub transport: Option<String>,
+    /// Columns and rows of tiles, such as 17x17, or auto.
+    #[arg(long, value_name = "CxR")]
+    pub tiles: Option<String>,
+    /// Dynamic bodies.
+    #[arg(long, value_name = "N")]
+    pub bodies: Option<String>,
+    /// Steps to make.
+    #[arg(long, value_name = "S")]
+    pub steps: Option<String>,
+    /// Chooses among the random variants of the scene.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<String>,
+    /// Any key of the configuration, by its full path or an unambiguous last part; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Give up a rank that stays silent for so long.
+    #[arg(long, value_name = "SECONDS")]
+    pub peer_timeout: Option<String>,
+    /// Write the summary to this file, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Write where the time of each rank went to this file, as CSV.
+    #[arg(long, value_name = "FILE")]
+    pub timings: Option<PathBuf>,
+    /// Write configuration and summary to this folder, which must be new or empty, and records and snapshots as asked for.
+    #[arg(long, value_name = "DIR", group = "folder")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in this folder from its newest snapshot. With CONFIG, begin it there if there is none yet.
+    #[arg(long, value_name = "DIR", group = "folder")]
+    pub resume: Option<PathBuf>,
+    /// Record every so many steps [default: the configuration's, else never].
+    #[arg(long, value_name = "K", requires = "folder")]
+    pub record_every: Option<String>,
+    /// Write a snapshot every so many steps [default: the configuration's, else never].
+    #[arg(long, value_name = "K", requires = "folder")]
+    pub checkpoint_every: Option<String>,
+    /// Let --out replace what is in its folder.
+    #[arg(long, requires = "out", conflicts_with = "resume")]
+    pub overwrite: bool,
+    /// Go on from the newest snapshot up to so many times where a rank is lost.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "folder")]
+    pub restarts: u32,
+    /// Show no progress, only the closing report.
+    #[arg(long)]
+    pub quiet: bool,
+    /// Let a rank panic before a step, to see what becomes of the others.
+    #[arg(long, value_name = "RANK@STEP", hide = true)]
+    pub panic_at: Option<PanicAt>,
+}
+
+impl RunArgs {
+    /// The values that win over the file's. An option of its own wins over `--set`.
+    ///
+    /// # Errors
+    /// On a `--set` without an equals sign.
+    pub fn overrides(&self) -> Result<Vec<Override>, ConfigError> {
+        let mut overrides = self.set.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+        let options = [
+            ("--ranks", "run.ranks", &self.ranks),
+            ("--threads", "run.threads", &self.threads),
+            ("--transport", "run.transport", &self.transport),
+            ("--tiles", "run.tiles", &self.tiles),
+            ("--bodies", "scene.bodies", &self.bodies),
+            ("--steps", "run.steps", &self.steps),
+            ("--seed", "scene.seed", &self.seed),
+            ("--peer-timeout", "run.peer_timeout", &self.peer_timeout),
+            ("--record-every", "output.record_every", &self.record_every),
+            ("--checkpoint-every", "output.checkpoint_every", &self.checkpoint_every),
+        ];
+        let given = options.iter().filter_map(|(option, key, value)| Some((option, key, value.as_ref()?)));
+        overrides.extend(given.map(|(option, key, value)| Override::option(option, key, value)));
+        Ok(overrides)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::{Cli, Command, one_line};
+    use clap::Parser;
+    use std::path::Path;
+
+    fn parse(line: &str) -> Result<RunArgs, String> {
+        match Cli::try_parse_from(["atoll", "run"].into_iter().chain(line.split_whitespace())) {
+            Ok(Cli { command: Command::Run(args) }) => Ok(*args),
+            Ok(_) => unreachable!("the verb is run"),
+            Err(error) => Err(one_line(&error, Some("run".as_ref()))),
+        }
+    }
+
+    #[test]
+    fn options_become_overrides_that_win_over_set() {
+        let line = "c.toml --seed 3 --set seed=2 --set solver=pgs --bodies -5 --out d --record-every 0";
+        let expected = [
+            Override::set("seed", "2"),
+            Override::set("solver", "pgs"),
+            Override::option("--bodies", "scene.bodies", "-5"),
+            Override::option("--seed", "scene.seed", "3"),
+            Override::option("--record-every", "output.record_every", "0"),
+        ];
+        assert_eq!(parse(line).unwrap().overrides().unwrap(), expected);
+    }
+
+    #[test]
+    fn a_run_goes_on_with_and_without_a_configuration() {
+        let args = parse("--resume runs/a --restarts 3 --checkpoint-every 100").unwrap();
+        assert_eq!((args.config, args.resume.as_deref(), args.restarts), (None, Some(Path::new("runs/a")), 3));
+        let args = parse("c.toml --resume runs/a").unwrap();
+        assert_eq!((args.config.as_deref(), args.restarts), (Some(Path::new("c.toml")), 0));
+        let args = parse("c.toml --out runs/a --overwrite --record-every 5").unwrap();
+        assert!(args.out.is_some() && args.overwrite);
+    }
+
+    #[test]
+    fn options_for_a_folder_need_one() {
+        let missing = "the following required arguments were not provided: ";
+        let folder = format!("{missing}<--out <DIR>|--resume <DIR>>; see atoll run --help");
+        for option in ["--record-every 5", "--checkpoint-every 5", "--restarts 1"] {
+            assert_eq!(parse(&format!("c.toml {option}")).unwrap_err(), folder, "{option}");
+        }
+        for (line, expected) in [
+            ("c.toml --overwrite", "the following required arguments were not provided: --out <DIR>; see"),
+            ("--overwrite --resume d", "the argument '--overwrite' cannot be used with '--resume <DIR>'; see"),
+            ("c.toml --out d --resume d", "the argument '--out <DIR>' cannot be used with '--resume <DIR>'; see"),
+            ("c.toml --out d --restarts -1", "invalid value '-1' for '--restarts <N>': "),
+            ("c.toml --out d --out d", "the argument '--out <DIR>' cannot be used multiple times; see"),
+        ] {
+            let error = parse(line).unwrap_err();
+            assert!(error.starts_with(expected), "{line}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_configuration_that_is_missing_is_asked_for() {
+        for line in ["", "--out d", "--ranks 2"] {
+            assert_eq!(
+                parse(line).unwrap_err(),
+                "the following required arguments were not provided: <CONFIG>; name a configuration such as \
+                 configs/quickstart.toml, or go on with a run by --resume DIR; see atoll run --help"
+            );
+        }
+    }
+}

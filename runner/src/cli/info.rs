@@ -1,0 +1,146 @@
+//! `atoll info`: what the folder of a run, a snapshot or a segment of a recording holds.
+
+use super::args::InfoArgs;
+use super::output;
+use crate::config::{Config, OneLine};
+use crate::error::{Exit, RunError};
+use crate::folder::recording::{Recording, RecordingError, Segment};
+use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
+use crate::folder::{Ended, EndedError, RunFolder};
+use std::ffi::OsStr;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::{fs, iter};
+
+/// Reads all of it, and tells what it found.
+///
+/// # Errors
+/// If it is none of these, or cannot be read, or is damaged.
+pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
+    let path = &args.path;
+    let folder = RunFolder::new("info", path);
+    let text = match path.extension().and_then(OsStr::to_str) {
+        _ if folder.holds_run() => of_run(&folder)?,
+        Some("atoll") => of_snapshot_file(path)?,
+        Some("parquet") => of_segment(path)?,
+        _ if path.is_dir() => match Snapshot::open(path)? {
+            Some(snapshot) => of_snapshot(&snapshot)?,
+            None => {
+                return Err(folder.refusal("holds no run and no complete snapshot; name one, or a file of one").into());
+            }
+        },
+        _ => {
+            return Err(folder
+                .refusal("is no run, snapshot or recording; name a folder, a .atoll or a .parquet file")
+                .into());
+        }
+    };
+    output::show(&text)?;
+    Ok(Exit::Done)
+}
+
+fn of_run(folder: &RunFolder) -> Result<String, RunError> {
+    let config = Config::load_begun(&folder.configuration())?;
+    let tiles = config.run.tiles.unwrap_or_default();
+    let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
+    let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {} x {} tiles\n", tiles[0], tiles[1]);
+    row(&mut text, "config hash", &config.hash(tiles));
+    row(&mut text, "state", &state(folder, config.run.steps)?);
+    row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
+    let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
+    if found.snapshots.is_empty() {
+        row(&mut text, "snapshots", "none");
+    }
+    for snapshot in &found.snapshots {
+        let size = snapshot.files.iter().map(|file| file.path.as_path());
+        let told = match snapshot.check() {
+            Ok(()) => format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state),
+            Err(error) => error.to_string(),
+        };
+        row(&mut text, "snapshot", &format!("after step {}: {told}", snapshot.step()));
+    }
+    for error in found.unusable {
+        row(&mut text, "snapshot", &error.to_string());
+    }
+    Ok(text)
+}
+
+/// How far a run came.
+fn state(folder: &RunFolder, steps: u64) -> Result<String, EndedError> {
+    let Some(ended) = Ended::read(folder.path())? else {
+        return Ok(format!("to make {steps} steps; under way, or ended before it could say how"));
+    };
+    let how = if !ended.interrupted && ended.steps == steps { "complete," } else { "ended after" };
+    let hash = ended.state_hash.unwrap_or_default();
+    Ok(format!("{how} {} of {steps} steps: state hash {}", ended.steps, OneLine(&hash)))
+}
+
+fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
+    let Some(every) = every else { return Ok("none".to_owned()) };
+    let recording = match Recording::open(folder) {
+        Err(RecordingError::Nothing { .. }) => return Ok(format!("every {every} steps, none complete")),
+        recording => recording?,
+    };
+    let (steps, files) = (recording.steps(), recording.files());
+    let mut rows = Vec::new();
+    steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;
+    let last = steps.last().copied().unwrap_or_default();
+    let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
+    Ok(format!("{count} records, steps 0 to {last}, every {every}; {size} in {} files", files.len()))
+}
+
+fn of_snapshot(snapshot: &Snapshot) -> Result<String, SnapshotError> {
+    snapshot.check()?;
+    let (files, facts) = (&snapshot.files, &snapshot.files[0].facts);
+    let mut text =
+        format!("snapshot after step {}, written by {} ranks of atoll {}\n", facts.step, facts.ranks, facts.version);
+    blocks(&mut text, files.iter());
+    Ok(text)
+}
+
+fn of_snapshot_file(path: &Path) -> Result<String, SnapshotError> {
+    let file = SnapshotFile::open(path)?;
+    file.check()?;
+    let facts = &file.facts;
+    let (step, rank, ranks, version) = (facts.step, facts.rank, facts.ranks, &facts.version);
+    let mut text = format!("snapshot after step {step}: the part of rank {rank} of {ranks} of atoll {version}\n");
+    blocks(&mut text, iter::once(&file));
+    Ok(text)
+}
+
+/// What there is in files of a snapshot.
+fn blocks<'a>(text: &mut String, files: impl Iterator<Item = &'a SnapshotFile> + Clone) {
+    let all = || files.clone().flat_map(|file| &file.blocks);
+    let hashes = files.clone().map(SnapshotFile::hashes).fold(Default::default(), atoll_core::Hashes::merge);
+    let [bodies, contacts] = [all().map(|block| block.bodies).sum::<u64>(), all().map(|block| block.contacts).sum()];
+    row(text, "tiles", &format!("{} with {bodies} bodies and {contacts} contacts", all().count()));
+    row(text, "size", &megabytes(files.map(|file| file.path.as_path())));
+    row(text, "state hash", &format!("{:032x}", hashes.state));
+    row(text, "contact hash", &format!("{:032x}", hashes.contact));
+}
+
+fn of_segment(path: &Path) -> Result<String, RecordingError> {
+    let segment = Segment::open(path)?;
+    let (facts, records) = (&segment.facts, &segment.records);
+    let mut text = format!(
+        "recording of {}, seed {}: the part of rank {} of {}\n",
+        OneLine(&facts.scene),
+        facts.seed,
+        segment.rank,
+        segment.ranks
+    );
+    let steps: Vec<String> = records.iter().map(|record| record.step.to_string()).collect();
+    row(&mut text, "steps", &steps.join(" "));
+    row(&mut text, "rows", &records.iter().map(|record| record.rows).sum::<u64>().to_string());
+    row(&mut text, "size", &megabytes(iter::once(path)));
+    Ok(text)
+}
+
+fn row(text: &mut String, name: &str, value: &str) {
+    writeln!(text, "{name:<14}{value}").expect("a string takes any text");
+}
+
+fn megabytes<'a>(files: impl Iterator<Item = &'a Path>) -> String {
+    let bytes: u64 = files.map(|file| fs::metadata(file).map_or(0, |data| data.len())).sum();
+    format!("{:.2} MB", bytes as f64 * 1e-6)
+}

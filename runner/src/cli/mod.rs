@@ -1,0 +1,53 @@
+//! The program as a person meets it: the command line, the verbs, one file each, and what goes to the terminal.
+
+pub(crate) mod args;
+mod console;
+mod diff;
+mod info;
+mod interrupt;
+mod output;
+mod progress;
+mod run;
+
+use crate::error::{Exit, RunError};
+use args::{Cli, Command};
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::env;
+use std::process::ExitCode;
+
+/// Reads the command line and does what it says.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let result = console::init().and_then(|()| match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Diff(args) => diff::run(args),
+        Command::Info(args) => info::run(args),
+    });
+    let exit = result.unwrap_or_else(|error| {
+        if !matches!(error, RunError::ToldElsewhere { .. }) {
+            console::complain(&error);
+        }
+        // One code tells of all that keeps a comparison from its answer.
+        if matches!(cli.command, Command::Diff(_)) { Exit::Usage } else { error.exit() }
+    });
+    ExitCode::from(exit as u8)
+}
+
+/// Help and version as they are; complaints on one line.
+fn usage(error: &clap::Error) -> ExitCode {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            // Nobody may be reading; that is no failure.
+            let _ = error.print();
+            ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Done } as u8)
+        }
+        _ => {
+            console::complain(&args::one_line(error, env::args_os().nth(1).as_deref()));
+            ExitCode::from(Exit::Usage as u8)
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! `atoll run`: a scene from start to end, or from where an earlier run came to.
+
+use super::args::RunArgs;
+use super::console::{Console, complain};
+use super::interrupt::stop_on_signals;
+use super::output::{self, WholeFile};
+use super::progress::Show;
+use crate::config::Config;
+#[cfg(any(feature = "iceoryx2", feature = "mpi"))]
+use crate::config::TransportKind;
+use crate::error::{Exit, RunError};
+use crate::folder::{Claim, RunFolder};
+use crate::launch;
+use crate::plan::Plan;
+use crate::rank::Observer;
+#[cfg(feature = "iceoryx2")]
+use crate::rank::StopFlag;
+use crate::summary::{Summary, timings};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::{fs, io};
+
+/// Does it, with everything that can be refused refused before anything heavy starts.
+///
+/// # Errors
+/// Whatever ended it without a summary, or with one that fails a check or cannot be written.
+pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
+    #[cfg(feature = "iceoryx2")]
+    if let Some(rank) = launch::iceoryx2::RankProcess::of_this() {
+        let goes_on = rank.goes_on();
+        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on));
+        // Whoever signals all processes at once means what the launcher is about to say.
+        let stop = stop_on_signals(false, || {});
+        return Ok(rank.run(plan, Observer { stop, ..observer(args, goes_on) }));
+    }
+    let config = load(args, false);
+    #[cfg(feature = "mpi")]
+    if is_for_mpi(args, &config) {
+        return over_mpi(args, config);
+    }
+    let config = config?;
+    // First of all: what is in a folder may change while another run writes there.
+    let held = hold(args)?;
+    let outputs = Outputs::check(args)?;
+    let first = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
+    tell(&first);
+    #[cfg(feature = "iceoryx2")]
+    if first.transport == TransportKind::Iceoryx2 {
+        launch::iceoryx2::check(&first, &configuration(args, false))?;
+        let _claim = claim(&first, held)?;
+        let quit = StopFlag::default();
+        let second = quit.clone();
+        let stop = stop_on_signals(true, move || {
+            second.request();
+        });
+        let wishes = launch::iceoryx2::Wishes { stop, quit };
+        let run = |plan: &Plan, goes_on| launch::iceoryx2::run(plan, &wishes, goes_on);
+        return conclude(&supervise(args, &config, first, run, || wishes.stop.is_requested())?, &outputs);
+    }
+    let _claim = claim(&first, held)?;
+    let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
+    let run = |plan: &Plan, goes_on| launch::run(plan, &Observer { stop: stop.clone(), ..observer(args, goes_on) });
+    conclude(&supervise(args, &config, first, run, || stop.is_requested())?, &outputs)
+}
+
+/// Runs a plan, and where a rank is lost goes on from the last snapshot, as often as the user allows. `run` is told whether
+/// it goes on with what was begun before.
+fn supervise(
+    args: &RunArgs,
+    config: &Config,
+    first: Plan,
+    run: impl Fn(&Plan, bool) -> Result<Summary, RunError>,
+    stop_asked: impl Fn() -> bool,
+) -> Result<Summary, RunError> {
+    let (mut current, mut restarts) = (first, 0);
+    loop {
+        match run(&current, restarts > 0) {
+            Err(error) if error.exit() == Exit::PeerLost && restarts < args.restarts && !stop_asked() => {
+                restarts += 1;
+                complain(&format!("{error}; starting again ({restarts} of {} times)", args.restarts));
+            }
+            ended => return ended,
+        }
+        current = plan(args, config, true)?;
+        tell(&current);
+    }
+}
+
+/// The folder that the run writes to, if there is one.
+fn folder(args: &RunArgs) -> Option<RunFolder> {
+    let out = args.out.as_ref().map(|path| RunFolder::new("--out", path));
+    out.or_else(|| args.resume.as_ref().map(|path| RunFolder::new("--resume", path)))
+}
+
+/// The file that says what to run: the user's, or the one in the folder of the run that is to go on. One that was begun
+/// here has the latter, whatever became of the former.
+fn configuration(args: &RunArgs, goes_on: bool) -> PathBuf {
+    let own = folder(args).map(|folder| folder.configuration());
+    let file = if goes_on { own } else { args.config.clone().or(own) };
+    file.expect("either is required on the command line")
+}
+
+fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
+    if let (None, Some(folder)) = (&args.config, folder(args)) {
+        folder.check_begun()?;
+    }
+    Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?)
+}
+
+/// Works out what the arguments ask for; `goes_on` says that the run was begun before, with these arguments.
+fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError> {
+    match folder(args) {
+        Some(folder) if goes_on || args.resume.is_some() && folder.holds_run() => Plan::going_on(config, folder),
+        Some(folder) => Plan::beginning(config, folder),
+        None => Plan::new(config),
+    }
+}
+
+fn observer(args: &RunArgs, goes_on: bool) -> Observer {
+    let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
+    // What has been tried once is not tried again.
+    let panic_at = args.panic_at.filter(|_| !goes_on);
+    Observer { listener: Some(Arc::new(Console::new(show))), panic_at, ..Observer::default() }
+}
+
+/// What the user may want to know before the run starts.
+fn tell(plan: &Plan) {
+    for note in plan.notes() {
+        complain(&note);
+    }
+}
+
+/// Keeps other runs from the folder of this one, if it has one that is there.
+fn hold(args: &RunArgs) -> Result<Option<Claim>, RunError> {
+    let tell: &dyn Fn(&str) = &|text| complain(&text);
+    let Some(folder) = folder(args) else { return Ok(None) };
+    Ok(folder.hold(args.resume.is_some().then_some(tell))?)
+}
+
+/// Makes the folder of a run ready, if it has one.
+fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
+    plan.output.as_ref().map(|output| output.claim(held)).transpose()
+}
+
+/// Whether ranks are to be joined by MPI. Where the configuration cannot be read, the command line says so, or that a
+/// launcher started this process among others: then the ranks meet to complain once.
+#[cfg(feature = "mpi")]
+fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
+    match config {
+        Ok(config) => config.transport() == TransportKind::Mpi,
+        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched(),
+    }
+}
+
+/// Runs this process as a rank of an MPI job.
+#[cfg(feature = "mpi")]
+fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, RunError> {
+    let mut job = launch::mpi::Job::join(complain)?;
+    let speaks = job.speaks();
+    let held = job.all_well(if speaks && config.is_ok() { hold(args) } else { Ok(None) })?;
+    let prepared = config.and_then(|config| {
+        if args.restarts > 0 {
+            let reason = "with transport mpi, start again with --resume, as configs/slurm/ does".to_owned();
+            return Err(RunError::Ranks(format!("--restarts {}: {reason}", args.restarts)));
+        }
+        let config = job.adapt(config)?;
+        // Only the rank that speaks writes these.
+        let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
+        let plan = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
+        Ok((plan, outputs))
+    });
+    let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    let _claim = job.all_well(if speaks { claim(&plan, held) } else { Ok(None) })?;
+    if speaks {
+        tell(&plan);
+    }
+    // Silently: the launcher sends signals of its own when it ends a job.
+    let stop = stop_on_signals(false, || launch::mpi::Job::quit());
+    let concluded = match job.run(&plan, &Observer { stop, ..observer(args, false) })? {
+        Some(summary) => conclude(&summary, &outputs),
+        None => Ok(Exit::Done),
+    };
+    job.close();
+    concluded
+}
+
+/// Shows and writes what became of a run, and says with which exit code to end.
+fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
+    // All are tried before any is complained about: the one may save what another lost.
+    let json = |file: &Option<WholeFile>| file.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
+    let (folder, json) = (json(&outputs.folder), json(&outputs.json));
+    let timings =
+        outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
+    let shown = output::show(summary);
+    folder.and(json).and(timings).and(shown)?;
+
+    RunError::check_bodies(summary.bodies, summary.bodies_lost)?;
+    Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
+}
+
+/// The files to write when the run is over.
+#[derive(Default)]
+struct Outputs {
+    json: Option<WholeFile>,
+    timings: Option<WholeFile>,
+    /// The summary in the folder of the run.
+    folder: Option<WholeFile>,
+}
+
+impl Outputs {
+    /// Where an error says that a run is complete, its summary goes where this one's was to go. What is left to say then.
+    fn copy_summary(&self, error: RunError) -> RunError {
+        if let (RunError::Complete { summary, .. }, Some(json)) = (&error, &self.json) {
+            let failed = |error: io::Error| RunError::Output { path: summary.clone(), reason: error.to_string() };
+            if let Err(error) = fs::read(summary).map_err(failed).and_then(|bytes| json.write(&bytes)) {
+                return error;
+            }
+        }
+        error
+    }
+
+    /// Where the summary and the timings are to go, checked.
+    fn check(args: &RunArgs) -> Result<Self, RunError> {
+        if let Some(folder) = folder(args).filter(|folder| args.out.is_some() || !folder.holds_run()) {
+            folder.check_free(args.overwrite)?;
+        }
+        let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
+        let options = [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())];
+        let [json, timings] = WholeFile::check_two(options)?;
+        Ok(Self { json, timings, folder })
+    }
+}

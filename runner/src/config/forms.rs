@@ -1,0 +1,249 @@
+//! Forms of values: how each is read from what was given and written again. [`super::keys`] says which key has which.
+
+use super::error::{ConfigError, Origin};
+use super::sections::{Config, MOST_TILES, TransportKind};
+use super::settings::{Settings, one_of};
+use super::words::{self, Words, word_for};
+use crate::scene::SceneKind;
+use glam::Vec2;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+use toml::Value;
+
+/// The form of a value. It is kept in one field, which a function finds in a configuration.
+pub(super) trait Form: Sync {
+    /// Takes what was given for `key`, if anything was; else what there is stays.
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError>;
+
+    /// What a file would say; none where there is nothing to say. The configuration stays as it is.
+    fn write(&self, config: &mut Config) -> Option<Value>;
+}
+
+/// Where a value is kept.
+type Field<T> = fn(&mut Config) -> &mut T;
+
+/// Where a value is kept that only some scenes have.
+type FieldIfAny<T> = fn(&mut Config) -> Option<&mut T>;
+
+/// A number whose bounds the physics checks.
+pub(super) struct Float(pub(super) Field<f32>);
+
+impl Form for Float {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.float(key)?, (self.0)(config));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(float(*(self.0)(config)))
+    }
+}
+
+/// A number within bounds.
+pub(super) struct Number(pub(super) FieldIfAny<f64>, pub(super) RangeInclusive<f64>);
+
+impl Form for Number {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        if let Some(field) = (self.0)(config) {
+            keep(settings.number(key, self.1.clone())?, field);
+        }
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        (self.0)(config).map(|number| (*number).into())
+    }
+}
+
+/// A whole number within bounds, which may follow from what stands before it in the table, and which its type can hold.
+pub(super) struct Whole<T>(pub(super) FieldIfAny<T>, pub(super) fn(&Config) -> RangeInclusive<u64>);
+
+impl<T: Copy + TryFrom<u64> + TryInto<u64>> Form for Whole<T> {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        let range = (self.1)(config);
+        if let Some(field) = (self.0)(config) {
+            let given = settings.integer(key, range)?;
+            keep(given.and_then(|number| number.try_into().ok()), field);
+        }
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        (self.0)(config).and_then(|number| (*number).try_into().ok()).map(whole)
+    }
+}
+
+/// A whole number that need not be there.
+pub(super) struct OptionalWhole(pub(super) Field<Option<u64>>, pub(super) RangeInclusive<u64>);
+
+impl Form for OptionalWhole {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        *(self.0)(config) = settings.integer(key, self.1.clone())?;
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        (self.0)(config).map(whole)
+    }
+}
+
+/// One of some words.
+pub(super) struct Word<T: 'static>(pub(super) Field<T>, pub(super) Words<T>);
+
+impl<T: Copy + PartialEq + Sync> Form for Word<T> {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.choice(key, self.1)?, (self.0)(config));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(word_for(self.1, *(self.0)(config)).into())
+    }
+}
+
+/// One of some words, or none.
+pub(super) struct OptionalWord<T: 'static>(pub(super) Field<Option<T>>, pub(super) Words<T>);
+
+impl<T: Copy + PartialEq + Sync> Form for OptionalWord<T> {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        *(self.0)(config) = settings.choice(key, self.1)?;
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        (self.0)(config).map(|value| word_for(self.1, value).into())
+    }
+}
+
+/// True or false.
+pub(super) struct Flag(pub(super) Field<bool>);
+
+impl Form for Flag {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.flag(key)?, (self.0)(config));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some((*(self.0)(config)).into())
+    }
+}
+
+/// Two numbers.
+pub(super) struct Pair(pub(super) Field<Vec2>);
+
+impl Form for Pair {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.pair(key)?.map(Vec2::from), (self.0)(config));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some((self.0)(config).to_array().map(float).to_vec().into())
+    }
+}
+
+/// A length of time.
+pub(super) struct Seconds(pub(super) Field<Duration>, pub(super) RangeInclusive<f64>);
+
+impl Form for Seconds {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.number(key, self.1.clone())?.map(Duration::from_secs_f64), (self.0)(config));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some((self.0)(config).as_secs_f64().into())
+    }
+}
+
+/// Steps in a second, of which the inverse is kept.
+pub(super) struct Hertz;
+
+impl Form for Hertz {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        keep(settings.float(key)?.map(|hertz| 1.0 / hertz), &mut config.params.dt);
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(float(hertz(config.params.dt)))
+    }
+}
+
+/// The kind of scene, from which everything else that is usual follows: it stands first.
+pub(super) struct SceneWord;
+
+impl Form for SceneWord {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        let kinds = SceneKind::USUAL.map(|kind| (kind.name(), kind));
+        let chosen = settings.choice(key, &kinds)?;
+        *config = Config::usual(chosen.ok_or_else(|| settings.missing(key, one_of(&kinds)))?);
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(config.scene.kind.name().into())
+    }
+}
+
+/// How many ranks, and whether that was asked for on the command line.
+pub(super) struct Ranks;
+
+impl Form for Ranks {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        // Those of a cluster are for its launcher to limit.
+        let transport = settings.choice("run.transport", words::TRANSPORT)?;
+        let most = if transport == Some(TransportKind::Mpi) { u64::from(u32::MAX) } else { 1024 };
+        keep(settings.integer(key, 1..=most)?.map(|ranks| ranks as usize), &mut config.run.ranks);
+        let is_asked = |origin: &Origin| !matches!(origin, Origin::File(_));
+        config.run.ranks_asked_for = settings.given(key).is_some_and(|given| is_asked(&given.origin));
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(whole(config.run.ranks as u64))
+    }
+}
+
+/// Columns and rows of tiles, if they are chosen.
+pub(super) struct Tiles;
+
+impl Form for Tiles {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        config.run.tiles = settings.tiles(key, MOST_TILES)?;
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        config.run.tiles.map(|tiles| tiles.map(Value::from).to_vec().into())
+    }
+}
+
+fn keep<T>(given: Option<T>, field: &mut T) {
+    if let Some(value) = given {
+        *field = value;
+    }
+}
+
+/// A number of things as TOML has it. No key takes more than TOML can say.
+fn whole(number: u64) -> Value {
+    Value::Integer(number.try_into().unwrap_or(i64::MAX))
+}
+
+/// The shortest decimal that is read as this number.
+fn float(number: f32) -> Value {
+    let shortest: f64 = number.to_string().parse().expect("a number is written as one");
+    // A file's numbers are rounded twice, to 64 bits and then to 32. Of all numbers, 7.038531e-26 alone ends elsewhere.
+    let same = (shortest as f32).to_bits() == number.to_bits();
+    Value::Float(if same { shortest } else { number.into() })
+}
+
+/// The steps per second that a step of this length came from. Of several, the one that is shortest to write.
+fn hertz(dt: f32) -> f32 {
+    let nearest = 1.0 / dt;
+    // Each of two divisions rounds by at most half a unit. For every number there is, that makes one unit at most.
+    let near = [nearest, nearest.next_down(), nearest.next_up()];
+    let exact = near.into_iter().filter(|hertz| hertz.is_finite() && 1.0 / hertz == dt);
+    exact.min_by_key(|hertz| hertz.to_string().len()).unwrap_or(nearest)
+}

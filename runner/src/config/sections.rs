@@ -1,0 +1,125 @@
+//! What a configuration holds, section by section, and what is usual where nobody says.
+
+use crate::scene::{SceneKind, SceneSpec};
+use atoll_core::Params;
+use std::time::Duration;
+
+/// More tiles along an axis cannot be named in 32 bits for both.
+pub(crate) const MOST_TILES: u32 = 65_535;
+
+/// Everything a run depends on.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Config {
+    /// What there is at the start.
+    pub scene: SceneSpec,
+    /// How long, and on what.
+    pub run: RunConfig,
+    /// The numbers of a step.
+    pub params: Params,
+    /// What is written while it runs.
+    pub output: OutputConfig,
+}
+
+/// `[run]`
+#[derive(Clone, PartialEq, Debug)]
+pub struct RunConfig {
+    /// How many steps.
+    pub steps: u64,
+    /// How many ranks share the tiles. With transport mpi the launcher decides, and this is only what it should be.
+    pub ranks: usize,
+    /// Whether that number was asked for on the command line, so that another one is an error.
+    pub ranks_asked_for: bool,
+    /// Threads of each rank.
+    pub threads: usize,
+    /// What carries bytes between ranks; `None` chooses by their number.
+    pub transport: Option<TransportKind>,
+    /// Columns and rows of tiles; `None` chooses by scene and physics, never by ranks or threads.
+    pub tiles: Option<[u32; 2]>,
+    /// A rank that stays silent for so long is given up.
+    pub peer_timeout: Duration,
+    /// How ranks exchange messages with transport mpi.
+    pub mpi_exchange: MpiExchange,
+}
+
+/// `[output]`: of runs that were given a folder for it.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct OutputConfig {
+    /// The bodies are recorded every so many steps; `None` records nothing.
+    pub record_every: Option<u64>,
+    /// A snapshot to go on from is written every so many steps; `None` writes none.
+    pub checkpoint_every: Option<u64>,
+}
+
+/// How ranks exchange messages over MPI. Both ways give the same bits.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum MpiExchange {
+    /// `MPI_Ialltoallv`: right up to hundreds of ranks.
+    #[default]
+    Alltoallv,
+    /// Messages only between ranks that have some: right for thousands.
+    Sparse,
+}
+
+/// What carries bytes between ranks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TransportKind {
+    /// One rank, alone.
+    Local,
+    /// Ranks are threads of this process.
+    Channel,
+    /// Ranks are processes of this machine that share memory.
+    Iceoryx2,
+    /// Ranks are processes that an MPI launcher started.
+    Mpi,
+}
+
+impl TransportKind {
+    /// As in a configuration.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Channel => "channel",
+            Self::Iceoryx2 => "iceoryx2",
+            Self::Mpi => "mpi",
+        }
+    }
+
+    /// Whether this program was built with it.
+    pub fn is_built_in(self) -> bool {
+        match self {
+            Self::Local | Self::Channel => true,
+            Self::Iceoryx2 => cfg!(feature = "iceoryx2"),
+            Self::Mpi => cfg!(feature = "mpi"),
+        }
+    }
+}
+
+/// What is usual where nobody says.
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            steps: 600,
+            ranks: 1,
+            ranks_asked_for: false,
+            threads: 1,
+            transport: None,
+            tiles: None,
+            peer_timeout: Duration::from_secs(30),
+            mpi_exchange: MpiExchange::default(),
+        }
+    }
+}
+
+impl Config {
+    /// What is usual for a scene.
+    pub(super) fn usual(kind: SceneKind) -> Self {
+        let (run, output) = (RunConfig::default(), OutputConfig::default());
+        Self { scene: SceneSpec::usual(kind), run, params: kind.usual_params(), output }
+    }
+
+    /// The transport that was chosen, or the one that suits the number of ranks.
+    pub fn transport(&self) -> TransportKind {
+        let suitable = if self.run.ranks == 1 { TransportKind::Local } else { TransportKind::Channel };
+        self.run.transport.unwrap_or(suitable)
+    }
+}

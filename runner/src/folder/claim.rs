@@ -1,0 +1,162 @@
+//! Who may write to the folder of a run: all processes of one run, and nobody else.
+
+use super::durable::{create_folder_durably, write_durably};
+use super::{FolderError, RunFolder};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::process;
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Ranks of a run whose launcher was killed end by themselves, and file systems of a network free the locks of a lost
+/// host after a while; so long they are given.
+const LINGERING: Duration = Duration::from_secs(100);
+
+/// Between two looks at whether they have.
+const POLL: Duration = Duration::from_millis(20);
+
+/// The right to write to the folder of a run, as long as this lives. Processes of one run share it.
+#[derive(Debug)]
+pub struct Claim {
+    _lock: Option<File>,
+}
+
+impl RunFolder {
+    /// Keeps other runs from writing here, if there is such a folder. Where it is given whom to tell, as for a run that is
+    /// to go on, it waits for one that is about to end.
+    ///
+    /// # Errors
+    /// If another run writes here, or nobody can.
+    pub fn hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Option<Claim>, FolderError> {
+        // What is no run, and cannot become one, is left as it is.
+        if !self.path().is_dir() || !self.holds_run() && self.check_free(false).is_err() {
+            return Ok(None);
+        }
+        let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
+        let deadline = Instant::now() + if waiting.is_some() { LINGERING } else { Duration::ZERO };
+        let mut told = false;
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
+                    if let Some(tell) = waiting.filter(|_| !std::mem::replace(&mut told, true)) {
+                        tell(&format!("{}: waiting for the run that still writes there", self.path().display()));
+                    }
+                    sleep(POLL);
+                }
+                Err(TryLockError::WouldBlock) => {
+                    return Err(self.refusal("another run is writing there; wait for its end, or stop it"));
+                }
+                // A file system without locks; then nobody can tell.
+                Err(TryLockError::Error(_)) => return Ok(Some(Claim { _lock: None })),
+            }
+        }
+        // From now on it is shared with the other processes of the run.
+        let shared = lock.lock_shared().is_ok();
+        Ok(Some(Claim { _lock: Some(lock).filter(|_| shared) }))
+    }
+
+    /// Makes the folder that of a run about to begin or to go on: what an overwritten run left is gone, and the configuration
+    /// is there. `held` is what [`hold`](Self::hold) gave before the folder was looked at.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run has begun there meanwhile.
+    pub fn claim(&self, held: Option<Claim>, begins: bool, configuration: &str) -> Result<Claim, FolderError> {
+        let failed = |error: io::Error| self.not_writable(&error);
+        let claim = match held {
+            Some(claim) => claim,
+            None => {
+                create_folder_durably(self.path()).map_err(failed)?;
+                let claim = self.hold(None)?;
+                self.check_free(false)?;
+                claim.ok_or_else(|| self.refusal("it was removed while the run began; try again"))?
+            }
+        };
+        if begins {
+            self.remove_after(None).map_err(failed)?;
+        }
+        let write = |file: &mut File| file.write_all(configuration.as_bytes());
+        write_durably(&self.configuration(), write).map_err(failed)?;
+        // Nobody else has ever written this.
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        fs::write(self.lock(), format!("{} {now}\n", process::id())).map_err(failed)?;
+        Ok(claim)
+    }
+
+    /// What tells the folder from any other, once a run has claimed it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn token(&self) -> io::Result<Vec<u8>> {
+        fs::read(self.lock())
+    }
+
+    /// Takes part in a claim that another process of this run made, which told the token. Waits for that to be seen here, but
+    /// no longer than `patience`.
+    ///
+    /// # Errors
+    /// If the folder here is another one: hosts of a cluster must see the same files.
+    pub fn share(&self, token: &[u8], patience: Duration) -> Result<Claim, FolderError> {
+        let deadline = Instant::now() + patience;
+        let reason = loop {
+            let reason = match self.token() {
+                Ok(found) if found == token && !token.is_empty() => {
+                    let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
+                    return Ok(Claim { _lock: lock });
+                }
+                Ok(_) => "it is not the folder that rank 0 writes to".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            if Instant::now() > deadline {
+                break reason;
+            }
+            sleep(POLL);
+        };
+        Err(self.refusal(format!("{reason}; every process of a run must see the same folder")))
+    }
+
+    fn open_lock(&self) -> io::Result<File> {
+        // Some file systems share only what can be read.
+        File::options().create(true).truncate(false).read(true).write(true).open(self.lock())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use tempfile::tempdir;
+
+    fn configuration() -> String {
+        Config::from_toml_str("test", "[scene]\nkind = \"rooms\"\n", &[]).unwrap().to_toml([2, 2])
+    }
+
+    #[test]
+    fn one_run_at_a_time_and_all_its_processes() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--out", &folder.path().join("new"));
+        assert!(run.hold(None).unwrap().is_none());
+        let claim = run.claim(None, true, &configuration()).unwrap();
+        let token = run.token().unwrap();
+        let shared = run.share(&token, Duration::ZERO).unwrap();
+        // A folder of the same name on another host has another, and a broken one none.
+        for other in [&b"7 7\n"[..], b""] {
+            let told = run.share(other, Duration::ZERO).unwrap_err().to_string();
+            assert!(
+                told.contains("it is not the folder that rank 0 writes to; every process of a run must see"),
+                "{told}"
+            );
+        }
+        let told = run.hold(None).unwrap_err().to_string();
+        assert!(told.contains("another run is writing there"), "{told}");
+        drop(claim);
+        assert!(run.hold(None).is_err());
+        drop(shared);
+        let held = run.hold(None).unwrap();
+        assert!(held.is_some());
+        // Who comes later finds what was begun meanwhile.
+        drop(held);
+        let told = run.claim(None, true, "").unwrap_err().to_string();
+        assert!(told.contains("it holds a run"), "{told}");
+    }
+}

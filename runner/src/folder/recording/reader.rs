@@ -1,0 +1,202 @@
+//! Reads the segments of all ranks as one sequence of records.
+
+use super::facts::RunFacts;
+use super::record::Row;
+use super::segment::Segment;
+use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
+use crate::folder::ended::Ended;
+use std::fs;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// A recording. Its files are opened as they are needed, never all at once.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    folder: PathBuf,
+    facts: RunFacts,
+    files: Vec<PathBuf>,
+    /// By step and rank.
+    parts: Vec<Part>,
+    steps: Vec<u64>,
+    incomplete: usize,
+    ended: Option<Ended>,
+}
+
+/// What one rank recorded of one step.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    step: u64,
+    rank: u32,
+    ranks: u32,
+    rows: u64,
+    file: usize,
+}
+
+impl Recording {
+    /// Reads what all segments say about themselves, and no rows.
+    ///
+    /// # Errors
+    /// If there are no records, a file cannot be read, files do not go together, or one is missing. What is missing after
+    /// the last complete record is what a killed run lost, and no error, unless the run's summary says that it came further.
+    pub fn open(folder: &Path) -> Result<Self, RecordingError> {
+        let (mut files, mut parts) = (Vec::new(), Vec::new());
+        // Of the first file, to compare with, and of the last step, which is what the run came to be.
+        let (mut first, mut last) = (None, None);
+        for (rank, path) in segments(folder)? {
+            let segment = Segment::open(&path)?;
+            if segment.rank != rank {
+                let reason = format!("it is of rank {}", segment.rank);
+                return Err(RecordingError::BadSegment { path, reason });
+            }
+            let first = first.get_or_insert_with(|| segment.facts.clone());
+            if let Some(what) = first.other_run(&segment.facts) {
+                let paths = [files.swap_remove(0), path];
+                return Err(RecordingError::OtherRun { paths, what });
+            }
+            let (ranks, file) = (segment.ranks, files.len());
+            parts.extend(segment.records.iter().map(|record| {
+                let (step, rows) = (record.step, record.rows);
+                Part { step, rank, ranks, rows, file }
+            }));
+            let step = parts.last().map(|part| part.step);
+            if last.as_ref().is_none_or(|(latest, _)| *latest < step) {
+                last = Some((step, segment.facts));
+            }
+            files.push(path);
+        }
+        let nothing = || RecordingError::Nothing { path: folder.to_owned() };
+        let (_, facts) = last.ok_or_else(nothing)?;
+        parts.sort_by_key(|part| (part.step, part.rank));
+        let (folder, ended) = (folder.to_owned(), Ended::read(folder)?);
+        let mut recording = Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended };
+        (recording.steps, recording.incomplete) = recording.find_complete()?;
+        if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
+    }
+
+    /// The folder it is in.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The run it is of; of one that was taken up again, as it was in the end.
+    pub fn facts(&self) -> &RunFacts {
+        &self.facts
+    }
+
+    /// Its segments.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// The steps of the records, ascending.
+    pub fn steps(&self) -> &[u64] {
+        &self.steps
+    }
+
+    /// Steps after the last record that only some ranks hold: the run was killed before all had written them.
+    pub fn incomplete(&self) -> usize {
+        self.incomplete
+    }
+
+    /// What the run's summary says, once it has ended.
+    pub fn ended(&self) -> Option<&Ended> {
+        self.ended.as_ref()
+    }
+
+    /// Replaces `rows` with the bodies of one record: those of each rank in turn, in the order of its tiles.
+    ///
+    /// # Errors
+    /// If there is no such record, or its files are damaged.
+    pub fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
+        rows.clear();
+        if self.steps.binary_search(&step).is_err() {
+            return Err(RecordingError::NoSuchStep { path: self.folder.clone(), step });
+        }
+        let parts = &self.parts[self.parts_of(step)];
+        let count = parts.iter().try_fold(0_u64, |sum, part| sum.checked_add(part.rows));
+        let fits = count.and_then(|count| rows.try_reserve_exact(usize::try_from(count).ok()?).ok());
+        fits.ok_or_else(|| {
+            let reason = format!("step {step} has more rows than this machine can hold");
+            RecordingError::Read { path: self.folder.clone(), reason }
+        })?;
+        for part in parts.iter().filter(|part| part.rows > 0) {
+            Segment::open(&self.files[part.file])?.read(step, rows)?;
+        }
+        Ok(())
+    }
+
+    fn parts_of(&self, step: u64) -> Range<usize> {
+        let start = self.parts.partition_point(|part| part.step < step);
+        start..start + self.parts[start..].partition_point(|part| part.step == step)
+    }
+
+    /// The steps that all ranks hold, none of which may be missing, and how many only some hold.
+    fn find_complete(&self) -> Result<(Vec<u64>, usize), RecordingError> {
+        let (mut complete, mut incomplete) = (Vec::new(), 0);
+        for parts in self.parts.chunk_by(|a, b| a.step == b.step) {
+            self.check_together(parts)?;
+            // They are of different ranks, and each of those is one of the run's.
+            if parts.len() == parts[0].ranks as usize {
+                complete.push(parts[0].step);
+            } else {
+                incomplete += 1;
+            }
+        }
+        let every = self.facts.record_every;
+        let told = self.ended.as_ref().map(|ended| ended.steps - ended.steps % every);
+        let last = complete.last().copied().max(told);
+        let unbroken = complete.iter().zip(0..).take_while(|(step, count)| **step == count * every).count();
+        let missing = unbroken as u64 * every;
+        if last.is_some_and(|last| missing <= last) {
+            return Err(RecordingError::Missing { folder: self.place_of_missing(missing), step: missing });
+        }
+        Ok((complete, incomplete))
+    }
+
+    /// Whether the parts of one step are those of different ranks of one run.
+    fn check_together(&self, parts: &[Part]) -> Result<(), RecordingError> {
+        for pair in parts.windows(2) {
+            let (step, paths) = (pair[0].step, || [0, 1].map(|i| self.files[pair[i].file].clone()));
+            let ranks = [pair[0].ranks, pair[1].ranks];
+            if ranks[0] != ranks[1] {
+                return Err(RecordingError::OtherRanks { paths: paths(), ranks, step });
+            }
+            if pair[0].rank == pair[1].rank {
+                return Err(RecordingError::Twice { paths: paths(), step });
+            }
+        }
+        Ok(())
+    }
+
+    /// The folder of the first rank that should hold a step; that of the run, if none does.
+    fn place_of_missing(&self, step: u64) -> PathBuf {
+        let parts = &self.parts[self.parts_of(step)];
+        let held = parts.iter().zip(0..).take_while(|(part, rank)| part.rank == *rank).count();
+        if parts.is_empty() { self.folder.clone() } else { rank_folder(&self.folder, held as u32) }
+    }
+}
+
+/// All complete segments of a run, with the ranks in whose folders they are, in a fixed order.
+fn segments(folder: &Path) -> Result<Vec<(u32, PathBuf)>, RecordingError> {
+    let mut segments = Vec::new();
+    for name in names(folder)? {
+        let Some(rank) = rank_of_folder(&name) else { continue };
+        let of_rank = folder.join(name);
+        let files = names(&of_rank)?;
+        let files = files.iter().filter(|name| steps_of_segment(name).is_some());
+        segments.extend(files.map(|name| (rank, of_rank.join(name))));
+    }
+    Ok(segments)
+}
+
+/// The names in a folder, in order. Whatever is not Unicode is not ours.
+fn names(folder: &Path) -> Result<Vec<String>, RecordingError> {
+    let read = || {
+        let entries = fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().into_string().ok()));
+        let mut names: Vec<String> = entries.filter_map(io::Result::transpose).collect::<io::Result<_>>()?;
+        names.sort();
+        Ok(names)
+    };
+    read().map_err(|error: io::Error| RecordingError::Read { path: folder.to_owned(), reason: error.to_string() })
+}

@@ -1,0 +1,211 @@
+//! A folder as that of a run: what lies where, and what is there when a run begins or goes on.
+
+use super::durable::is_temporary;
+use super::{FolderError, recording, snapshot};
+use crate::config::{Config, Difference, is_resolved, other_run};
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// The name of what every process of a run holds.
+const LOCK: &str = "lock";
+
+/// A folder that is, or is to be, that of a run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// What it was given with.
+    option: &'static str,
+}
+
+impl RunFolder {
+    /// The folder at a path, whatever is there, which was given with an option.
+    pub fn new(option: &'static str, path: &Path) -> Self {
+        Self { path: path.to_owned(), option }
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The resolved configuration.
+    pub fn configuration(&self) -> PathBuf {
+        self.path.join("run.toml")
+    }
+
+    /// The closing figures.
+    pub fn summary(&self) -> PathBuf {
+        self.path.join("summary.json")
+    }
+
+    /// The snapshots.
+    pub fn snapshots(&self) -> PathBuf {
+        self.path.join("snapshots")
+    }
+
+    /// What every process of a run holds.
+    pub(super) fn lock(&self) -> PathBuf {
+        self.path.join(LOCK)
+    }
+
+    /// What a rank records.
+    pub fn rank(&self, rank: u32) -> PathBuf {
+        recording::rank_folder(&self.path, rank)
+    }
+
+    /// Whether a run was begun here: the configuration is one that a run wrote.
+    pub fn holds_run(&self) -> bool {
+        fs::read_to_string(self.configuration()).is_ok_and(|text| is_resolved(&text))
+    }
+
+    /// Refuses a folder in which no run can begin, before anything is done to it.
+    ///
+    /// # Errors
+    /// If it holds anything, unless that is a run and `overwrite` is true, or cannot be looked at.
+    pub fn check_free(&self, overwrite: bool) -> Result<(), FolderError> {
+        if self.holds_run() {
+            let how = "go on with that with --resume, replace it with --overwrite, or name another folder";
+            return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
+        }
+        let is_ours = |name: &OsStr| name == LOCK || self.is_unfinished(name);
+        match fs::read_dir(&self.path).map(|mut all| all.all(|entry| entry.is_ok_and(|one| is_ours(&one.file_name()))))
+        {
+            // A run that was killed before it began leaves a little.
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.refusal("it is not empty, and what it holds is no run; name another folder")),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            Err(error) => Err(self.refusal(format!("{error}; name a folder"))),
+        }
+    }
+
+    /// Whether a file of that name in here is one that a killed run did not finish.
+    fn is_unfinished(&self, name: &OsStr) -> bool {
+        [self.configuration(), self.summary()].iter().any(|path| is_temporary(name, path))
+    }
+
+    /// Refuses a folder in which no run was begun.
+    ///
+    /// # Errors
+    /// If none was.
+    pub fn check_begun(&self) -> Result<(), FolderError> {
+        let begin = "no run was begun there; begin one with `atoll run CONFIG --out DIR`";
+        if self.holds_run() { Ok(()) } else { Err(self.refusal(begin)) }
+    }
+
+    /// Refuses to go on with a run that is configured otherwise than the one here. More steps, or fewer, are no other run.
+    ///
+    /// # Errors
+    /// Naming the first key that differs; or if no run was begun here.
+    pub fn check_same_run(&self, config: &Config, tiles: [u32; 2]) -> Result<(), FolderError> {
+        self.check_begun()?;
+        let begun = Config::load_begun(&self.configuration())?;
+        other_run(&config.identity(tiles), &begun.identity(tiles_of(&begun))).map_or(Ok(()), |difference| {
+            let Difference { key, ours, theirs } = difference;
+            Err(self.refusal(format!("{key} = {theirs} there, and {ours} here; only how a run is spread can change")))
+        })
+    }
+
+    /// That this folder cannot be used.
+    pub fn refusal(&self, reason: impl ToString) -> FolderError {
+        FolderError::Unusable { option: self.option, path: self.path.clone(), reason: reason.to_string() }
+    }
+
+    /// That nothing can be written or removed here.
+    pub fn not_writable(&self, error: &io::Error) -> FolderError {
+        self.refusal(format!("{error}; name a folder that can be written to"))
+    }
+
+    /// Removes what a run left after `step`, as it goes on from there; everything but the configuration if there is no such
+    /// step.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn remove_after(&self, step: Option<u64>) -> io::Result<()> {
+        for entry in fs::read_dir(&self.path)? {
+            let entry = entry?;
+            if entry.path() == self.summary() || self.is_unfinished(&entry.file_name()) {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        snapshot::remove_after(&self.snapshots(), step)?;
+        recording::remove_after(&self.path, step)
+    }
+}
+
+/// The tile grid in the configuration of a folder, where it is always given.
+fn tiles_of(config: &Config) -> [u32; 2] {
+    config.run.tiles.unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tempfile::tempdir;
+
+    fn config(overrides: &[(&str, &str)]) -> Config {
+        let text = "[scene]\nkind = \"rooms\"\n[run]\ntiles = [2, 2]\n[output]\nrecord_every = 5\n";
+        Config::from_toml_str("test", text, overrides).unwrap()
+    }
+
+    fn folder(files: &[&str]) -> (tempfile::TempDir, RunFolder) {
+        let folder = tempdir().unwrap();
+        let configuration = config(&[]).to_toml([2, 2]);
+        files.iter().for_each(|name| fs::write(folder.path().join(name), &configuration).unwrap());
+        let run = RunFolder::new("--out", folder.path());
+        (folder, run)
+    }
+
+    #[test]
+    fn runs_begin_in_empty_folders_and_over_runs() {
+        let refused = |files: &[&str], overwrite| {
+            let (_folder, run) = folder(files);
+            run.check_free(overwrite).err().map(|error| error.to_string())
+        };
+        assert_eq!(refused(&[], false), None);
+        assert_eq!(refused(&["lock", ".run.toml.123.tmp"], false), None);
+        assert_eq!(refused(&["run.toml", "summary.json"], true), None);
+        for (files, overwrite, expected) in [
+            (&["run.toml", "lock"][..], false, "it holds a run; go on with that with --resume"),
+            (&["lock", "thesis.tex"], true, "it is not empty, and what it holds is no run"),
+            (&[".thesis.tex.1.tmp"], true, "it is not empty, and what it holds is no run"),
+        ] {
+            let told = refused(files, overwrite).unwrap();
+            assert!(told.starts_with("--out /") && told.contains(expected), "{told}");
+        }
+        let (_folder, run) = folder(&["file"]);
+        let file = RunFolder::new("--out", &run.path().join("file"));
+        // A person's own is no run.
+        fs::write(run.configuration(), "[scene]\nkind = \"rooms\"\n").unwrap();
+        assert!(run.check_free(true).unwrap_err().to_string().contains("what it holds is no run"));
+        assert!(file.check_free(true).unwrap_err().to_string().contains("name a folder"));
+    }
+
+    #[test]
+    fn what_ended_runs_left_is_removed() {
+        let (folder, run) = folder(&["run.toml", "summary.json", ".summary.json.7.tmp", "notes", "lock"]);
+        run.remove_after(Some(3)).unwrap();
+        let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["lock", "notes", "run.toml"]);
+    }
+
+    #[test]
+    fn another_run_is_told_by_what_differs() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--resume", folder.path());
+        let check = |overrides| run.check_same_run(&config(overrides), [2, 2]).map_err(|error| error.to_string());
+        assert!(check(&[]).unwrap_err().contains("no run was begun there"));
+        run.claim(None, true, &config(&[]).to_toml([2, 2])).unwrap();
+        check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
+        // Wherever it was begun.
+        let begun = fs::read_to_string(run.configuration()).unwrap();
+        fs::write(run.configuration(), begun.replace("[run]", "[run]\ntransport = \"mpi\"")).unwrap();
+        check(&[("transport", "channel")]).unwrap();
+        let told = check(&[("seed", "4")]).unwrap_err();
+        assert!(told.contains("scene.seed = 1 there, and 4 here"), "{told}");
+        let told = check(&[("record_every", "4")]).unwrap_err();
+        assert!(told.contains("output.record_every = 5 there, and 4 here"), "{told}");
+    }
+}

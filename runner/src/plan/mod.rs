@@ -1,0 +1,235 @@
+//! What every rank of a run must know alike, worked out once before any of them starts.
+
+mod advice;
+mod assignment;
+mod memory;
+pub(crate) mod tiles;
+
+pub(crate) use assignment::Assignment;
+
+use crate::config::{Config, OutputConfig, TransportKind};
+use crate::error::RunError;
+use crate::folder::snapshot::{self, Found, Snapshot};
+use crate::folder::{Claim, Ended, RunFolder};
+use crate::scene::Scene;
+use atoll_core::{Blueprint, TileGrid, World};
+
+/// A configuration, checked and resolved.
+#[derive(Debug)]
+pub struct Plan {
+    /// The configuration itself.
+    pub config: Config,
+    /// The start.
+    pub scene: Scene,
+    /// Everything about the world but its bodies.
+    pub blueprint: Blueprint,
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// Which rank holds which tiles.
+    pub assignment: Assignment,
+    /// What carries the bytes.
+    pub transport: TransportKind,
+    /// What is written while it runs, if anything is.
+    pub output: Option<Output>,
+    /// Where it can go on from; nothing if it begins.
+    pub found: Found,
+}
+
+/// What a run writes to its folder.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// Where to.
+    pub folder: RunFolder,
+    /// The folder's configuration, every value resolved.
+    pub configuration: String,
+    /// How often.
+    pub every: OutputConfig,
+    /// Whether the run begins there, or goes on.
+    pub begins: bool,
+}
+
+impl Output {
+    /// Makes the folder that of this run. `held` is what [`RunFolder::hold`] gave before the plan was made.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run writes there.
+    pub fn claim(&self, held: Option<Claim>) -> Result<Claim, RunError> {
+        Ok(self.folder.claim(held, self.begins, &self.configuration)?)
+    }
+}
+
+fn scene_and_tiles(config: &Config) -> (Scene, [u32; 2]) {
+    let scene = Scene::new(&config.scene);
+    let tiles = tiles::tile_counts(config, &scene);
+    (scene, tiles)
+}
+
+impl Plan {
+    /// Works it all out. Takes a look at every body where the tiles are to be shared among ranks. Nothing is written.
+    ///
+    /// # Errors
+    /// If no world can be made of it.
+    pub fn new(config: &Config) -> Result<Self, RunError> {
+        Self::begin(config, None)
+    }
+
+    /// A run that begins in a folder and writes there.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn beginning(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
+        Self::begin(config, Some(folder))
+    }
+
+    fn begin(config: &Config, folder: Option<RunFolder>) -> Result<Self, RunError> {
+        let (scene, tiles) = scene_and_tiles(config);
+        Self::from_found(config, scene, tiles, Found::default(), folder.map(|folder| (folder, true)))
+    }
+
+    /// A run that goes on in a folder, from the newest snapshot that is whole; from the start if none was complete when
+    /// the run ended.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and if what the folder holds is another run, or cannot be gone on with.
+    pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
+        let (scene, tiles) = scene_and_tiles(config);
+        folder.check_same_run(config, tiles)?;
+        let (steps, ended) = (config.run.steps, Ended::read(folder.path())?);
+        if let Some(ended) = ended.as_ref().filter(|ended| !ended.interrupted && ended.steps == steps) {
+            RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
+            return Err(RunError::Complete { summary: folder.summary(), steps });
+        }
+        let ended = ended.map(|ended| ended.steps);
+        let mut found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
+        let newest = found.snapshots.first().map(Snapshot::step);
+        if newest == Some(steps) {
+            // So that there is a step to make, of which the summary tells. If the others are damaged, there is none.
+            found.snapshots.rotate_left(1);
+        }
+        if let Some(made) = newest.max(ended).filter(|&made| made > steps) {
+            let reason = format!("{made} steps are made there already, and {steps} asked for");
+            return Err(folder.refusal(format!("{reason}; give --steps as many or more")).into());
+        }
+        if let (Some(made), None) = (ended, newest) {
+            let reason = format!("{made} steps of this run are made, and there is no snapshot to go on from");
+            return Err(folder.refusal(format!("{reason}; begin another run with --out")).into());
+        }
+        Self::from_found(config, scene, tiles, found, Some((folder, false)))
+    }
+
+    /// `folder` is written to, and says whether the run begins there.
+    fn from_found(
+        config: &Config,
+        scene: Scene,
+        tiles: [u32; 2],
+        found: Found,
+        folder: Option<(RunFolder, bool)>,
+    ) -> Result<Self, RunError> {
+        let transport = config.transport();
+        let ranks = config.run.ranks as u64;
+        // Of an MPI job the others may be anywhere.
+        let here = if transport == TransportKind::Mpi { 1 } else { ranks };
+        memory::check(
+            scene.bodies(),
+            u64::from(tiles[0]) * u64::from(tiles[1]),
+            ranks,
+            here,
+            folder.is_some().then_some(&config.output),
+        )?;
+        let (low, high) = scene.domain();
+        let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
+        let params = config.params.clone();
+        let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
+        // An empty world costs nothing and checks the blueprint for all of them.
+        World::new(&blueprint, &[])?;
+
+        let ranks = config.run.ranks;
+        let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
+            let mut weights = vec![0; blueprint.grid.tiles()];
+            if ranks > 1 {
+                scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
+            }
+            weights
+        });
+        let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
+        let output = folder.map(|(folder, begins)| Output {
+            folder,
+            configuration: config.to_toml(tiles),
+            every: config.output,
+            begins,
+        });
+        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output, found })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Exit;
+
+    const ROOMS: &str = "[scene]\nkind = \"rooms\"\nbodies = 2000\n";
+
+    fn plan(overrides: &[(&str, &str)]) -> Plan {
+        Plan::new(&Config::from_toml_str("test", ROOMS, overrides).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn islands_sleep_within_one_tile() {
+        let config = |overrides| Config::from_toml_str("test", ROOMS, overrides).unwrap();
+        let error = Plan::new(&config(&[("sleep", "true"), ("tiles", "2x3")])).unwrap_err();
+        assert!(error.to_string().contains("sleep = true on 6 tiles"), "{error}");
+        assert_eq!(plan(&[("sleep", "true"), ("bodies", "50000")]).tiles, [1, 1]);
+    }
+
+    #[test]
+    fn what_a_run_made_is_never_taken_for_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = RunFolder::new("--resume", folder.path());
+        let config = |steps| Config::from_toml_str("test", ROOMS, &[("tiles", "2x2"), ("steps", steps)]).unwrap();
+        std::fs::write(run.configuration(), config("60").to_toml([2, 2])).unwrap();
+        let on = |steps, summary: &str| {
+            std::fs::write(run.summary(), summary).unwrap();
+            Plan::going_on(&config(steps), run.clone()).unwrap_err()
+        };
+        // It has left a snapshot, wherever that is now.
+        let interrupted = r#"{"steps": 40, "interrupted": true}"#;
+        let told = on("60", interrupted).to_string();
+        assert!(told.contains("40 steps of this run are made, and there is no snapshot to go on from"), "{told}");
+        let told = on("30", interrupted).to_string();
+        assert!(told.contains("40 steps are made there already, and 30 asked for"), "{told}");
+        let failed = on("60", r#"{"steps": 60, "interrupted": false, "bodies": 2000, "bodies_lost": 3}"#);
+        assert_eq!(failed.exit(), Exit::Physics, "{failed}");
+        assert!(failed.to_string().contains("1997 bodies at the end of a world of 2000"), "{failed}");
+        let complete = on("60", r#"{"steps": 60, "interrupted": false, "bodies": 2000, "bodies_lost": 0}"#);
+        assert_eq!(complete.exit(), Exit::Done, "{complete}");
+        std::fs::remove_file(run.summary()).unwrap();
+        Plan::going_on(&config("60"), run).unwrap();
+    }
+
+    #[test]
+    fn the_hash_leaves_out_how_and_keeps_what() {
+        let hash = |overrides: &[(&str, &str)]| {
+            let plan = plan(overrides);
+            plan.config.hash(plan.tiles)
+        };
+        let usual = hash(&[]);
+        assert_eq!(usual.len(), 32);
+        for how in [
+            ("ranks", "3"),
+            ("threads", "2"),
+            ("transport", "channel"),
+            ("peer_timeout", "5"),
+            ("tiles", "1x1"),
+            ("broad_phase", "quadtree"),
+            ("islands", "dfs"),
+            ("parallel", "coloring"),
+        ] {
+            assert_eq!(hash(&[how]), usual, "{how:?}");
+        }
+        for what in
+            [("seed", "2"), ("steps", "9"), ("bodies", "2001"), ("tiles", "2x1"), ("power", "1.2"), ("hertz", "90")]
+        {
+            assert_ne!(hash(&[what]), usual, "{what:?}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! How a rank begins: with its part of the scene, or of a snapshot.
+
+use super::trouble::{Refusal, all_well};
+use super::{Observer, RankError};
+use crate::error::RunError;
+use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
+use crate::plan::Plan;
+use atoll_core::World;
+use atoll_transport::{Rank, Transport};
+use tracing::info;
+
+/// A world about to be stepped.
+pub(super) struct Beginning {
+    pub(super) world: World,
+    /// The step after which it was saved, if it was.
+    pub(super) resumed: Option<u64>,
+}
+
+/// This rank's part of the newest snapshot of which every rank can read its part, or else of the scene.
+pub(super) fn build(
+    plan: &Plan,
+    rank: Rank,
+    observer: &Observer,
+    transport: &mut impl Transport,
+) -> Result<Beginning, RankError> {
+    let mut snapshots = plan.found.snapshots.iter().peekable();
+    while let Some(snapshot) = snapshots.next() {
+        let restored = restore(plan, rank, snapshot)?.map_err(RunError::Snapshot);
+        let is_damage = |error: &&RunError| matches!(error, RunError::Snapshot(error) if error.is_damage());
+        // What cannot be read just now is no reason to give it up.
+        all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
+        let error = match (all_well(transport, restored.as_ref().err()), restored) {
+            (Ok(()), Ok(world)) => return Ok(Beginning { world, resumed: Some(snapshot.step()) }),
+            (Ok(()), Err(error)) | (Err(Refusal::Known(error)), _) => error,
+            (Err(refusal), _) => return Err(refusal.into()),
+        };
+        let Some(next) = snapshots.peek().map(|next| next.step()) else {
+            return Err(RankError::Agreed { text: format!("{error}; {NO_OTHER}"), exit: error.exit() });
+        };
+        if rank == Rank(0) {
+            observer.note(&format!("{error}; going on after step {next} instead"));
+        }
+    }
+    Ok(Beginning { world: scene(plan, rank)?, resumed: None })
+}
+
+/// This rank's tiles of a snapshot. That they cannot be read is for all ranks to hear.
+fn restore(plan: &Plan, rank: Rank, snapshot: &Snapshot) -> Result<Result<World, SnapshotError>, RankError> {
+    let mut world = World::new(&plan.blueprint, &plan.assignment.tiles_of(rank.index())).map_err(RankError::Setup)?;
+    let restored = snapshot.restore(&mut world);
+    if restored.is_ok() {
+        info!(step = snapshot.step(), bodies = world.bodies().count(), "restored");
+    }
+    Ok(restored.map(|()| world))
+}
+
+/// This rank's part of the scene.
+fn scene(plan: &Plan, rank: Rank) -> Result<World, RankError> {
+    let tiles = plan.assignment.tiles_of(rank.index());
+    let mut world = World::new(&plan.blueprint, &tiles).map_err(RankError::Setup)?;
+    let mut bodies = 0_u64;
+    if !tiles.is_empty() {
+        for body in plan.scene.iter() {
+            bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
+        }
+    }
+    info!(tiles = tiles.len(), bodies, "built");
+    Ok(world)
+}

@@ -1,0 +1,90 @@
+//! The beginning and the end of what a rank writes, which ranks come to together.
+
+use super::recorder::Recorder;
+use super::trouble::all_well;
+use super::{Observer, RankError};
+use crate::error::RunError;
+use crate::folder::{RunFolder, snapshot};
+use crate::plan::{Output, Plan};
+use atoll_core::World;
+use atoll_transport::{Collective, Rank, Transport};
+use std::time::{Duration, Instant};
+
+/// Hosts of a cluster may see a new file a little later than the one that wrote it.
+const UNSEEN: Duration = Duration::from_secs(10);
+
+/// A user may wonder after so long.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// Starts to write, on all ranks or none. What an earlier attempt left after the step from which the run goes on is removed
+/// first.
+pub(super) fn start<'a>(
+    plan: &'a Plan,
+    rank: Rank,
+    resumed: Option<u64>,
+    transport: &mut impl Transport,
+) -> Result<Option<Recorder<'a>>, RankError> {
+    let Some(output) = &plan.output else { return Ok(None) };
+    let token = if rank == Rank(0) { output.folder.token().unwrap_or_default() } else { Vec::new() };
+    let token = transport.all_gather(&token).map_err(RankError::Transport)?.swap_remove(0);
+    // Others wait for the one that waits.
+    let claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2)).map_err(RunError::Folder);
+    all_well(transport, claim.as_ref().err())?;
+    let removed = if rank == Rank(0) { output.folder.remove_after(resumed) } else { Ok(()) };
+    // Nobody writes before it is done.
+    let trouble = removed.err().map(|error| RunError::Folder(output.folder.not_writable(&error)));
+    all_well(transport, trouble.as_ref())?;
+    let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
+    all_well(transport, recorder.as_ref().err())?;
+    Ok(recorder.ok())
+}
+
+/// Waits until everything is written, on all ranks, and says how long this one spent on writing. A run that was `stopped`
+/// leaves a snapshot to go on from.
+pub(super) fn finish(
+    mut recorder: Recorder<'_>,
+    world: &World,
+    stopped: bool,
+    plan: &Plan,
+    observer: &Observer,
+    transport: &mut impl Transport,
+) -> Result<Duration, RankError> {
+    let Output { folder, every, .. } = recorder.output();
+    let patience = plan.config.run.peer_timeout / 4;
+    together(transport, observer, folder, || recorder.has_room(patience))?;
+    if stopped || every.checkpoint_every.is_some() {
+        recorder.snapshot(world);
+    }
+    let kept = recorder.snapshot_before();
+    together(transport, observer, folder, || recorder.close(patience))?;
+    let time = recorder.time();
+    let trouble = recorder.failure().map(|why| RunError::StoppedWriting {
+        why: why.to_string(),
+        complete: world.step_count(),
+        steps: plan.config.run.steps,
+        folder: folder.path().to_owned(),
+    });
+    all_well(transport, trouble.as_ref())?;
+    if let (Rank(0), Some(kept)) = (transport.rank(), kept)
+        && let Err(error) = snapshot::remove_before(&folder.snapshots(), kept)
+    {
+        observer.note(&format!("old snapshots stay in {}: {error}", folder.snapshots().display()));
+    }
+    Ok(time)
+}
+
+/// Waits until `done` says so on all ranks: however slow the disk of one is, the others hear of it.
+fn together(
+    transport: &mut impl Transport,
+    observer: &Observer,
+    folder: &RunFolder,
+    mut done: impl FnMut() -> bool,
+) -> Result<(), RankError> {
+    let (start, mut told) = (Instant::now(), false);
+    while !transport.all_gather(&[u8::from(done())]).map_err(RankError::Transport)?.iter().all(|rank| rank == &[1]) {
+        if transport.rank() == Rank(0) && start.elapsed() > SILENCE && !std::mem::replace(&mut told, true) {
+            observer.note(&format!("waiting for what is written to {}", folder.path().display()));
+        }
+    }
+    Ok(())
+}

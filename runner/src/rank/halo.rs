@@ -1,0 +1,75 @@
+//! The halo of the physics over a transport: one frame per pair of ranks and sync point.
+
+use crate::plan::Assignment;
+use atoll_core::{CodecError, Frames, Halo, Inbox, Outbox, TileId, Verdict};
+use atoll_transport::{Incoming, Rank, Transport, TransportError};
+use std::time::Duration;
+use thiserror::Error;
+
+/// Why a sync point failed.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub(crate) enum ExchangeError {
+    /// The bytes did not come through.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// They came through and make no sense.
+    #[error("rank {from} sent what cannot be read: {error}")]
+    Frame {
+        /// The sender.
+        from: Rank,
+        /// What is wrong with it.
+        error: CodecError,
+    },
+}
+
+/// One rank's halo.
+#[derive(Debug)]
+pub(crate) struct RankHalo<'a, T> {
+    transport: T,
+    assignment: &'a Assignment,
+    /// What goes to each rank; kept for its memory.
+    frames: Frames,
+    /// What came last; kept for its memory.
+    incoming: Incoming,
+    waited: Duration,
+}
+
+impl<'a, T: Transport> RankHalo<'a, T> {
+    /// A halo that finds tiles by `assignment`, which every rank must hold alike.
+    pub(crate) fn new(transport: T, assignment: &'a Assignment) -> Self {
+        Self { transport, assignment, frames: Frames::default(), incoming: Incoming::default(), waited: Duration::ZERO }
+    }
+
+    /// How long this rank has waited for others in all sync points.
+    pub(crate) fn waited(&self) -> Duration {
+        self.waited
+    }
+
+    /// The transport, for what ranks do together outside of steps.
+    pub(crate) fn transport(&mut self) -> &mut T {
+        &mut self.transport
+    }
+}
+
+impl<T: Transport> Halo for RankHalo<'_, T> {
+    type Error = ExchangeError;
+
+    fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), ExchangeError> {
+        let (own, size) = (self.transport.rank().index(), self.transport.size());
+        self.frames.deal(outbox, size, own, &|tile: TileId| self.assignment.rank_of(tile));
+        let outgoing = self.transport.prepare(self.frames.lengths())?;
+        outgoing.set_flag_word(outbox.verdict().to_word());
+        for (to, bytes) in outgoing.iter_mut().filter(|(_, bytes)| !bytes.is_empty()) {
+            self.frames.encode(outbox, to.index(), bytes);
+        }
+        self.transport.exchange(&mut self.incoming)?;
+        self.waited += self.incoming.waited();
+        // What stays on this rank never becomes bytes.
+        outbox.deliver(inbox);
+        inbox.hear(Verdict::from_word(self.incoming.flag_word()));
+        for (from, bytes) in self.incoming.iter().filter(|(_, bytes)| !bytes.is_empty()) {
+            inbox.decode(bytes).map_err(|error| ExchangeError::Frame { from, error })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,230 @@
+//! One rank of a run, from an empty world to the last figure.
+
+mod begin;
+mod end;
+mod facts;
+mod halo;
+// Threads are started alike as it is.
+#[cfg(any(test, feature = "iceoryx2", feature = "mpi"))]
+pub(crate) mod handshake;
+mod observer;
+mod recorder;
+pub(crate) mod trouble;
+
+pub(crate) use facts::{Gathered, PHASES, RankFacts};
+pub(crate) use halo::{ExchangeError, RankHalo};
+pub use observer::{Listener, Observer, PanicAt, StopFlag};
+use trouble::Refusal;
+
+use crate::error::Exit;
+use crate::plan::Plan;
+use atoll_core::{SetupError, StepError, StepReport, TileFacts};
+use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
+use begin::Beginning;
+use bytemuck::Pod;
+use rayon::ThreadPoolBuilder;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use tracing::{debug, info_span};
+
+/// Why a rank ended early.
+#[derive(Debug)]
+pub(crate) enum RankError {
+    /// Its world could not be built.
+    Setup(SetupError),
+    /// Its threads could not be started.
+    Threads {
+        /// Itself.
+        rank: Rank,
+        /// How many it wanted.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+    /// A step failed.
+    Step(StepError<ExchangeError>),
+    /// Outside of a step, the transport failed.
+    Transport(TransportError),
+    /// What all ranks know alike: they ended together.
+    Agreed {
+        /// In words.
+        text: String,
+        /// The exit code they go with.
+        exit: Exit,
+    },
+    /// It said so itself, in a process of its own.
+    #[cfg(feature = "iceoryx2")]
+    Told {
+        /// Its words.
+        text: String,
+        /// The exit code they go with.
+        exit: Exit,
+    },
+}
+
+impl From<Refusal> for RankError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Transport(error) => Self::Transport(error),
+            Refusal::Known(error) => Self::Agreed { text: error.to_string(), exit: error.exit() },
+        }
+    }
+}
+
+impl RankError {
+    /// What the transport said, if it was the transport.
+    pub(crate) fn transport(&self) -> Option<&TransportError> {
+        match self {
+            Self::Transport(error) | Self::Step(StepError::Halo(ExchangeError::Transport(error))) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+/// How a rank ended.
+#[derive(Debug)]
+pub(crate) struct RankEnd {
+    /// Steps it completed.
+    pub complete: u64,
+    /// What all ranks have to say, of rank 0.
+    pub result: Result<Option<Gathered>, RankError>,
+}
+
+/// Runs one rank, with a pool of threads of its own that this thread becomes part of. `leads_process` is true for one
+/// rank of each process.
+pub(crate) fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads_process: bool) -> RankEnd {
+    let (rank, threads) = (transport.rank(), plan.config.run.threads);
+    let _span = info_span!("rank", rank = rank.0).entered();
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(move |thread| format!("rank {rank}, thread {thread}"))
+        // So that a transport bound to its thread can be used inside the pool, and one thread really is one.
+        .use_current_thread()
+        .build();
+    // From here to its drop, everything parallel on this thread runs in the pool.
+    let _pool = match pool {
+        Ok(pool) => pool,
+        Err(error) => {
+            let error = RankError::Threads { rank, threads, reason: error.to_string() };
+            return RankEnd { complete: 0, result: Err(error) };
+        }
+    };
+    let mut complete = 0;
+    let result = run(transport, plan, observer, leads_process, &mut complete);
+    RankEnd { complete, result }
+}
+
+fn run<T: Transport>(
+    transport: T,
+    plan: &Plan,
+    observer: &Observer,
+    leads_process: bool,
+    complete: &mut u64,
+) -> Result<Option<Gathered>, RankError> {
+    let start = Instant::now();
+    let rank = transport.rank();
+    // Before the halo: where this rank fails, the others hear of it before the last of what it writes is written.
+    let mut recorder;
+    let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
+    let Beginning { mut world, resumed } = begin::build(plan, rank, observer, halo.transport())?;
+    // From here on the clock measures steps, not how long another rank takes to build.
+    halo.transport().barrier().map_err(RankError::Transport)?;
+    recorder = end::start(plan, rank, resumed, halo.transport())?;
+    *complete = world.step_count();
+    observer.complete.store(*complete, Ordering::Relaxed);
+    let built = Instant::now();
+
+    let steps = plan.config.run.steps;
+    let told = observer.steps(rank == Rank(0), world.step_count(), steps);
+    let before = halo.transport().stats();
+    let mut last = StepReport::default();
+    let mut migrations = 0;
+    if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
+        recorder.write_due(&world, false);
+    }
+    while world.step_count() < steps && !last.stopped {
+        if observer.stop.is_requested() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some()) {
+            world.request_stop();
+        }
+        if observer.panic_at == Some(PanicAt { rank: rank.0, step: world.step_count() }) {
+            panic!("as --panic-at asks");
+        }
+        if world.step_count() + 1 == steps {
+            world.measure_next_step();
+        }
+        last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
+        migrations += last.migrations;
+        *complete = world.step_count();
+        observer.complete.store(*complete, Ordering::Relaxed);
+        if let Some(recorder) = &mut recorder {
+            recorder.write_due(&world, last.stopped);
+        }
+        told.made(*complete);
+        debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
+    }
+    // Whoever asks while the last step is made gets all of them.
+    let interrupted = last.stopped && *complete < steps;
+    let output_time = match recorder {
+        Some(recorder) => end::finish(recorder, &world, interrupted, plan, observer, halo.transport())?,
+        None => Duration::ZERO,
+    };
+    drop(told);
+    let finished = Instant::now();
+
+    let sent = halo.transport().stats().since(&before);
+    let mut facts = RankFacts::new(&world, &last, &plan.scene);
+    facts.interrupted = interrupted.into();
+    facts.migrations = migrations;
+    facts.resumed_at = resumed.unwrap_or(0);
+    (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
+    facts.build_nanos = (built - start).as_nanos() as u64;
+    facts.wall_nanos = (finished - built).as_nanos() as u64;
+    facts.wait_nanos = halo.waited().as_nanos() as u64;
+    facts.output_nanos = output_time.as_nanos() as u64;
+    let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
+    if leads_process {
+        facts.peak_rss_bytes = peak_rss_bytes();
+    }
+    gather(halo.transport(), &facts, &tiles).map_err(RankError::Transport)
+}
+
+/// Brings everything to rank 0.
+fn gather(
+    transport: &mut impl Transport,
+    facts: &RankFacts,
+    tiles: &[TileFacts],
+) -> Result<Option<Gathered>, TransportError> {
+    let ranks = transport.gather(Rank(0), bytemuck::bytes_of(facts))?;
+    let tiles = transport.gather(Rank(0), bytemuck::cast_slice(tiles))?;
+    let Some((ranks, tiles)) = ranks.zip(tiles) else { return Ok(None) };
+    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)? };
+    if gathered.ranks.len() == ranks.len() { Ok(Some(gathered)) } else { Err(unreadable(Rank(0))) }
+}
+
+/// What came from all ranks, in their order, as one list.
+fn records<T: Pod>(parts: &[Vec<u8>]) -> Result<Vec<T>, TransportError> {
+    let mut records = Vec::new();
+    for (rank, bytes) in parts.iter().enumerate() {
+        let part = bytes.chunks_exact(size_of::<T>());
+        if !part.remainder().is_empty() {
+            return Err(unreadable(Rank::from_index(rank)));
+        }
+        records.extend(part.map(bytemuck::pod_read_unaligned::<T>));
+    }
+    Ok(records)
+}
+
+fn unreadable(rank: Rank) -> TransportError {
+    TransportError::PeerLost {
+        rank,
+        reason: "its closing figures cannot be read; run one version on all ranks".to_owned(),
+    }
+}
+
+/// The most memory this process ever held, in bytes; zero where the system does not tell.
+fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kilobytes =
+        status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
+    kilobytes.unwrap_or(0_u64) * 1024
+}

@@ -1,0 +1,68 @@
+//! A summary as people read it.
+
+use super::Summary;
+use std::fmt;
+
+/// The closing words of a run.
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [columns, rows] = self.tiles;
+        let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
+        let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
+        writeln!(f, "{}: {} bodies, seed {}, {columns} x {rows} tiles", self.scene, self.bodies, self.seed)?;
+        writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
+        let early = if self.interrupted { ", interrupted" } else { "" };
+        let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };
+        let each = self.ms_per_step;
+        let after = if self.resumed_at > 0 { format!(" after the first {}", self.resumed_at) } else { String::new() };
+        let steps = plural(self.steps - self.resumed_at, "step");
+        writeln!(f, "{steps}{after} in {:.2} s: {each:.3} ms per step, {rate:.1} steps/s{early}", self.wall_s)?;
+        self.write_phases(f)?;
+        self.write_facts(f)
+    }
+}
+
+impl Summary {
+    fn write_phases(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let total: f64 = self.phases.iter().map(|(_, time)| time.mean_ms).sum();
+        let share = |ms: f64| if total > 0.0 { 100.0 * ms / total } else { 0.0 };
+        writeln!(f)?;
+        writeln!(f, "{:<14}{:>10}{:>9}{:>15}", "phase", "ms/step", "share", "slowest rank")?;
+        for (name, time) in &self.phases {
+            let (mean, slowest) = (time.mean_ms, format!("{:.3} (#{})", time.max_rank_ms, time.slowest_rank));
+            writeln!(f, "{:<14}{mean:>10.3}{:>7.1} %{slowest:>15}", name.replace('_', " "), share(mean))?;
+        }
+        writeln!(f, "{:<14}{total:>10.3}{:>7.1} %", "total", share(total))?;
+        writeln!(f)
+    }
+
+    fn write_facts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = |f: &mut fmt::Formatter<'_>, name: &str, text: fmt::Arguments<'_>| writeln!(f, "{name:<14}{text}");
+        let mega = 1e-6;
+        row(f, "bodies", format_args!("{}, {} lost, {} escaped", self.bodies, self.bodies_lost, self.escaped))?;
+        let border = 100.0 * self.border_contact_fraction;
+        row(f, "contacts", format_args!("{} touching, {border:.2} % across tiles", self.contacts))?;
+        let (mean, most) = (self.mean_penetration, self.max_penetration);
+        row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
+        let (mean, most) = (self.constraint_violation, self.max_constraint_violation);
+        row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
+        let (islands, largest, colors) = (self.islands, self.largest_island, self.colors);
+        let asleep = if self.asleep > 0 { format!(", {} bodies asleep", self.asleep) } else { String::new() };
+        row(f, "islands", format_args!("{islands}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
+        let (half_v2, spin2) = (self.mean_half_v2, self.mean_spin2);
+        row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
+        let [x, y] = self.momentum;
+        row(f, "energy", format_args!("{:.6e} J, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
+        row(
+            f,
+            "tiles",
+            format_args!("{} ghosts in the last step, {} migrations in all", self.ghosts, self.migrations),
+        )?;
+        let sent = self.bytes_sent as f64 * mega;
+        row(f, "sent", format_args!("{sent:.1} MB between ranks in {} messages", self.messages_sent))?;
+        row(f, "memory", format_args!("{:.0} MB at most", self.peak_rss_bytes as f64 * mega))?;
+        row(f, "config hash", format_args!("{}", self.config_hash))?;
+        row(f, "state hash", format_args!("{}", self.state_hash))?;
+        row(f, "contact hash", format_args!("{}", self.contact_hash))
+    }
+}
