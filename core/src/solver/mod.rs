@@ -32,7 +32,7 @@ pub(crate) use write_back::write_back;
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::params::{Exchange, Parallel};
-use crate::parallel::crew::{Crew, Member};
+use crate::parallel::crew::{Crew, Member, Needed};
 use crate::parallel::lanes::{LANES, dispatch};
 use crate::parallel::shared::Shared;
 use crate::parallel::team::Team;
@@ -115,7 +115,7 @@ impl Solver {
         let to_do = self.jobs().filter(|job| !substeps(job).is_empty());
         let (large, small): (Vec<_>, Vec<_>) = to_do.partition(|job| job.large);
         for job in &large {
-            let crew = Crew::default();
+            let crew = Crew::<Needed>::new();
             team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps(job), setup }));
         }
         team.for_each(small, alone);
