@@ -3,7 +3,7 @@
 use super::groups::{Bounce, Group, Groups, NO_CONTACT};
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
-use crate::model::contact::Contact;
+use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::{dot, max, turn};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
 use crate::parallel::team::Team;
@@ -13,6 +13,7 @@ use crate::solver::place::STATIC;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
+use std::mem::offset_of;
 
 /// What rows are made of.
 #[derive(Clone, Copy)]
@@ -73,7 +74,7 @@ impl Local {
 struct Inputs {
     a: [u32; LANES],
     b: [u32; LANES],
-    /// The contacts, four numbers at a time (see [`Contact`]): normal, offset; rotations; two points.
+    /// The contacts, four numbers at a time; see [`Numbers`].
     contact: [[Quad; LANES]; QUADS],
     separation: [Row; 2],
     /// Roots of the masses of both bodies, as the solver has them.
@@ -88,6 +89,37 @@ struct Inputs {
 
 /// A contact in fours.
 const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
+
+/// The numbers of eight contacts, by where they lie in a [`Contact`].
+struct Numbers<V>([[V; 4]; QUADS]);
+
+impl<V: Lanes> Numbers<V> {
+    #[inline(always)]
+    fn load(contacts: &[[Quad; LANES]; QUADS]) -> Self {
+        let [a, b, c, d, e] = contacts;
+        Self([V::load_quads(a), V::load_quads(b), V::load_quads(c), V::load_quads(d), V::load_quads(e)])
+    }
+
+    /// The number at an offset in bytes.
+    #[inline(always)]
+    fn at(&self, offset: usize) -> V {
+        let number = offset / size_of::<f32>();
+        self.0[number / 4][number % 4]
+    }
+
+    /// Anchor, impulse along the normal, impulse along the tangent of a point.
+    #[inline(always)]
+    fn point(&self, point: usize) -> (Vectors<V>, V, V) {
+        let first = offset_of!(Contact, points) + point * size_of::<ContactPoint>();
+        let anchor = Vectors {
+            x: self.at(first + offset_of!(ContactPoint, anchor.x)),
+            y: self.at(first + offset_of!(ContactPoint, anchor.y)),
+        };
+        let normal_impulse = self.at(first + offset_of!(ContactPoint, normal_impulse));
+        let tangent_impulse = self.at(first + offset_of!(ContactPoint, tangent_impulse));
+        (anchor, normal_impulse, tangent_impulse)
+    }
+}
 
 impl Inputs {
     #[inline(always)]
@@ -163,13 +195,13 @@ impl<V: Lanes> Vectors<V> {
 #[inline(always)]
 fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
-    let [normal_x, normal_y, offset_x, offset_y] = V::load_quads(&inputs.contact[0]);
+    let contact = Numbers::<V>::load(&inputs.contact);
     let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
     let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
     let (boxy_a, boxy_b) = (V::load(&inputs.boxy_a), V::load(&inputs.boxy_b));
-    let normal = Vectors { x: normal_x, y: normal_y };
-    let tangent = Vectors { x: normal_y, y: normal_x.mul(V::splat(-1.0)) };
-    let offset = Vectors { x: offset_x, y: offset_y };
+    let normal = Vectors { x: contact.at(offset_of!(Contact, normal.x)), y: contact.at(offset_of!(Contact, normal.y)) };
+    let tangent = Vectors { x: normal.y, y: normal.x.mul(V::splat(-1.0)) };
+    let offset = Vectors { x: contact.at(offset_of!(Contact, offset.x)), y: contact.at(offset_of!(Contact, offset.y)) };
     let (on_a, on_b) = (normal.scaled(root_mass_a), normal.scaled(root_mass_b));
     group.a = inputs.a;
     group.b = inputs.b;
@@ -183,13 +215,9 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let linear = on_a.dot(on_a).add(on_b.dot(on_b));
     // Where there is no contact nothing may come of it, not even the inverse of zero.
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
-    let [x0, y0, _, normal0] = V::load_quads(&inputs.contact[2]);
-    let [tangent0, _, x1, y1] = V::load_quads(&inputs.contact[3]);
-    let [_, normal1, tangent1, _] = V::load_quads(&inputs.contact[4]);
-    let points = [(x0, y0, normal0, tangent0), (x1, y1, normal1, tangent1)];
+    let points = [contact.point(0), contact.point(1)];
     for (k, rows) in group.points.iter_mut().enumerate() {
-        let (x, y, normal_impulse, tangent_impulse) = points[k];
-        let arm_a = Vectors { x, y };
+        let (arm_a, normal_impulse, tangent_impulse) = points[k];
         let arm_b = arm_a.minus(offset);
         // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
         let normal_a = boxy_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
