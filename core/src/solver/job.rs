@@ -26,7 +26,7 @@ pub(crate) struct Job<'a> {
     pub(crate) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
     pub(crate) ghosts: &'a [Ghost],
-    pub(crate) base: u32,
+    pub(crate) base: usize,
     pub(crate) frozen: bool,
     /// Whether it is worth a crew.
     pub(crate) large: bool,
@@ -107,7 +107,7 @@ impl<'a> Job<'a> {
                 V::store_quads([warm[0], warm[1], warm[2], rest], velocity);
             }
             for ghost in self.ghosts_in(&range) {
-                let i = (ghost.place - self.base) as usize - range.start;
+                let i = ghost.place.get() - self.base - range.start;
                 for (k, given) in ghost.given.into_iter().enumerate() {
                     if self.frozen {
                         (starts[i][k], velocities[i][k]) = (given, given);
@@ -122,7 +122,7 @@ impl<'a> Job<'a> {
 
     /// The ghosts among some bodies.
     fn ghosts_in(&self, bodies: &Range<usize>) -> &[Ghost] {
-        let before = |body: usize| self.ghosts.partition_point(|ghost| (ghost.place - self.base) as usize <= body);
+        let before = |body: usize| self.ghosts.partition_point(|ghost| ghost.place.get() - self.base <= body);
         match bodies.start {
             _ if self.ghosts.is_empty() => &[],
             start => &self.ghosts[if start == 0 { 0 } else { before(start - 1) }..before(bodies.end - 1)],

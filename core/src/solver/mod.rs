@@ -17,11 +17,11 @@ mod batches;
 mod bodies;
 mod coloring;
 mod constraint;
+pub(crate) mod index;
 #[allow(unsafe_code)]
 mod job;
 mod motion;
 mod pgs;
-pub(crate) mod place;
 mod run;
 mod soft_step;
 mod write_back;
@@ -43,6 +43,7 @@ use batches::{Batches, Graph};
 use coloring::Coloring;
 use constraint::groups::{Group, Groups};
 use constraint::rows::Source;
+use index::GraphNode;
 use job::Job;
 use run::Run;
 use std::ops::Range;
@@ -63,22 +64,26 @@ impl Solver {
         self.bodies.graph()
     }
 
-    /// Puts the islands into batches, leaves those out that sleep (see [`crate::islands::sleep`]), and takes their bodies in.
-    /// `roots` gives for each node the lowest of its island, `largest` how many nodes the largest island has.
+    /// For each body of the tile what it is in the graph of contacts, until bodies are gathered.
+    pub(crate) fn nodes(&self) -> &[GraphNode] {
+        self.bodies.nodes()
+    }
+
+    /// Puts the islands into batches, but those that sleep, and takes their bodies in. `roots` gives for each node the
+    /// lowest of its island, `largest` how many nodes the largest island has.
     pub(crate) fn gather(
         &mut self,
-        tile: &mut Tile,
+        tile: &Tile,
         contacts: &[Pair],
         (roots, largest): (&[u32], u64),
         setup: &Setup,
         team: Team,
     ) {
-        let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
+        let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
         let heard_of = setup.params.exchange == Exchange::Substep;
         let first_ghost = if heard_of { self.bodies.first_ghost } else { roots.len() };
         let graph = Graph { contacts, roots, largest, first_ghost, sleeps };
-        self.batches.divide(graph, self.bodies.places_mut(), setup.params.parallel, team);
-        self.bodies.load(tile, &self.batches, setup);
+        self.bodies.load(tile, &mut self.batches, graph, setup, team);
     }
 
     /// Colors the contacts and gives each its place. Returns how many colors there are.
@@ -131,7 +136,7 @@ impl Solver {
         let (weight, colors, frozen) = (&weight[..], &colors[..], *frozen);
         self.batches.all.iter().map(move |batch| {
             let bodies = batch.bodies.len();
-            let own_ghosts = ghosts.partition_point(|ghost| (ghost.place as usize) < batch.bodies.end);
+            let own_ghosts = ghosts.partition_point(|ghost| ghost.place.get() < batch.bodies.end);
             let colors = &colors[batch.colors.clone()];
             Job {
                 velocity: Shared::new(velocity.split_off_mut(..bodies).expect(IN_ORDER)),
@@ -142,7 +147,7 @@ impl Solver {
                 doubles: Shared::new(doubles.split_off_mut(..batch.doubles.len()).expect(IN_ORDER)),
                 colors,
                 ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
-                base: batch.bodies.start as u32,
+                base: batch.bodies.start,
                 frozen,
                 large: batch.large && colors.iter().any(|color| color.slices > 1),
             }

@@ -161,7 +161,9 @@ fn prepare(bench: &mut Bench<'_>) {
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (sizes.islands, sizes.largest);
         (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
-        solver.gather(b.tile, &contacts.bodies, (b.work.islands.roots(), sizes.largest), b.setup, b.team);
+        let roots = b.work.islands.roots();
+        b.tile.fall_asleep(solver.nodes(), roots, b.setup);
+        solver.gather(b.tile, &contacts.bodies, (roots, sizes.largest), b.setup, b.team);
     });
     bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
     bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));

@@ -9,7 +9,7 @@ use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
 use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
-use crate::solver::place::STATIC;
+use crate::solver::index::SolverIndex;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -65,8 +65,8 @@ struct Local {
 
 impl Local {
     #[inline(always)]
-    fn place(self, place: u32) -> u32 {
-        if place == STATIC { self.slice } else { place - self.base }
+    fn place(self, place: SolverIndex) -> u32 {
+        place.within(self.base, self.slice)
     }
 }
 
@@ -150,8 +150,8 @@ impl Inputs {
             let [a, b] = contacts.bodies[contact];
             let (place_a, place_b) = (bodies.place_of(a), bodies.place_of(b));
             (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
-            inputs.weight_a[lane] = bodies.weight[place_a as usize];
-            inputs.weight_b[lane] = bodies.weight[place_b as usize];
+            inputs.weight_a[lane] = bodies.weight[place_a.get()];
+            inputs.weight_b[lane] = bodies.weight[place_b.get()];
             let kind_a = setup.kind(tile.bodies.kind[a as usize]);
             let kind_b = setup.kind(tile.bodies.kind[b as usize]);
             inputs.friction_a[lane] = kind_a.material.friction;
