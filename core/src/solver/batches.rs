@@ -3,6 +3,7 @@
 //! A batch is one or several whole islands. Within an island the order of constraints follows from its contacts alone
 //! (see [`super::coloring`]), so how islands are put into batches changes no bit.
 
+use super::constraint::columns::Each;
 use super::index::{GraphNode, SolverIndex, place_all};
 use crate::collide::broad_phase::Pair;
 use crate::model::params::Parallel;
@@ -34,8 +35,7 @@ pub(crate) struct Batch {
     /// Whether several threads are to solve it together.
     pub(crate) large: bool,
     pub(crate) colors: Range<usize>,
-    pub(crate) singles: Range<usize>,
-    pub(crate) doubles: Range<usize>,
+    pub(crate) groups: Each<Range<usize>>,
 }
 
 impl Batch {

@@ -1,9 +1,10 @@
 //! A batch with its part of the solver's buffers, for one thread or a crew of them.
 
 use super::bodies::Ghost;
-use super::constraint::groups::{Color, Group};
+use super::constraint::columns::SharedColumns;
 use super::constraint::kernels::{Pass, Table};
-use super::motion::{Motion, turn_on};
+use super::constraint::layout::Color;
+use super::motion::{Motion, integrate_rotation};
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{LANES, Lanes, Quad};
 use crate::parallel::shared::Shared;
@@ -21,8 +22,7 @@ pub(crate) struct Job<'a> {
     pub(crate) pose: Shared<'a, Quad>,
     pub(crate) start: Shared<'a, Quad>,
     pub(crate) weight: &'a [Quad],
-    pub(crate) singles: Shared<'a, Group<1>>,
-    pub(crate) doubles: Shared<'a, Group<2>>,
+    pub(crate) groups: SharedColumns<'a>,
     pub(crate) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
     pub(crate) ghosts: &'a [Ghost],
@@ -57,19 +57,13 @@ impl<'a> Job<'a> {
     #[inline(always)]
     fn colors_of_stage<V: Lanes>(&self, stage: &[Color], slice: u32, pass: impl Pass) {
         for color in stage {
-            let (singles, doubles) = color.slice(slice);
             // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
             // piece has a body of its own that stands for statics. A stage of several colors has one piece.
-            let (singles, doubles, bodies) = unsafe {
+            let (groups, bodies) = unsafe {
                 let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
-                (self.singles.range(singles), self.doubles.range(doubles), bodies)
+                (self.groups.range(color.slice(slice)), bodies)
             };
-            for group in singles {
-                pass.group::<V, 1>(group, bodies);
-            }
-            for group in doubles {
-                pass.group::<V, 2>(group, bodies);
-            }
+            groups.pass::<V>(pass, bodies);
         }
     }
 
@@ -142,7 +136,7 @@ impl<'a> Job<'a> {
                 let [vx, vy, w, _] = V::load_quads(velocity);
                 let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
                 let [x, y, c, s] = V::load_quads(pose);
-                let (c, s) = turn_on(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
+                let (c, s) = integrate_rotation(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
             }
         }

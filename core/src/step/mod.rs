@@ -82,7 +82,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 }
             }
             world.each_tile(|bench| {
-                bench.stage(Phase::Finalize, |b| b.work.solver.restitute(b.setup));
+                bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution(b.setup));
                 bench.stage(Phase::Border, send_impulses);
             });
             world.exchange(halo)?;
@@ -178,7 +178,7 @@ fn finalize(bench: &mut Bench<'_>) {
     bench.stage(Phase::Finalize, |b| {
         let (solver, contacts) = (&mut b.work.solver, &mut b.work.contacts);
         if b.setup.params.exchange == Exchange::Step {
-            solver.restitute(b.setup);
+            solver.apply_restitution(b.setup);
         }
         if b.measures {
             b.tile.violation = solver.violation(contacts, b.setup);

@@ -1,10 +1,10 @@
 //! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
 
-use super::groups::{Bounce, Group, Groups, NO_CONTACT};
-use crate::collide::broad_phase::Pair;
+use super::columns::{Each, Members, NO_CONTACT, Slices, Visitor, lengths};
+use super::group::Group;
+use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::contact::{Contact, ContactPoint};
-use crate::model::math::{dot, max, turn};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
 use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
@@ -12,7 +12,7 @@ use crate::solver::bodies::SolverBodies;
 use crate::solver::index::SolverIndex;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::Vec2;
+use std::marker::PhantomData;
 use std::mem::offset_of;
 
 /// What rows are made of.
@@ -26,13 +26,9 @@ pub(crate) struct Source<'a> {
 
 /// Groups of one slice of one color, to be written by one thread.
 struct Unit<'a> {
-    singles: &'a mut [Group<1>],
-    doubles: &'a mut [Group<2>],
-    in_singles: &'a [[u32; LANES]],
-    in_doubles: &'a [[u32; LANES]],
-    /// The first body of the batch, and which of its statics this slice uses.
-    base: u32,
-    slice: u32,
+    groups: Slices<'a>,
+    members: Each<&'a [Members]>,
+    local: Local,
 }
 
 /// Writes the rows of a unit.
@@ -45,14 +41,22 @@ impl Kernel for Write<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { unit, source } = self;
-        let local = Local { base: unit.base, slice: unit.slice };
-        for (group, members) in unit.singles.iter_mut().zip(unit.in_singles) {
-            write::<V, 1>(group, &Inputs::collect(members, source, local));
-        }
-        for (group, members) in unit.doubles.iter_mut().zip(unit.in_doubles) {
-            write::<V, 2>(group, &Inputs::collect(members, source, local));
-        }
+        let Unit { groups, members, local } = self.unit;
+        groups.visit(members, &WriteRows::<V> { source: self.source, local, lanes: PhantomData });
+    }
+}
+
+/// Writes the rows of a group.
+struct WriteRows<'a, V> {
+    source: Source<'a>,
+    local: Local,
+    lanes: PhantomData<V>,
+}
+
+impl<V: Lanes> Visitor for WriteRows<'_, V> {
+    #[inline(always)]
+    fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members) {
+        write::<V, N>(group, &Inputs::collect(members, self.source, self.local));
     }
 }
 
@@ -123,7 +127,7 @@ impl<V: Lanes> Numbers<V> {
 
 impl Inputs {
     #[inline(always)]
-    fn collect(members: &[u32; LANES], source: Source<'_>, local: Local) -> Self {
+    fn collect(members: &Members, source: Source<'_>, local: Local) -> Self {
         const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
         const ZERO: Row = [0.0; LANES];
         let mut inputs = Self {
@@ -203,15 +207,16 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let tangent = Vectors { x: normal.y, y: normal.x.mul(V::splat(-1.0)) };
     let offset = Vectors { x: contact.at(offset_of!(Contact, offset.x)), y: contact.at(offset_of!(Contact, offset.y)) };
     let (on_a, on_b) = (normal.scaled(root_mass_a), normal.scaled(root_mass_b));
-    group.a = inputs.a;
-    group.b = inputs.b;
-    on_a.x.store(&mut group.normal_ax);
-    on_a.y.store(&mut group.normal_ay);
-    on_b.x.store(&mut group.normal_bx);
-    on_b.y.store(&mut group.normal_by);
-    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut group.friction);
+    let sides = &mut group.sides;
+    sides.a = inputs.a;
+    sides.b = inputs.b;
+    on_a.x.store(&mut sides.normal_ax);
+    on_a.y.store(&mut sides.normal_ay);
+    on_b.x.store(&mut sides.normal_bx);
+    on_b.y.store(&mut sides.normal_by);
+    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut sides.friction);
     // The roots of a static's inverse masses are zero.
-    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut group.fixed);
+    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut sides.fixed);
     let linear = on_a.dot(on_a).add(on_b.dot(on_b));
     // Where there is no contact nothing may come of it, not even the inverse of zero.
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
@@ -243,26 +248,18 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
 impl Groups {
     /// Writes the rows of all contacts where [`Groups::lay_out`] has put them.
     pub(crate) fn write(&mut self, batches: &Batches, source: Source<'_>, team: Team) {
-        let Self { singles, doubles, in_singles, in_doubles, colors, .. } = self;
-        let (mut singles, mut doubles) = (&mut singles[..], &mut doubles[..]);
-        let (mut in_singles, mut in_doubles) = (&in_singles[..], &in_doubles[..]);
+        let Self { columns, members, colors, .. } = self;
+        let (mut groups, colors) = (columns.slices(), &*colors);
+        let mut members = members.each_ref().map(|members| &members[..]);
         let mut next = |batch: &Batch, color: usize, slice: u32| {
-            let (single, double) = colors[color].slice(slice);
-            Unit {
-                singles: singles.split_off_mut(..single.len()).expect("groups lie in order"),
-                doubles: doubles.split_off_mut(..double.len()).expect("groups lie in order"),
-                in_singles: in_singles.split_off(..single.len()).expect("as many as groups"),
-                in_doubles: in_doubles.split_off(..double.len()).expect("as many as groups"),
-                base: batch.bodies.start as u32,
-                slice,
-            }
+            let counts = lengths(&colors[color].slice(slice));
+            let own = |column: usize| members[column].split_off(..counts[column]).expect("as many as groups");
+            let (groups, members) = (groups.split_off(counts), std::array::from_fn(own));
+            Unit { groups, members, local: Local { base: batch.bodies.start as u32, slice } }
         };
         let each = batches.all.iter().flat_map(|batch| {
-            let colors = &*colors;
-            batch
-                .colors
-                .clone()
-                .flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
+            let slices = move |color: usize| (0..colors[color].slices).map(move |slice| (batch, color, slice));
+            batch.colors.clone().flat_map(slices)
         });
         if team.is_alone() {
             each.for_each(|(batch, color, slice)| dispatch(Write { unit: next(batch, color, slice), source }));
@@ -271,34 +268,4 @@ impl Groups {
             team.for_each(units, |unit| dispatch(Write { unit, source }));
         }
     }
-
-    /// Finds the points that may bounce, in canonical order.
-    pub(crate) fn find_bounces(&mut self, source: Source<'_>) {
-        self.bounces.clear();
-        for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
-            let sides = source.contacts.bodies[i];
-            let [a, b] =
-                sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);
-            let restitution = max(a, b);
-            if restitution > 0.0 && self.is_solved(i as u32) {
-                for point in 0..contact.point_count() {
-                    let closing = closing_speed(source.tile, sides, contact, point);
-                    if closing > source.setup.params.restitution_threshold {
-                        let (contact, point) = (i as u32, point as u32);
-                        self.bounces.push(Bounce { contact, point, speed: restitution * closing });
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Speed at which a point's surfaces come nearer, in m/s.
-fn closing_speed(tile: &Tile, [a, b]: Pair, contact: &Contact, point: usize) -> f32 {
-    let anchor = contact.points[point].anchor;
-    let velocity = |body: u32, arm: Vec2| {
-        let i = body as usize;
-        tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
-    };
-    -dot(velocity(b, anchor - contact.offset) - velocity(a, anchor), contact.normal)
 }
