@@ -103,7 +103,7 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
     world.begin_step();
     migrate(&mut world, halo)?;
     Ok(world.each_tile(|bench| {
-        // Manifolds as they are, not as they were frozen.
+        // Manifolds as they are, not as they were kept.
         bench.tile.contacts.clear();
         bench.tile.strays.clear();
         collide(bench);

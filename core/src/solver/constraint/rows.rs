@@ -86,9 +86,9 @@ struct Inputs {
     weight_b: [Quad; LANES],
     friction_a: Row,
     friction_b: Row,
-    /// One for a box, zero for a circle.
-    boxy_a: Row,
-    boxy_b: Row,
+    /// One for a shape that changes as it turns, zero for a round one.
+    not_round_a: Row,
+    not_round_b: Row,
 }
 
 /// A contact in fours.
@@ -139,8 +139,8 @@ impl Inputs {
             weight_b: NONE,
             friction_a: ZERO,
             friction_b: ZERO,
-            boxy_a: ZERO,
-            boxy_b: ZERO,
+            not_round_a: ZERO,
+            not_round_b: ZERO,
         };
         let Source { tile, contacts, bodies, setup } = source;
         for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
@@ -160,8 +160,8 @@ impl Inputs {
             let kind_b = setup.kind(tile.bodies.kind[b as usize]);
             inputs.friction_a[lane] = kind_a.material.friction;
             inputs.friction_b[lane] = kind_b.material.friction;
-            inputs.boxy_a[lane] = kind_a.boxy();
-            inputs.boxy_b[lane] = kind_b.boxy();
+            inputs.not_round_a[lane] = kind_a.not_round;
+            inputs.not_round_b[lane] = kind_b.not_round;
         }
         inputs
     }
@@ -202,7 +202,7 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let contact = Numbers::<V>::load(&inputs.contact);
     let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
     let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
-    let (boxy_a, boxy_b) = (V::load(&inputs.boxy_a), V::load(&inputs.boxy_b));
+    let (not_round_a, not_round_b) = (V::load(&inputs.not_round_a), V::load(&inputs.not_round_b));
     let normal = Vectors { x: contact.at(offset_of!(Contact, normal.x)), y: contact.at(offset_of!(Contact, normal.y)) };
     let tangent = Vectors { x: normal.y, y: normal.x.mul(V::splat(-1.0)) };
     let offset = Vectors { x: contact.at(offset_of!(Contact, offset.x)), y: contact.at(offset_of!(Contact, offset.y)) };
@@ -224,16 +224,16 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     for (k, rows) in group.points.iter_mut().enumerate() {
         let (arm_a, normal_impulse, tangent_impulse) = points[k];
         let arm_b = arm_a.minus(offset);
-        // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
-        let normal_a = boxy_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
-        let normal_b = boxy_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
+        // A round body's anchor lies on the line of its center and the normal; rounding must not spin it.
+        let normal_a = not_round_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
+        let normal_b = not_round_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
         let (tangent_a, tangent_b) = (root_a.mul(arm_a.cross(tangent)), root_b.mul(arm_b.cross(tangent)));
         normal_a.store(&mut rows.normal_a);
         normal_b.store(&mut rows.normal_b);
         tangent_a.store(&mut rows.tangent_a);
         tangent_b.store(&mut rows.tangent_b);
-        boxy_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
-        boxy_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
+        not_round_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
+        not_round_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
         inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b))).store(&mut rows.normal_mass);
         inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b))).store(&mut rows.tangent_mass);
         rows.first_separation = inputs.separation[k];
