@@ -1,8 +1,8 @@
 //! The columns in which groups lie: one for each kind of constraint, today contacts of one point and contacts of two.
 //!
-//! What the groups of a kind look like, only this file, the rows and the passes know; everywhere else a column is a number
-//! below [`COLUMNS`]. A new kind of constraint is one more: a field in each struct here, and a line where the fields are
-//! listed.
+//! Everywhere else a column is a number below [`COLUMNS`]: batches, colors, layout and threads know no kind from another.
+//! So a new kind of constraint is one more field of each struct here, and a line where these are listed; what its rows are
+//! and what a pass does to them is told in `group.rs`, `rows.rs` and `kernels.rs`, as for contacts.
 
 use super::group::{Group, PointRows, Sides};
 use super::kernels::{Pass, Table};
