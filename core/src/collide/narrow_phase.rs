@@ -5,7 +5,7 @@ use crate::collide::manifold::{Manifold, collide};
 use crate::collide::proxies::Proxies;
 use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot};
 use crate::model::math::{Rot, dot, turn};
-use crate::model::shape::{KindRow, Shape};
+use crate::model::shape::KindRow;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -192,14 +192,15 @@ impl<'a> Side<'a> {
         }
     }
 
-    fn is_circle(&self) -> bool {
-        matches!(self.kind.shape, Shape::Circle { .. })
+    #[inline(always)]
+    fn is_round(&self) -> bool {
+        self.kind.shape.is_round()
     }
 
-    /// How the body turned since `then`. A circle's contacts do not turn with it.
+    /// How the body turned since `then`. A round body's contacts do not turn with it.
     #[inline(always)]
     fn turned(&self, then: Rot) -> Rot {
-        if self.is_circle() { Rot::IDENTITY } else { then.to(self.rotation) }
+        if self.is_round() { Rot::IDENTITY } else { then.to(self.rotation) }
     }
 }
 
@@ -255,20 +256,20 @@ fn touch(tile: &Tile, [a, b]: Pair, known: Option<&Contact>, setup: &Setup) -> O
     Some((contact, [points[0].separation, points[1].separation]))
 }
 
-/// The separations of a contact whose frozen geometry still serves: the bodies have hardly moved against each other.
+/// The separations of a contact whose manifold still serves: the bodies have hardly moved against each other.
 ///
 /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for
-/// ever. Here a circle's contacts do not turn with the circle, so that rolling keeps them.
+/// ever. Here a round body's contacts do not turn with it, so that rolling keeps them.
 #[inline(always)]
 fn recycle(known: &Contact, a: &Side<'_>, b: &Side<'_>, offset: Vec2, setup: &Setup) -> Option<[f32; 2]> {
     let (turned_a, turned_b) = (a.turned(known.rotation_a), b.turned(known.rotation_b));
     if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
         return None;
     }
-    // Relative motion as seen from the box, or from the world where there is none.
-    let frame = if a.is_circle() { turned_b } else { turned_a };
+    // Relative motion as seen from the body that turns its contacts, or from the world where there is none.
+    let frame = if a.is_round() { turned_b } else { turned_a };
     let moved = frame.unrotate(offset) - known.offset;
-    let twist = if a.is_circle() || b.is_circle() {
+    let twist = if a.is_round() || b.is_round() {
         0.0
     } else {
         let extent = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { side.kind.bounding_radius } else { 0.0 };

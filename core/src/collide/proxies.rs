@@ -25,8 +25,8 @@ pub(crate) struct Proxies {
     /// How near a surface at rest may come to the center without touching: bounding radius, what turning may bring
     /// nearer in the step, half the speculative distance.
     pub(crate) reach: Vec<f32>,
-    /// One for a box, zero for a circle.
-    pub(crate) boxy: Vec<f32>,
+    /// One for a shape that changes as it turns, zero for a round one.
+    pub(crate) not_round: Vec<f32>,
     /// Local coordinates are rounded; comparing them needs this much more room for the body, in meters.
     pub(crate) slack: Vec<f32>,
     pub(crate) owned: usize,
@@ -62,7 +62,7 @@ impl Proxies {
             &mut self.velocity_x,
             &mut self.velocity_y,
             &mut self.reach,
-            &mut self.boxy,
+            &mut self.not_round,
             &mut self.slack,
         ];
         let mut rest = columns.map(|column| {
@@ -100,7 +100,7 @@ impl Proxies {
     /// step. `offset` leads from the center of the first to that of the second.
     ///
     /// Circles touch if distance < reach + closing speed x dt, the contact rule with the greatest closing speed there
-    /// can be. Of two circles that is known, of others only that it is no more than their relative speed. All is
+    /// can be. Of two round bodies that is known, of others only that it is no more than their relative speed. All is
     /// multiplied by the distance, which saves a division.
     #[inline(always)]
     pub(crate) fn is_pair(&self, offset: Vec2, [a, b]: Pair) -> bool {
@@ -109,8 +109,11 @@ impl Proxies {
         let between = Vec2::new(self.velocity_x[b] - self.velocity_x[a], self.velocity_y[b] - self.velocity_y[a]);
         let square = dot(offset, offset);
         let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
-        let closing =
-            if self.boxy[a] + self.boxy[b] > 0.0 { speed * distance } else { math::max(-dot(between, offset), 0.0) };
+        let closing = if self.not_round[a] + self.not_round[b] > 0.0 {
+            speed * distance
+        } else {
+            math::max(-dot(between, offset), 0.0)
+        };
         let within = (self.reach[a] + self.reach[b]) * distance + self.dt * closing;
         overlap & (square <= within * 1.0001)
     }
@@ -120,7 +123,8 @@ impl Proxies {
 fn load(bodies: &Bodies, dynamic: usize, corner: DVec2, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9]) {
     let (count, dynamic) = (range.len(), dynamic.saturating_sub(range.start));
     // One length for all columns: each index is checked once, not once per column.
-    let [x, y, half_x, half_y, velocity_x, velocity_y, reach, boxy, slack] = columns.map(|column| &mut column[..count]);
+    let [x, y, half_x, half_y, velocity_x, velocity_y, reach, not_round, slack] =
+        columns.map(|column| &mut column[..count]);
     let (position, velocity, rotation) =
         (&bodies.position[range.clone()], &bodies.velocity[range.clone()], &bodies.rotation[range.clone()]);
     let (angular_velocity, kinds) = (&bodies.angular_velocity[range.clone()], &bodies.kind[range]);
@@ -135,10 +139,9 @@ fn load(bodies: &Bodies, dynamic: usize, corner: DVec2, setup: &Setup, range: Ra
         }
         (half_x[i], half_y[i]) = (half.x, half.y);
         (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
-        // Turning brings no point of a circle nearer.
-        let is_box = kind.boxy();
-        let sweep = is_box * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
+        // Turning brings no point of a round body nearer.
+        let sweep = kind.not_round * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
         reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
-        boxy[i] = is_box;
+        not_round[i] = kind.not_round;
     }
 }

@@ -9,7 +9,7 @@
 //! are found anew each step, so nothing has to be kept in order.
 
 use crate::model::math;
-use crate::solver::place::NOT_SOLVED;
+use crate::solver::index::GraphNode;
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
@@ -59,30 +59,35 @@ impl Sleep {
         }
     }
 
-    /// Decides which islands sleep. `nodes` gives for each body its node of the contact graph plus one, or
-    /// [`NOT_SOLVED`] if it has no contact; `roots` for each node the lowest of its island. Takes the velocity of those
-    /// that sleep. Returns which islands sleep, by root, and how many bodies do.
+    /// For each node that is the lowest of its island whether that sleeps, as was decided last.
+    pub(crate) fn islands(&self) -> &[bool] {
+        &self.islands
+    }
+
+    /// Decides which islands sleep. `nodes` gives for each body what it is in the graph of contacts, `roots` for each node
+    /// the lowest of its island. Takes the velocity of those that sleep. Returns how many bodies do.
     pub(crate) fn decide(
         &mut self,
-        nodes: &[u32],
+        nodes: &[GraphNode],
         roots: &[u32],
         velocity: &mut [Vec2],
         angular_velocity: &mut [f32],
         setup: &Setup,
-    ) -> (&[bool], u64) {
-        let root_of = |node: u32| roots[node as usize - 1] as usize;
+    ) -> u64 {
+        let root_of = |node: GraphNode| node.number().map(|number| roots[number as usize] as usize);
         self.rested.clear();
         self.rested.resize(roots.len(), f32::INFINITY);
-        for (&node, &still) in nodes.iter().zip(&self.still).filter(|&(&node, _)| node != NOT_SOLVED) {
-            let rested = &mut self.rested[root_of(node)];
-            *rested = math::min(still, *rested);
+        for (&node, &still) in nodes.iter().zip(&self.still) {
+            if let Some(root) = root_of(node) {
+                self.rested[root] = math::min(still, self.rested[root]);
+            }
         }
         self.islands.clear();
         self.islands.extend(self.rested.iter().map(|&rested| rested >= setup.params.sleep_time));
         let mut count = 0;
         for (i, asleep) in self.asleep.iter_mut().enumerate() {
-            if nodes[i] != NOT_SOLVED {
-                self.still[i] = self.rested[root_of(nodes[i])];
+            if let Some(root) = root_of(nodes[i]) {
+                self.still[i] = self.rested[root];
             }
             *asleep = self.still[i] >= setup.params.sleep_time;
             if *asleep {
@@ -90,7 +95,7 @@ impl Sleep {
                 count += 1;
             }
         }
-        (&self.islands, count)
+        count
     }
 
     /// Counts on for those that rest. `speed` tells that of a body's fastest point, in m/s.
@@ -115,16 +120,17 @@ mod tests {
         let params = Params { sleep: true, ..Params::default() };
         let setup = Setup::new(&Blueprint { params, grid, kinds: Vec::new(), statics: Vec::new() }).unwrap();
         let mut sleep = Sleep { still: vec![9.0, 0.1, 9.0, 9.0], asleep: vec![true; 4], ..Sleep::default() };
-        let mut decide = |nodes: &[u32], roots: &[u32]| {
-            let (islands, count) = sleep.decide(nodes, roots, &mut [Vec2::ONE; 4], &mut [1.0; 4], &setup);
-            (islands.to_vec(), count, sleep.asleep.clone(), sleep.still.clone())
+        let mut decide = |nodes: [Option<u32>; 4], roots: &[u32]| {
+            let nodes = nodes.map(|node| node.map_or(GraphNode::NO_CONTACT, GraphNode::new));
+            let count = sleep.decide(&nodes, roots, &mut [Vec2::ONE; 4], &mut [1.0; 4], &setup);
+            (sleep.islands.clone(), count, sleep.asleep.clone(), sleep.still.clone())
         };
         // The first two touch each other, the third something that never moves, the last nothing.
-        let (islands, count, asleep, still) = decide(&[1, 2, 3, NOT_SOLVED], &[0, 0, 2]);
+        let (islands, count, asleep, still) = decide([Some(0), Some(1), Some(2), None], &[0, 0, 2]);
         assert_eq!((islands[0], islands[2], count), (false, true, 2));
         assert_eq!((asleep, still), (vec![false, false, true, true], vec![0.1, 0.1, 9.0, 9.0]));
         // Once apart, the first must rest anew by itself.
-        let (_, _, asleep, _) = decide(&[NOT_SOLVED, NOT_SOLVED, 1, NOT_SOLVED], &[0]);
+        let (_, _, asleep, _) = decide([None, None, Some(0), None], &[0]);
         assert_eq!(asleep, [false, false, true, true]);
     }
 }

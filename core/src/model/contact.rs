@@ -1,4 +1,4 @@
-//! Contacts that outlive a step: frozen geometry and impulses, and the cache that keeps them.
+//! Contacts that outlive a step: their manifolds and impulses, and the cache that keeps them.
 
 use crate::model::id::GlobalId;
 use crate::model::math::Rot;
@@ -9,9 +9,9 @@ use glam::Vec2;
 #[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct ContactPoint {
-    /// Where it lies, from the center of body A when the geometry was frozen, in meters.
+    /// Where it lies, from the center of body A when the manifold was made, in meters.
     pub anchor: Vec2,
-    /// Distance of the two surfaces when the geometry was frozen; negative: overlap. In meters.
+    /// Distance of the two surfaces when the manifold was made; negative: overlap. In meters.
     pub separation: f32,
     /// Impulse along the normal in the last substep, in N s.
     pub normal_impulse: f32,
@@ -26,17 +26,18 @@ impl ContactPoint {
     pub const ABSENT: u32 = u32::MAX;
 }
 
-/// A contact of body A, the one with the lower GlobalId, and body B.
+/// A contact of body A, the one with the lower GlobalId, and body B. Its manifold is kept for as long as the two hardly
+/// move against each other ([`Params::recycle_distance`](crate::Params::recycle_distance)).
 #[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Contact {
-    /// Unit vector from A to B, frozen.
+    /// Unit vector from A to B when the manifold was made.
     pub normal: Vec2,
-    /// Center of B minus center of A when frozen, in meters.
+    /// Center of B minus center of A when it was made, in meters.
     pub offset: Vec2,
-    /// Rotation of A when frozen.
+    /// Rotation of A when it was made.
     pub rotation_a: Rot,
-    /// Rotation of B when frozen.
+    /// Rotation of B when it was made.
     pub rotation_b: Rot,
     /// One or two points; the first is always there.
     pub points: [ContactPoint; 2],

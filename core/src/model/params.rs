@@ -96,7 +96,7 @@ pub struct Params {
     pub push_out_speed: f32,
     /// A contact is made when separation < this + closing speed x dt, in m (0.02).
     pub speculative_distance: f32,
-    /// A contact's normal and anchors stay frozen until this much relative motion, in m (0.05). Zero computes every
+    /// A contact's manifold is kept until this much relative motion, in m (0.05). Zero computes every
     /// manifold anew, and piles never quite come to rest.
     pub recycle_distance: f32,
     /// Approach speed below which nothing bounces, in m/s (1).

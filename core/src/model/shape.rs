@@ -54,6 +54,16 @@ impl Shape {
         }
     }
 
+    /// Whether the outline stays as it is however the body is turned. Then turning brings no point of it nearer, its
+    /// surface comes nearer no faster than its center does, a normal impulse does not turn it, and its contacts do not
+    /// turn with it. So only for a circle around the center of mass: a capsule, or a box with rounded corners, is not round.
+    pub(crate) fn is_round(&self) -> bool {
+        match self {
+            Self::Circle { .. } => true,
+            Self::Box { .. } => false,
+        }
+    }
+
     fn is_valid(&self) -> bool {
         let positive = |x: f32| x > 0.0 && x.is_finite();
         match *self {
@@ -104,11 +114,13 @@ pub struct Kind {
 pub(crate) struct KindRow {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
-    /// Half extents of a box (zero for a circle) and the radius of a circle (zero for a box): the half width of the
+    /// Half extents of what turns (zero for a circle) and the radius around it (zero for a box): the half width of the
     /// AABB is `|c| * extent.x + |s| * extent.y + radius` for both.
     pub(crate) extent: Vec2,
     pub(crate) radius: f32,
     pub(crate) bounding_radius: f32,
+    /// One if the shape changes as it turns, zero if it [is round](Shape::is_round).
+    pub(crate) not_round: f32,
     /// Masses; zero, and so are the inverses, for a static kind.
     pub(crate) mass: f32,
     pub(crate) inertia: f32,
@@ -159,6 +171,7 @@ impl KindRow {
             extent,
             radius,
             bounding_radius: kind.shape.bounding_radius(),
+            not_round: if kind.shape.is_round() { 0.0 } else { 1.0 },
             mass: 0.0,
             inertia: 0.0,
             inv_mass: 0.0,
@@ -167,12 +180,6 @@ impl KindRow {
             root_inv_mass: 0.0,
             root_inv_inertia: 0.0,
         })
-    }
-
-    /// One for a box, zero for a circle.
-    #[inline(always)]
-    pub(crate) fn boxy(&self) -> f32 {
-        if self.radius > 0.0 { 0.0 } else { 1.0 }
     }
 
     /// Half width and half height of the AABB at a rotation, in meters.

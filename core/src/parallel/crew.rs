@@ -5,47 +5,106 @@
 //! two pieces, finds the stages it missed done. Who takes which piece does not matter: pieces of one stage share nothing.
 //!
 //! Source: stages of claimed blocks, as in the solver of Box2D v3 (E. Catto).
+//!
+//! # Who hears of what
+//!
+//! What is written in a stage is handed on along one way only, from whoever finished a piece to the one who finished the
+//! last (`done`), and from there to all who waited for the stage (`state`). A member waits for every stage before it
+//! claims a piece of the next, so a claim hands on nothing; nor does the count that begins anew, as it is begun before
+//! the stage is. These [`Orderings`] are all there are: the rest is relaxed.
+//!
+//! `loom` goes through every order in which the members may meet, and shows for each of the orderings that without it a
+//! member misses what another wrote:
+//!
+//! ```sh
+//! RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p atoll-core --lib loom
+//! ```
 
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::thread;
+use std::marker::PhantomData;
+use sync::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-/// How often a member looks before it lets others have the processor.
-const PATIENCE: u32 = 2000;
+#[cfg(all(test, loom))]
+mod loom_tests;
+
+#[cfg(not(loom))]
+mod sync {
+    pub(super) use std::hint::spin_loop;
+    pub(super) use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+    pub(super) use std::thread::yield_now;
+
+    /// How often a member looks before it lets others have the processor.
+    pub(super) const PATIENCE: u32 = 2000;
+}
+
+#[cfg(loom)]
+mod sync {
+    pub(super) use loom::hint::spin_loop;
+    pub(super) use loom::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+    pub(super) use loom::thread::yield_now;
+
+    /// A model tries every order: looking twice shows no more than looking once.
+    pub(super) const PATIENCE: u32 = 0;
+}
+
+/// The orderings by which members hear of each other's work. Types, so that checks can try weaker ones.
+pub(crate) trait Orderings {
+    /// A piece is done: hands on what was done to it, and takes up, for whoever finds it was the last, what was done to
+    /// all others.
+    const PIECE_DONE: Ordering = Ordering::AcqRel;
+    /// The next stage begins: hands on all that was done in the one before.
+    const STAGE_BEGINS: Ordering = Ordering::Release;
+    /// A stage is seen to have begun: takes that up.
+    const STAGE_SEEN: Ordering = Ordering::Acquire;
+}
+
+/// The orderings of every crew that works.
+pub(crate) struct Needed;
+
+impl Orderings for Needed {}
 
 /// What the members share.
-#[derive(Default, Debug)]
-pub(crate) struct Crew {
+pub(crate) struct Crew<O = Needed> {
     /// The stage under way, and in the low half its next piece.
     state: AtomicU64,
     /// Pieces of the stage under way that are done.
     done: AtomicU32,
     /// A member panicked: the others must not wait for its piece.
     abandoned: AtomicBool,
+    orderings: PhantomData<O>,
 }
 
 /// One of a crew, or somebody who works alone.
-pub(crate) struct Member<'a> {
-    crew: Option<&'a Crew>,
+pub(crate) struct Member<'a, O = Needed> {
+    crew: Option<&'a Crew<O>>,
     /// The stage this member comes to next.
     stage: Cell<u32>,
 }
 
-impl Crew {
+impl<O: Orderings> Crew<O> {
+    pub(crate) fn new() -> Self {
+        Self {
+            state: AtomicU64::new(0),
+            done: AtomicU32::new(0),
+            abandoned: AtomicBool::new(false),
+            orderings: PhantomData,
+        }
+    }
+
     /// A member, for one thread.
-    pub(crate) fn member(&self) -> Member<'_> {
+    pub(crate) fn member(&self) -> Member<'_, O> {
         Member { crew: Some(self), stage: Cell::new(0) }
     }
 
-    /// The next piece of a stage, for the caller alone. What was done in earlier stages is seen: `state` hands it on.
+    /// The next piece of a stage, for the caller alone, who has waited for the stage before.
     fn claim(&self, stage: u32, pieces: u32) -> Option<u32> {
-        let mut state = self.state.load(Ordering::Acquire);
+        let mut state = self.state.load(Ordering::Relaxed);
         loop {
             let piece = state as u32;
             if (state >> 32) as u32 != stage || piece >= pieces {
                 return None;
             }
-            match self.state.compare_exchange_weak(state, state + 1, Ordering::Acquire, Ordering::Acquire) {
+            match self.state.compare_exchange_weak(state, state + 1, Ordering::Relaxed, Ordering::Relaxed) {
                 Ok(_) => return Some(piece),
                 Err(now) => state = now,
             }
@@ -54,24 +113,24 @@ impl Crew {
 
     /// Notes that a piece is done. The last one to do so has seen all that the others did, and begins the next stage.
     fn finish(&self, stage: u32, pieces: u32) {
-        if self.done.fetch_add(1, Ordering::AcqRel) + 1 == pieces {
+        if self.done.fetch_add(1, O::PIECE_DONE) + 1 == pieces {
             self.done.store(0, Ordering::Relaxed);
-            self.state.store(u64::from(stage.wrapping_add(1)) << 32, Ordering::Release);
+            self.state.store(u64::from(stage.wrapping_add(1)) << 32, O::STAGE_BEGINS);
         }
     }
 
-    /// Waits for pieces that others have taken.
+    /// Waits for pieces that others have taken. Then all that was done in the stage is seen.
     fn wait(&self, stage: u32) {
         let mut looks = 0;
-        while (self.state.load(Ordering::Acquire) >> 32) as u32 == stage {
+        while (self.state.load(O::STAGE_SEEN) >> 32) as u32 == stage {
             assert!(!self.abandoned.load(Ordering::Relaxed), "another thread of this rank panicked");
             looks += 1;
-            if looks < PATIENCE { std::hint::spin_loop() } else { thread::yield_now() }
+            if looks < sync::PATIENCE { sync::spin_loop() } else { sync::yield_now() }
         }
     }
 }
 
-impl<'a> Member<'a> {
+impl<'a, O: Orderings> Member<'a, O> {
     /// Somebody without a crew: all pieces in order.
     pub(crate) fn alone() -> Self {
         Self { crew: None, stage: Cell::new(0) }
@@ -83,7 +142,7 @@ impl<'a> Member<'a> {
     /// An iterator, not a function that is given the work: what is done to a piece must be compiled within the caller,
     /// for the caller's processor (see [`super::lanes`]).
     #[inline(always)]
-    pub(crate) fn pieces(&self, pieces: u32) -> Pieces<'a> {
+    pub(crate) fn pieces(&self, pieces: u32) -> Pieces<'a, O> {
         let stage = self.stage.get();
         self.stage.set(stage.wrapping_add(1));
         Pieces { crew: self.crew, stage, pieces, next: 0, claimed: false }
@@ -91,8 +150,8 @@ impl<'a> Member<'a> {
 }
 
 /// The pieces of a stage that fall to one member.
-pub(crate) struct Pieces<'a> {
-    crew: Option<&'a Crew>,
+pub(crate) struct Pieces<'a, O: Orderings = Needed> {
+    crew: Option<&'a Crew<O>>,
     stage: u32,
     pieces: u32,
     /// Without a crew, the next piece.
@@ -101,7 +160,7 @@ pub(crate) struct Pieces<'a> {
     claimed: bool,
 }
 
-impl Iterator for Pieces<'_> {
+impl<O: Orderings> Iterator for Pieces<'_, O> {
     type Item = u32;
     #[inline(always)]
     fn next(&mut self) -> Option<u32> {
@@ -122,7 +181,7 @@ impl Iterator for Pieces<'_> {
     }
 }
 
-impl Drop for Pieces<'_> {
+impl<O: Orderings> Drop for Pieces<'_, O> {
     #[inline(always)]
     fn drop(&mut self) {
         // Only a panic leaves a piece undone.
@@ -132,13 +191,14 @@ impl Drop for Pieces<'_> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use std::thread;
 
     #[test]
     fn every_piece_is_done_once_and_stages_do_not_overlap() {
-        let crew = Crew::default();
+        let crew = Crew::<Needed>::new();
         let done: Vec<AtomicU64> = (0..50).map(|_| AtomicU64::new(0)).collect();
         thread::scope(|scope| {
             for _ in 0..3 {
@@ -160,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_member_that_comes_late_finds_all_done() {
-        let crew = Crew::default();
+        let crew = Crew::<Needed>::new();
         let work = || {
             let member = crew.member();
             (0..10).map(|_| member.pieces(3).count()).sum::<usize>()
@@ -170,7 +230,7 @@ mod tests {
 
     #[test]
     fn nobody_waits_for_a_member_that_panicked() {
-        let crew = Crew::default();
+        let crew = Crew::<Needed>::new();
         let run = || {
             let member = crew.member();
             let mut pieces = member.pieces(1);

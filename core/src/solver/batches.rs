@@ -3,7 +3,8 @@
 //! A batch is one or several whole islands. Within an island the order of constraints follows from its contacts alone
 //! (see [`super::coloring`]), so how islands are put into batches changes no bit.
 
-use super::place::{NOT_SOLVED, STATIC};
+use super::constraint::columns::Each;
+use super::index::{GraphNode, SolverIndex, place_all};
 use crate::collide::broad_phase::Pair;
 use crate::model::params::Parallel;
 use crate::parallel::lanes::LANES;
@@ -34,8 +35,7 @@ pub(crate) struct Batch {
     /// Whether several threads are to solve it together.
     pub(crate) large: bool,
     pub(crate) colors: Range<usize>,
-    pub(crate) singles: Range<usize>,
-    pub(crate) doubles: Range<usize>,
+    pub(crate) groups: Each<Range<usize>>,
 }
 
 impl Batch {
@@ -78,23 +78,25 @@ pub(crate) struct Batches {
     crews: bool,
 }
 
-fn is_node(place: u32) -> bool {
-    place != NOT_SOLVED && place != STATIC
-}
-
 /// An island without contacts that are to be solved.
 const NO_BATCH: u32 = u32::MAX;
 
 impl Batches {
-    /// Puts islands into batches, but those that sleep. `place` gives for each body of the tile its node plus one,
-    /// [`STATIC`] or [`NOT_SOLVED`]; afterwards, its place among the solver's bodies.
-    pub(crate) fn divide(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, team: Team) {
+    /// Puts islands into batches, but those that sleep. `nodes` gives for each body of the tile what it is in the graph;
+    /// returns which of the solver's bodies it is.
+    pub(crate) fn divide(
+        &mut self,
+        graph: Graph<'_>,
+        nodes: Vec<GraphNode>,
+        parallel: Parallel,
+        team: Team,
+    ) -> Vec<SolverIndex> {
         let Graph { contacts, roots, largest, sleeps, .. } = graph;
         self.crews = !team.is_alone();
         self.all.clear();
         self.contacts.clear();
         if contacts.is_empty() {
-            return;
+            return place_all(nodes, |_| SolverIndex::NOT_SOLVED);
         }
         // An island that is nearly everything is worth no sorting: the others may as well be solved with it.
         let (is_large, is_most) = (contacts.len() >= LARGE as usize, 4 * largest >= 3 * roots.len() as u64);
@@ -105,36 +107,42 @@ impl Batches {
         };
         let crew = parallel == Parallel::Coloring || parallel == Parallel::Auto && is_large;
         if together && sleeps.is_none() {
-            self.put_together(contacts.len(), place, roots.len(), crew);
+            self.put_together(contacts.len(), nodes, roots.len(), crew)
         } else {
-            self.put_apart(graph, place, parallel, together.then_some(crew));
+            self.put_apart(graph, nodes, parallel, together.then_some(crew))
         }
     }
 
     /// Everything in one batch.
-    fn put_together(&mut self, contacts: usize, place: &mut [u32], nodes: usize, crew: bool) {
+    fn put_together(&mut self, contacts: usize, nodes: Vec<GraphNode>, moving: usize, crew: bool) -> Vec<SolverIndex> {
         let mut batch = Batch::new(self.crews && crew);
-        let more = batch.statics - 1;
-        if more > 0 {
-            place.iter_mut().filter(|place| is_node(**place)).for_each(|place| *place += more);
-        }
+        let statics = batch.statics;
         batch.contacts = 0..contacts;
-        batch.bodies = 0..(batch.statics as usize + nodes).next_multiple_of(LANES);
+        batch.bodies = 0..(statics as usize + moving).next_multiple_of(LANES);
         self.contacts.extend(0..contacts as u32);
         self.all.push(batch);
+        let after = |statics: u32| move |node: GraphNode| node.placed(|number| SolverIndex::new(statics + number));
+        // After one static, as is usual, all numbers stay as they are: the compiler leaves nothing to do.
+        if statics == 1 { place_all(nodes, after(1)) } else { place_all(nodes, after(statics)) }
     }
 
     /// Islands into the batches that [`choose`](Self::choose) has them in.
-    fn put_apart(&mut self, graph: Graph<'_>, place: &mut [u32], parallel: Parallel, together: Option<bool>) {
+    fn put_apart(
+        &mut self,
+        graph: Graph<'_>,
+        nodes: Vec<GraphNode>,
+        parallel: Parallel,
+        together: Option<bool>,
+    ) -> Vec<SolverIndex> {
         let Graph { contacts, roots, .. } = graph;
-        let island_of = |place: &[u32], [a, b]: Pair| {
-            let node = if place[a as usize] == STATIC { place[b as usize] } else { place[a as usize] } - 1;
-            roots[node as usize]
+        let island_of = |[a, b]: Pair| {
+            let node = nodes[a as usize].number().or_else(|| nodes[b as usize].number());
+            roots[node.expect("one of a contact's bodies moves") as usize]
         };
         self.of_island.clear();
         self.of_island.resize(roots.len(), 0);
         for &pair in contacts {
-            self.of_island[island_of(place, pair) as usize] += 1;
+            self.of_island[island_of(pair) as usize] += 1;
         }
         self.choose(graph, parallel, together);
 
@@ -150,9 +158,8 @@ impl Batches {
             let end = first + batch.statics as usize + batch.bodies.end;
             (batch.bodies, first) = (first..first + batch.statics as usize, end.next_multiple_of(LANES));
         }
-        // Contacts are counted while bodies still go by their nodes.
         for &pair in contacts {
-            let batch = self.of_island[island_of(place, pair) as usize];
+            let batch = self.of_island[island_of(pair) as usize];
             if batch != NO_BATCH {
                 self.all[batch as usize].contacts.end += 1;
             }
@@ -165,26 +172,27 @@ impl Batches {
         }
         self.contacts.resize(sum, 0);
         for (i, &pair) in (0..).zip(contacts) {
-            let batch = self.of_island[island_of(place, pair) as usize];
+            let batch = self.of_island[island_of(pair) as usize];
             if batch != NO_BATCH {
                 let end = &mut self.all[batch as usize].contacts.end;
                 self.contacts[*end] = i;
                 *end += 1;
             }
         }
-        for place in place.iter_mut().filter(|place| is_node(**place)) {
-            let batch = self.of_island[roots[*place as usize - 1] as usize];
-            *place = if batch == NO_BATCH {
-                NOT_SOLVED
-            } else {
-                let end = &mut self.all[batch as usize].bodies.end;
-                *end += 1;
-                *end as u32 - 1
-            };
-        }
+        let mut place = |number: u32| {
+            let batch = self.of_island[roots[number as usize] as usize];
+            if batch == NO_BATCH {
+                return SolverIndex::NOT_SOLVED;
+            }
+            let end = &mut self.all[batch as usize].bodies.end;
+            *end += 1;
+            SolverIndex::new(*end as u32 - 1)
+        };
+        let places = place_all(nodes, |node| node.placed(&mut place));
         for batch in &mut self.all {
             batch.bodies.end = batch.bodies.end.next_multiple_of(LANES);
         }
+        places
     }
 
     /// Decides which island goes into which batch, from the contacts of each alone: ascending, so that neighbours in
@@ -240,17 +248,15 @@ mod tests {
     }
 
     /// Numbers the bodies with contacts as the solver does: places, and links between nodes.
-    fn number(bodies: usize, contacts: &[Pair]) -> (Vec<u32>, Vec<Pair>) {
-        let mut place = vec![NOT_SOLVED; bodies];
-        contacts.iter().flatten().for_each(|&body| place[body as usize] = STATIC);
-        let mut nodes = 0;
-        for place in place[2..].iter_mut().filter(|place| **place == STATIC) {
-            nodes += 1;
-            *place = nodes;
+    fn number(bodies: usize, contacts: &[Pair]) -> (Vec<GraphNode>, Vec<Pair>) {
+        let mut node = vec![GraphNode::NO_CONTACT; bodies];
+        contacts.iter().flatten().for_each(|&body| node[body as usize] = GraphNode::STATIC);
+        for (number, node) in (0..).zip(node[2..].iter_mut().filter(|node| **node == GraphNode::STATIC)) {
+            *node = GraphNode::new(number);
         }
-        let links = contacts.iter().map(|&[a, b]| [place[a as usize], place[b as usize]]);
-        let links = links.filter(|link| !link.contains(&STATIC)).map(|link| link.map(|place| place - 1)).collect();
-        (place, links)
+        let links = contacts.iter().map(|&[a, b]| Some([node[a as usize].number()?, node[b as usize].number()?]));
+        let links = links.flatten().collect();
+        (node, links)
     }
 
     proptest! {
@@ -258,7 +264,7 @@ mod tests {
         #[test]
         fn batches_share_nothing_and_leave_nothing_out((bodies, contacts) in any_contacts(), sleep: bool) {
             let (nodes, links) = number(bodies, &contacts);
-            let count = nodes.iter().filter(|&&place| is_node(place)).count();
+            let count = nodes.iter().filter_map(|node| node.number()).count();
             let mut islands = Islands::default();
             let largest = islands.find(IslandSearch::UnionFind, count, &links, Team::ALONE).largest;
             let roots = islands.roots();
@@ -268,9 +274,8 @@ mod tests {
             let graph = Graph { contacts: &contacts, roots, largest, first_ghost, sleeps };
             for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
                 for team in [Team::ALONE, Team::of_pool()] {
-                    let mut place = nodes.clone();
                     let mut batches = Batches::default();
-                    batches.divide(graph, &mut place, parallel, team);
+                    let place = batches.divide(graph, nodes.clone(), parallel, team);
                     let mut solved = vec![false; contacts.len()];
                     let mut next = (0, 0);
                     for batch in &batches.all {
@@ -282,18 +287,19 @@ mod tests {
                         for &contact in own {
                             solved[contact as usize] = true;
                             for body in contacts[contact as usize] {
-                                let place = place[body as usize] as usize;
+                                let place = place[body as usize].get();
                                 let moving = batch.bodies.start + batch.statics as usize..batch.bodies.end;
                                 prop_assert!(body < 2 || moving.contains(&place), "a body in another batch");
                             }
                         }
                     }
                     for (contact, solved) in contacts.iter().zip(solved) {
-                        let node = contact.map(|body| nodes[body as usize]).into_iter().find(|&place| is_node(place));
-                        let root = roots[node.expect("one moves") as usize - 1];
+                        let node = contact.iter().find_map(|&body| nodes[body as usize].number());
+                        let root = roots[node.expect("one moves") as usize];
                         prop_assert_eq!(solved, !(sleep && asleep[root as usize]));
                     }
-                    let mut places: Vec<u32> = place.into_iter().filter(|&place| is_node(place)).collect();
+                    let solved = |place: &SolverIndex| ![SolverIndex::STATIC, SolverIndex::NOT_SOLVED].contains(place);
+                    let mut places: Vec<_> = place.into_iter().filter(solved).collect();
                     places.sort_unstable();
                     prop_assert!(places.windows(2).all(|pair| pair[0] < pair[1]), "two bodies at one place");
                 }

@@ -1,11 +1,12 @@
 //! The bodies a solver works on: those with contacts, compacted.
 
-use super::batches::Batches;
-use super::place::{NOT_SOLVED, STATIC};
+use super::batches::{Batches, Graph};
+use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
 use crate::exchange::record::{GhostRefresh, Unseen};
 use crate::model::params::Ghosts;
 use crate::parallel::lanes::Quad;
+use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -26,10 +27,12 @@ pub(crate) struct SolverBodies {
     pub(crate) start: Vec<Quad>,
     /// Roots of mass, inertia, inverse inertia, inverse mass.
     pub(crate) weight: Vec<Quad>,
-    /// Ghosts, by place.
+    /// Ghosts, in the order of these bodies.
     pub(crate) ghosts: Vec<Ghost>,
-    /// For each body of the tile its place here.
-    place: Vec<u32>,
+    /// For each body of the tile what it is in the graph of contacts; empty once that is made into `index`.
+    node: Vec<GraphNode>,
+    /// For each body of the tile which of these it is; empty while it has a `node`.
+    index: Vec<SolverIndex>,
     /// Contacts between bodies that move, as nodes: bodies with contacts, in the order of the tile.
     links: Vec<Pair>,
     nodes: usize,
@@ -41,7 +44,7 @@ pub(crate) struct SolverBodies {
 /// A ghost among the solver's bodies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ghost {
-    pub(crate) place: u32,
+    pub(crate) place: SolverIndex,
     /// What it is given in every substep, mass-weighted; its velocity, if it is frozen.
     pub(crate) given: [f32; 3],
 }
@@ -52,34 +55,33 @@ impl SolverBodies {
     /// Numbers the bodies that have contacts: the nodes of the contact graph.
     pub(crate) fn number(&mut self, tile: &Tile, contacts: &[Pair]) {
         let dynamic = tile.owned + tile.ghosts();
-        self.place.clear();
-        self.place.resize(tile.bodies.len(), NOT_SOLVED);
+        self.node = forget(std::mem::take(&mut self.index), tile.bodies.len());
+        // Whoever has a contact is taken for a static, until it turns out to move.
         for &[a, b] in contacts {
-            self.place[a as usize] = STATIC;
-            self.place[b as usize] = STATIC;
+            self.node[a as usize] = GraphNode::STATIC;
+            self.node[b as usize] = GraphNode::STATIC;
         }
         let mut nodes = 0;
-        let (owned, ghosts) = self.place[..dynamic].split_at_mut(tile.owned);
-        for places in [owned, ghosts] {
+        let (owned, ghosts) = self.node[..dynamic].split_at_mut(tile.owned);
+        for bodies in [owned, ghosts] {
             self.first_ghost = nodes as usize;
-            for place in places.iter_mut().filter(|place| **place == STATIC) {
+            for node in bodies.iter_mut().filter(|node| **node == GraphNode::STATIC) {
+                *node = GraphNode::new(nodes);
                 nodes += 1;
-                *place = nodes;
             }
         }
         self.nodes = nodes as usize;
         self.links.clear();
         for &[a, b] in contacts {
-            let (a, b) = (self.place[a as usize], self.place[b as usize]);
-            if a != STATIC && b != STATIC {
-                self.links.push([a - 1, b - 1]);
+            if let (Some(a), Some(b)) = (self.node[a as usize].number(), self.node[b as usize].number()) {
+                self.links.push([a, b]);
             }
         }
     }
 
-    /// As [`places`](Self::places); until bodies are loaded, of each body with contacts its node plus one.
-    pub(crate) fn places_mut(&mut self) -> &mut [u32] {
-        &mut self.place
+    /// For each body of the tile what it is in the graph of contacts.
+    pub(crate) fn nodes(&self) -> &[GraphNode] {
+        &self.node
     }
 
     /// How many bodies have contacts, and which of them touch.
@@ -87,13 +89,14 @@ impl SolverBodies {
         (self.nodes, &self.links)
     }
 
-    /// For each body of the tile its place, [`STATIC`] or [`NOT_SOLVED`].
-    pub(crate) fn places(&self) -> &[u32] {
-        &self.place
+    /// For each body of the tile which of these it is.
+    pub(crate) fn places(&self) -> &[SolverIndex] {
+        &self.index
     }
 
-    /// Takes the bodies in at their places.
-    pub(crate) fn load(&mut self, tile: &Tile, batches: &Batches, setup: &Setup) {
+    /// Puts the islands of the graph into batches, and takes their bodies in.
+    pub(crate) fn load(&mut self, tile: &Tile, batches: &mut Batches, graph: Graph<'_>, setup: &Setup, team: Team) {
+        self.index = batches.divide(graph, std::mem::take(&mut self.node), setup.params.parallel, team);
         let total = batches.all.last().map_or(0, |batch| batch.bodies.end);
         for column in [&mut self.velocity, &mut self.pose, &mut self.start, &mut self.weight] {
             column.clear();
@@ -103,8 +106,8 @@ impl SolverBodies {
         self.frozen = setup.params.ghosts == Ghosts::Frozen;
         let bodies = &tile.bodies;
         for i in 0..tile.owned + tile.ghosts() {
-            let place = self.place[i];
-            if place == NOT_SOLVED {
+            let place = self.index[i];
+            if place == SolverIndex::NOT_SOLVED {
                 continue;
             }
             let kind = setup.kind(bodies.kind[i]);
@@ -112,8 +115,8 @@ impl SolverBodies {
             let (root_mass, root_inertia) = (kind.root_mass * scale, kind.root_inertia * scale);
             let velocity = bodies.velocity[i] * root_mass;
             let velocity = [velocity.x, velocity.y, bodies.angular_velocity[i] * root_inertia];
-            self.velocity[place as usize] = [velocity[0], velocity[1], velocity[2], 0.0];
-            self.weight[place as usize] =
+            self.velocity[place.get()] = [velocity[0], velocity[1], velocity[2], 0.0];
+            self.weight[place.get()] =
                 [root_mass, root_inertia, kind.root_inv_inertia / scale, kind.root_inv_mass / scale];
             if i >= tile.owned {
                 let given = if self.frozen { velocity } else { self.given(place, &tile.unseen[i - tile.owned]) };
@@ -131,18 +134,18 @@ impl SolverBodies {
     }
 
     /// Mass-weighted, what a ghost is given per substep.
-    fn given(&self, place: u32, unseen: &Unseen) -> [f32; 3] {
-        let [_, _, root_inv_inertia, root_inv_mass] = self.weight[place as usize];
+    fn given(&self, place: SolverIndex, unseen: &Unseen) -> [f32; 3] {
+        let [_, _, root_inv_inertia, root_inv_mass] = self.weight[place.get()];
         [unseen.linear.x * root_inv_mass, unseen.linear.y * root_inv_mass, unseen.angular * root_inv_inertia]
     }
 
     /// Takes over a ghost's state from its owner. Its share of the next warm start stays this tile's own.
     pub(crate) fn refresh(&mut self, body: usize, refresh: &GhostRefresh) {
-        let place = self.place[body];
-        if place == NOT_SOLVED {
+        let place = self.index[body];
+        if place == SolverIndex::NOT_SOLVED {
             return;
         }
-        let i = place as usize;
+        let i = place.get();
         for (k, &velocity) in refresh.velocity.iter().enumerate() {
             let impulse = self.velocity[i][k] - self.start[i][k];
             self.velocity[i][k] = velocity;
@@ -155,14 +158,14 @@ impl SolverBodies {
 
     /// Mass-weighted velocity and pose of a body with a contact, as another tile's ghost takes them over.
     pub(crate) fn state_of(&self, body: u32) -> ([f32; 3], Quad) {
-        let place = self.place_of(body) as usize;
+        let place = self.place_of(body).get();
         let [x, y, w, _] = self.velocity[place];
         ([x, y, w], self.pose[place])
     }
 
-    /// The place of a body of the tile: [`STATIC`], or [`NOT_SOLVED`] if it has no contact.
+    /// Which of these a body of the tile is.
     #[inline(always)]
-    pub(crate) fn place_of(&self, body: u32) -> u32 {
-        self.place[body as usize]
+    pub(crate) fn place_of(&self, body: u32) -> SolverIndex {
+        self.index[body as usize]
     }
 }

@@ -1,7 +1,7 @@
 //! Greedy coloring of the constraint graph: contacts of one color share no body that moves.
 
 use super::batches::Batches;
-use super::place::STATIC;
+use super::index::SolverIndex;
 use crate::collide::broad_phase::Pair;
 use crate::parallel::team::Team;
 
@@ -22,7 +22,7 @@ pub(crate) struct Coloring {
 impl Coloring {
     /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet. `place` gives for
     /// each body of the tile its place among the solver's.
-    pub(crate) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[u32], team: Team) {
+    pub(crate) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[SolverIndex], team: Team) {
         self.taken.clear();
         self.taken.resize(batches.all.last().map_or(0, |batch| batch.bodies.end), 0);
         self.color.clear();
@@ -36,14 +36,15 @@ impl Coloring {
         });
         let color_batch = |(own, color, taken, base): (&[u32], &mut [u8], &mut [u64], u32)| {
             // The first body of a batch stands for all statics: it never moves, so it is never taken.
-            let local = |body: u32| place[body as usize].max(base) as usize - base as usize;
+            const STATICS: u32 = 0;
+            let local = |body: u32| place[body as usize].within(base, STATICS) as usize;
             for (&contact, color) in own.iter().zip(color) {
                 let [a, b] = contacts[contact as usize].map(local);
                 let free = (taken[a] | taken[b]).trailing_ones();
                 if free < COLORS as u32 {
                     taken[a] |= 1 << free;
                     taken[b] |= 1 << free;
-                    taken[STATIC as usize] = 0;
+                    taken[STATICS as usize] = 0;
                 }
                 *color = free as u8;
             }

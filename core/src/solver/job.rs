@@ -1,9 +1,10 @@
 //! A batch with its part of the solver's buffers, for one thread or a crew of them.
 
 use super::bodies::Ghost;
-use super::constraint::groups::{Color, Group};
+use super::constraint::columns::SharedColumns;
 use super::constraint::kernels::{Pass, Table};
-use super::motion::{Motion, turn_on};
+use super::constraint::layout::Color;
+use super::motion::{Motion, integrate_rotation};
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{LANES, Lanes, Quad};
 use crate::parallel::shared::Shared;
@@ -21,12 +22,11 @@ pub(crate) struct Job<'a> {
     pub(crate) pose: Shared<'a, Quad>,
     pub(crate) start: Shared<'a, Quad>,
     pub(crate) weight: &'a [Quad],
-    pub(crate) singles: Shared<'a, Group<1>>,
-    pub(crate) doubles: Shared<'a, Group<2>>,
+    pub(crate) groups: SharedColumns<'a>,
     pub(crate) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
     pub(crate) ghosts: &'a [Ghost],
-    pub(crate) base: u32,
+    pub(crate) base: usize,
     pub(crate) frozen: bool,
     /// Whether it is worth a crew.
     pub(crate) large: bool,
@@ -57,19 +57,13 @@ impl<'a> Job<'a> {
     #[inline(always)]
     fn colors_of_stage<V: Lanes>(&self, stage: &[Color], slice: u32, pass: impl Pass) {
         for color in stage {
-            let (singles, doubles) = color.slice(slice);
             // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
             // piece has a body of its own that stands for statics. A stage of several colors has one piece.
-            let (singles, doubles, bodies) = unsafe {
+            let (groups, bodies) = unsafe {
                 let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
-                (self.singles.range(singles), self.doubles.range(doubles), bodies)
+                (self.groups.range(color.slice(slice)), bodies)
             };
-            for group in singles {
-                pass.group::<V, 1>(group, bodies);
-            }
-            for group in doubles {
-                pass.group::<V, 2>(group, bodies);
-            }
+            groups.pass::<V>(pass, bodies);
         }
     }
 
@@ -107,7 +101,7 @@ impl<'a> Job<'a> {
                 V::store_quads([warm[0], warm[1], warm[2], rest], velocity);
             }
             for ghost in self.ghosts_in(&range) {
-                let i = (ghost.place - self.base) as usize - range.start;
+                let i = ghost.place.get() - self.base - range.start;
                 for (k, given) in ghost.given.into_iter().enumerate() {
                     if self.frozen {
                         (starts[i][k], velocities[i][k]) = (given, given);
@@ -122,7 +116,7 @@ impl<'a> Job<'a> {
 
     /// The ghosts among some bodies.
     fn ghosts_in(&self, bodies: &Range<usize>) -> &[Ghost] {
-        let before = |body: usize| self.ghosts.partition_point(|ghost| (ghost.place - self.base) as usize <= body);
+        let before = |body: usize| self.ghosts.partition_point(|ghost| ghost.place.get() - self.base <= body);
         match bodies.start {
             _ if self.ghosts.is_empty() => &[],
             start => &self.ghosts[if start == 0 { 0 } else { before(start - 1) }..before(bodies.end - 1)],
@@ -142,7 +136,7 @@ impl<'a> Job<'a> {
                 let [vx, vy, w, _] = V::load_quads(velocity);
                 let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
                 let [x, y, c, s] = V::load_quads(pose);
-                let (c, s) = turn_on(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
+                let (c, s) = integrate_rotation(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
             }
         }

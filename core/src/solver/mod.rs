@@ -17,11 +17,11 @@ mod batches;
 mod bodies;
 mod coloring;
 mod constraint;
+pub(crate) mod index;
 #[allow(unsafe_code)]
 mod job;
 mod motion;
 mod pgs;
-pub(crate) mod place;
 mod run;
 mod soft_step;
 mod write_back;
@@ -32,8 +32,8 @@ pub(crate) use write_back::write_back;
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::params::{Exchange, Parallel};
-use crate::parallel::crew::{Crew, Member};
-use crate::parallel::lanes::{LANES, dispatch};
+use crate::parallel::crew::{Crew, Member, Needed};
+use crate::parallel::lanes::dispatch;
 use crate::parallel::shared::Shared;
 use crate::parallel::team::Team;
 use crate::state::violation::Violation;
@@ -41,8 +41,10 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use batches::{Batches, Graph};
 use coloring::Coloring;
-use constraint::groups::{Group, Groups};
+use constraint::columns::lengths;
+use constraint::groups::Groups;
 use constraint::rows::Source;
+use index::GraphNode;
 use job::Job;
 use run::Run;
 use std::ops::Range;
@@ -63,22 +65,26 @@ impl Solver {
         self.bodies.graph()
     }
 
-    /// Puts the islands into batches, leaves those out that sleep (see [`crate::islands::sleep`]), and takes their bodies in.
-    /// `roots` gives for each node the lowest of its island, `largest` how many nodes the largest island has.
+    /// For each body of the tile what it is in the graph of contacts, until bodies are gathered.
+    pub(crate) fn nodes(&self) -> &[GraphNode] {
+        self.bodies.nodes()
+    }
+
+    /// Puts the islands into batches, but those that sleep, and takes their bodies in. `roots` gives for each node the
+    /// lowest of its island, `largest` how many nodes the largest island has.
     pub(crate) fn gather(
         &mut self,
-        tile: &mut Tile,
+        tile: &Tile,
         contacts: &[Pair],
         (roots, largest): (&[u32], u64),
         setup: &Setup,
         team: Team,
     ) {
-        let sleeps = setup.params.sleep.then(|| tile.fall_asleep(self.bodies.places(), roots, setup));
+        let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
         let heard_of = setup.params.exchange == Exchange::Substep;
         let first_ghost = if heard_of { self.bodies.first_ghost } else { roots.len() };
         let graph = Graph { contacts, roots, largest, first_ghost, sleeps };
-        self.batches.divide(graph, self.bodies.places_mut(), setup.params.parallel, team);
-        self.bodies.load(tile, &self.batches, setup);
+        self.bodies.load(tile, &mut self.batches, graph, setup, team);
     }
 
     /// Colors the contacts and gives each its place. Returns how many colors there are.
@@ -115,7 +121,7 @@ impl Solver {
         let to_do = self.jobs().filter(|job| !substeps(job).is_empty());
         let (large, small): (Vec<_>, Vec<_>) = to_do.partition(|job| job.large);
         for job in &large {
-            let crew = Crew::default();
+            let crew = Crew::<Needed>::new();
             team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps(job), setup }));
         }
         team.for_each(small, alone);
@@ -125,24 +131,23 @@ impl Solver {
     fn jobs(&mut self) -> impl Iterator<Item = Job<'_>> {
         const IN_ORDER: &str = "batches lie in order";
         let SolverBodies { velocity, pose, start, weight, ghosts, frozen, .. } = &mut self.bodies;
-        let Groups { singles, doubles, colors, .. } = &mut self.groups;
+        let (mut groups, colors) = self.groups.parts();
         let (mut velocity, mut pose, mut start) = (&mut velocity[..], &mut pose[..], &mut start[..]);
-        let (mut singles, mut doubles, mut ghosts) = (&mut singles[..], &mut doubles[..], &ghosts[..]);
-        let (weight, colors, frozen) = (&weight[..], &colors[..], *frozen);
+        let mut ghosts = &ghosts[..];
+        let (weight, frozen) = (&weight[..], *frozen);
         self.batches.all.iter().map(move |batch| {
             let bodies = batch.bodies.len();
-            let own_ghosts = ghosts.partition_point(|ghost| (ghost.place as usize) < batch.bodies.end);
+            let own_ghosts = ghosts.partition_point(|ghost| ghost.place.get() < batch.bodies.end);
             let colors = &colors[batch.colors.clone()];
             Job {
                 velocity: Shared::new(velocity.split_off_mut(..bodies).expect(IN_ORDER)),
                 pose: Shared::new(pose.split_off_mut(..bodies).expect(IN_ORDER)),
                 start: Shared::new(start.split_off_mut(..bodies).expect(IN_ORDER)),
                 weight: &weight[batch.bodies.clone()],
-                singles: Shared::new(singles.split_off_mut(..batch.singles.len()).expect(IN_ORDER)),
-                doubles: Shared::new(doubles.split_off_mut(..batch.doubles.len()).expect(IN_ORDER)),
+                groups: groups.split_off(lengths(&batch.groups)).share(),
                 colors,
                 ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
-                base: batch.bodies.start as u32,
+                base: batch.bodies.start,
                 frozen,
                 large: batch.large && colors.iter().any(|color| color.slices > 1),
             }
@@ -150,27 +155,24 @@ impl Solver {
     }
 
     /// Bounces: contacts that pressed and came in fast get their approach speed back, in part.
-    pub(crate) fn restitute(&mut self, setup: &Setup) {
+    pub(crate) fn apply_restitution(&mut self, setup: &Setup) {
         if setup.bouncy {
-            self.groups.restitute(&mut self.bodies);
+            self.groups.apply_restitution(&mut self.bodies);
         }
     }
 
     /// Copies the impulses of the last substep back to the contacts.
     pub(crate) fn store_impulses(&self, contacts: &mut Contacts) {
-        fn copy<const N: usize>(groups: &[Group<N>], members: &[[u32; LANES]], contacts: &mut Contacts) {
-            for (group, members) in groups.iter().zip(members) {
-                for (lane, &contact) in members.iter().enumerate() {
-                    let Some(contact) = contacts.cache.contacts.get_mut(contact as usize) else { continue };
-                    for (point, rows) in contact.points.iter_mut().zip(&group.points) {
-                        point.normal_impulse = rows.normal_impulse[lane];
-                        point.tangent_impulse = rows.tangent_impulse[lane];
-                    }
+        let contacts = &mut contacts.cache.contacts;
+        self.groups.each(|rows, members| {
+            for (lane, &contact) in members.iter().enumerate() {
+                let Some(contact) = contacts.get_mut(contact as usize) else { continue };
+                for (point, rows) in contact.points.iter_mut().zip(rows) {
+                    point.normal_impulse = rows.normal_impulse[lane];
+                    point.tangent_impulse = rows.tangent_impulse[lane];
                 }
             }
-        }
-        copy(&self.groups.singles, &self.groups.in_singles, contacts);
-        copy(&self.groups.doubles, &self.groups.in_doubles, contacts);
+        });
     }
 
     /// Brings a contact's separations up to date after its bodies were placed anew.
@@ -179,8 +181,8 @@ impl Solver {
     }
 
     /// Gives one of a contact's bodies some more impulse at one of its points.
-    pub(crate) fn push(&mut self, contact: u32, point: usize, upon_a: bool, normal: f32, tangent: f32) {
-        self.groups.push(contact, point, upon_a, [normal, tangent], &mut self.bodies);
+    pub(crate) fn apply_impulse(&mut self, contact: u32, point: usize, upon_a: bool, normal: f32, tangent: f32) {
+        self.groups.apply_impulse(contact, point, upon_a, [normal, tangent], &mut self.bodies);
     }
 
     /// How fast, in m/s, the surfaces of each solved point still come nearer than they may.

@@ -53,7 +53,7 @@ impl Motion {
 
 /// A rotation turned on by a small angle, at length one again.
 #[inline(always)]
-pub(crate) fn turn_on<V: Lanes>(c: V, s: V, angle: V) -> (V, V) {
+pub(crate) fn integrate_rotation<V: Lanes>(c: V, s: V, angle: V) -> (V, V) {
     let turned_c = c.sub(angle.mul(s));
     let turned_s = s.add(angle.mul(c));
     let scale = V::splat(1.0).div(turned_c.mul(turned_c).add(turned_s.mul(turned_s)).sqrt());

@@ -11,7 +11,7 @@
 //! faster than `push_out_speed`. The push goes through the velocities, so it adds energy; `soft-step` does not have that
 //! fault. Contacts still apart may close their gap within the step, no more.
 
-use super::constraint::groups::Group;
+use super::constraint::group::Group;
 use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
 use super::motion::Motion;
@@ -50,11 +50,11 @@ impl Iterate {
 impl Pass for Iterate {
     #[inline(always)]
     fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
-        let mut a = V::gather(bodies.velocity, &group.a);
-        let mut b = V::gather(bodies.velocity, &group.b);
-        let normals = Normals::<V>::load(group);
+        let mut a = V::gather(bodies.velocity, &group.sides.a);
+        let mut b = V::gather(bodies.velocity, &group.sides.b);
+        let normals = Normals::<V>::load(&group.sides);
         let zero = V::splat(0.0);
-        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
+        normals.apply_friction(&mut group.points, V::load(&group.sides.friction), &mut a, &mut b);
         for rows in &mut group.points {
             let axis = normals.normal(rows);
             let separation = V::load(&rows.separation);
@@ -64,12 +64,12 @@ impl Pass for Iterate {
             let old = V::load(&rows.normal_impulse);
             let wanted = V::load(&rows.normal_mass).mul(axis.speed(&a, &b).add(bias));
             let new = old.sub(wanted).max(zero);
-            axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
+            axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
             // The step is the only substep: what it did in all is what it does now.
             new.store(&mut rows.total_normal);
             V::load(&rows.tangent_impulse).store(&mut rows.total_tangent);
         }
-        V::scatter(a, bodies.velocity, &group.a);
-        V::scatter(b, bodies.velocity, &group.b);
+        V::scatter(a, bodies.velocity, &group.sides.a);
+        V::scatter(b, bodies.velocity, &group.sides.b);
     }
 }

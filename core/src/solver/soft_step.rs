@@ -4,7 +4,7 @@
 //! (warm starting), solves with soft contacts that push overlap out, integrates positions, and solves once more without
 //! the push ("relax"), so that the push adds no energy.
 
-use super::constraint::groups::Group;
+use super::constraint::group::Group;
 use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
 use super::job::Job;
 use super::motion::Motion;
@@ -52,10 +52,10 @@ impl Solve {
 impl Pass for Solve {
     #[inline(always)]
     fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
-        let mut a = V::gather(bodies.velocity, &group.a);
-        let mut b = V::gather(bodies.velocity, &group.b);
-        let normals = Normals::<V>::load(group);
-        let fixed = V::load(&group.fixed);
+        let mut a = V::gather(bodies.velocity, &group.sides.a);
+        let mut b = V::gather(bodies.velocity, &group.sides.b);
+        let normals = Normals::<V>::load(&group.sides);
+        let fixed = V::load(&group.sides.fixed);
         let either = |of: fn(&Softness) -> f32| {
             fixed.if_positive(V::splat(of(&self.static_softness)), V::splat(of(&self.softness)))
         };
@@ -74,11 +74,11 @@ impl Pass for Solve {
             let speed = axis.speed(&a, &b);
             let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
             let new = old.sub(wanted).sub(impulse_scale.mul(old)).max(zero);
-            axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
+            axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
         }
-        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
-        V::scatter(a, bodies.velocity, &group.a);
-        V::scatter(b, bodies.velocity, &group.b);
+        normals.apply_friction(&mut group.points, V::load(&group.sides.friction), &mut a, &mut b);
+        V::scatter(a, bodies.velocity, &group.sides.a);
+        V::scatter(b, bodies.velocity, &group.sides.b);
     }
 }
 
@@ -98,11 +98,11 @@ impl<const TOTALS: bool> Relax<TOTALS> {
 impl<const TOTALS: bool> Pass for Relax<TOTALS> {
     #[inline(always)]
     fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
-        let mut a = V::gather(bodies.velocity, &group.a);
-        let mut b = V::gather(bodies.velocity, &group.b);
-        let pose_a = V::gather(bodies.pose, &group.a);
-        let pose_b = V::gather(bodies.pose, &group.b);
-        let normals = Normals::<V>::load(group);
+        let mut a = V::gather(bodies.velocity, &group.sides.a);
+        let mut b = V::gather(bodies.velocity, &group.sides.b);
+        let pose_a = V::gather(bodies.pose, &group.sides.a);
+        let pose_b = V::gather(bodies.pose, &group.sides.b);
+        let normals = Normals::<V>::load(&group.sides);
         let zero = V::splat(0.0);
         for rows in &mut group.points {
             let axis = normals.normal(rows);
@@ -112,18 +112,18 @@ impl<const TOTALS: bool> Pass for Relax<TOTALS> {
             let old = V::load(&rows.normal_impulse);
             let wanted = V::load(&rows.normal_mass).mul(axis.speed(&a, &b).add(bias));
             let new = old.sub(wanted).max(zero);
-            axis.push(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
+            axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
             if TOTALS {
                 V::load(&rows.total_normal).add(new).store(&mut rows.total_normal);
             }
         }
-        normals.rub(&mut group.points, V::load(&group.friction), &mut a, &mut b);
+        normals.apply_friction(&mut group.points, V::load(&group.sides.friction), &mut a, &mut b);
         if TOTALS {
             for rows in &mut group.points {
                 V::load(&rows.total_tangent).add(V::load(&rows.tangent_impulse)).store(&mut rows.total_tangent);
             }
         }
-        V::scatter(a, bodies.velocity, &group.a);
-        V::scatter(b, bodies.velocity, &group.b);
+        V::scatter(a, bodies.velocity, &group.sides.a);
+        V::scatter(b, bodies.velocity, &group.sides.b);
     }
 }

@@ -1,8 +1,8 @@
 //! Every owned body's new state, solved or flown, written back to the tile.
 
 use super::bodies::SolverBodies;
-use super::motion::{Motion, turn_on};
-use super::place::NOT_SOLVED;
+use super::index::SolverIndex;
+use super::motion::{Motion, integrate_rotation};
 use crate::model::id::GlobalId;
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row, dispatch};
@@ -46,7 +46,7 @@ struct Owned<'a> {
     angular_velocity: &'a mut [f32],
     id: &'a [GlobalId],
     /// Among the solver's bodies.
-    place: &'a [u32],
+    place: &'a [SolverIndex],
     /// Empty where nobody sleeps.
     asleep: &'a [bool],
     not_finite: Option<GlobalId>,
@@ -88,7 +88,7 @@ impl<'a> Owned<'a> {
     /// A body with contacts, from its solver body.
     #[inline(always)]
     fn store(&mut self, i: usize, solved: &SolverBodies) {
-        let place = self.place[i] as usize;
+        let place = self.place[i].get();
         let [_, _, root_inv_inertia, root_inv_mass] = solved.weight[place];
         let [x, y, c, s] = solved.pose[place];
         let [vx, vy, w, _] = solved.velocity[place];
@@ -117,7 +117,7 @@ impl Kernel for WriteBack<'_> {
             let (mut flying, mut storing) = (0, 0);
             for (i, &place) in (first..end).zip(&owned.place[first..end]) {
                 (flown[flying], stored[storing]) = (i as u32, i as u32);
-                let flies = place == NOT_SOLVED;
+                let flies = place == SolverIndex::NOT_SOLVED;
                 flying += usize::from(flies);
                 storing += usize::from(!flies);
             }
@@ -155,7 +155,7 @@ fn fly<V: Lanes>(owned: &mut Owned<'_>, block: &[u32], motion: &Motion, substeps
     for _ in 0..substeps {
         velocity = motion.accelerate(velocity, one, one);
         (x, y) = (x.add(h.mul(velocity[0])), y.add(h.mul(velocity[1])));
-        (c, s) = turn_on(c, s, h.mul(velocity[2]));
+        (c, s) = integrate_rotation(c, s, h.mul(velocity[2]));
     }
     let mut out: [Row; 7] = [[0.0; LANES]; 7];
     for (row, value) in out.iter_mut().zip([velocity[0], velocity[1], velocity[2], x, y, c, s]) {

@@ -2,5 +2,6 @@
 
 pub(crate) mod facts;
 pub(crate) mod hash;
+mod layout;
 pub(crate) mod snapshot;
 pub(crate) mod violation;

@@ -84,7 +84,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
                 }
             }
             world.each_tile_apart(|bench| {
-                bench.stage(Phase::Finalize, |b| b.work.solver.restitute(b.setup));
+                bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution(b.setup));
                 bench.stage(Phase::Border, send_impulses);
             });
             world.exchange(halo)?;
@@ -115,7 +115,7 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
     world.begin_step();
     migrate(&mut world, halo)?;
     Ok(world.each_tile(|bench| {
-        // Manifolds as they are, not as they were frozen.
+        // Manifolds as they are, not as they were kept.
         bench.tile.contacts.clear();
         bench.tile.strays.clear();
         collide(bench);
@@ -175,7 +175,9 @@ fn prepare(bench: &mut Bench<'_>) {
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (sizes.islands, sizes.largest);
         (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
-        solver.gather(b.tile, &contacts.bodies, (b.work.islands.roots(), sizes.largest), b.setup, b.team);
+        let roots = b.work.islands.roots();
+        b.tile.fall_asleep(solver.nodes(), roots, b.setup);
+        solver.gather(b.tile, &contacts.bodies, (roots, sizes.largest), b.setup, b.team);
     });
     bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
     bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));
@@ -190,7 +192,7 @@ fn finalize(bench: &mut Bench<'_>) {
     bench.stage(Phase::Finalize, |b| {
         let (solver, contacts) = (&mut b.work.solver, &mut b.work.contacts);
         if b.setup.params.exchange == Exchange::Step {
-            solver.restitute(b.setup);
+            solver.apply_restitution(b.setup);
         }
         if b.measures {
             b.tile.violation = solver.violation(contacts, b.setup);

@@ -7,6 +7,7 @@ use crate::model::body::Bodies;
 use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
 use crate::model::id::{GlobalId, TileId};
 use crate::model::params::BroadPhase;
+use crate::solver::index::GraphNode;
 use crate::state::hash::Hashes;
 use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
@@ -152,13 +153,13 @@ impl Tile {
         if a < b { (a, b) } else { (b, a) }
     }
 
-    /// Sends islands to sleep, or wakes them. Returns which sleep (see [`Sleep::decide`]).
-    pub(crate) fn fall_asleep(&mut self, nodes: &[u32], roots: &[u32], setup: &Setup) -> &[bool] {
-        self.sleep.resize(self.owned);
-        let (velocity, angular_velocity) = (&mut self.bodies.velocity, &mut self.bodies.angular_velocity);
-        let (islands, count) = self.sleep.decide(nodes, roots, velocity, angular_velocity, setup);
-        self.counts.asleep = count;
-        islands
+    /// Sends islands to sleep, which takes their bodies' velocities, or wakes them (see [`Sleep::decide`]).
+    pub(crate) fn fall_asleep(&mut self, nodes: &[GraphNode], roots: &[u32], setup: &Setup) {
+        if setup.params.sleep {
+            self.sleep.resize(self.owned);
+            let (velocity, angular_velocity) = (&mut self.bodies.velocity, &mut self.bodies.angular_velocity);
+            self.counts.asleep = self.sleep.decide(nodes, roots, velocity, angular_velocity, setup);
+        }
     }
 
     /// Notes who has rested in this step.

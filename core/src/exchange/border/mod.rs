@@ -225,7 +225,7 @@ impl Solver {
             let mean = |a: f32, b: f32| 0.5 * (a + b);
             let normal = mean(mine.total_normal, theirs.total_normal) - mine.total_normal;
             let tangent = mean(mine.total_tangent, theirs.total_tangent) - mine.total_tangent;
-            self.push(contact, k, owns_a, normal, tangent);
+            self.apply_impulse(contact, k, owns_a, normal, tangent);
             self.groups.set_impulses(contact, k, mean(mine.normal, theirs.normal), mean(mine.tangent, theirs.tangent));
         }
     }

@@ -1,6 +1,6 @@
 //! What the passes of both solvers do to a group of contacts, eight lanes at a time.
 
-use super::groups::{Group, PointRows};
+use super::group::{Group, PointRows, Sides};
 use crate::parallel::lanes::{Lanes, Quad, Row};
 use std::cell::Cell;
 
@@ -46,7 +46,7 @@ impl<V: Lanes> Axis<V> {
     }
 
     #[inline(always)]
-    pub(crate) fn push(&self, impulse: V, a: &mut [V; 4], b: &mut [V; 4]) {
+    pub(crate) fn apply_impulse(&self, impulse: V, a: &mut [V; 4], b: &mut [V; 4]) {
         a[0] = a[0].sub(self.ax.mul(impulse));
         a[1] = a[1].sub(self.ay.mul(impulse));
         a[2] = a[2].sub(self.aw.mul(impulse));
@@ -66,12 +66,12 @@ pub(crate) struct Normals<V> {
 
 impl<V: Lanes> Normals<V> {
     #[inline(always)]
-    pub(crate) fn load<const N: usize>(group: &Group<N>) -> Self {
+    pub(crate) fn load(sides: &Sides) -> Self {
         Self {
-            ax: V::load(&group.normal_ax),
-            ay: V::load(&group.normal_ay),
-            bx: V::load(&group.normal_bx),
-            by: V::load(&group.normal_by),
+            ax: V::load(&sides.normal_ax),
+            ay: V::load(&sides.normal_ay),
+            bx: V::load(&sides.normal_bx),
+            by: V::load(&sides.normal_by),
         }
     }
 
@@ -94,14 +94,20 @@ impl<V: Lanes> Normals<V> {
     /// Friction at all points, within the cone that the normal impulses of this moment allow. In solve and in relax: with
     /// friction in relax alone, piles over a tile border jitter a hundred times more.
     #[inline(always)]
-    pub(crate) fn rub<const N: usize>(&self, points: &mut [PointRows; N], friction: V, a: &mut [V; 4], b: &mut [V; 4]) {
+    pub(crate) fn apply_friction<const N: usize>(
+        &self,
+        points: &mut [PointRows; N],
+        friction: V,
+        a: &mut [V; 4],
+        b: &mut [V; 4],
+    ) {
         for rows in points {
             let axis = self.tangent(rows);
             let most = friction.mul(V::load(&rows.normal_impulse));
             let old = V::load(&rows.tangent_impulse);
             let wanted = V::load(&rows.tangent_mass).mul(axis.speed(a, b));
             let new = old.sub(wanted).min(most).max(V::splat(0.0).sub(most));
-            axis.push(accumulate(&mut rows.tangent_impulse, old, new), a, b);
+            axis.apply_impulse(accumulate(&mut rows.tangent_impulse, old, new), a, b);
         }
     }
 }
@@ -120,14 +126,14 @@ pub(crate) struct WarmStart;
 impl Pass for WarmStart {
     #[inline(always)]
     fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
-        let mut a = V::gather(bodies.velocity, &group.a);
-        let mut b = V::gather(bodies.velocity, &group.b);
-        let normals = Normals::<V>::load(group);
+        let mut a = V::gather(bodies.velocity, &group.sides.a);
+        let mut b = V::gather(bodies.velocity, &group.sides.b);
+        let normals = Normals::<V>::load(&group.sides);
         for rows in &group.points {
-            normals.normal(rows).push(V::load(&rows.normal_impulse), &mut a, &mut b);
-            normals.tangent(rows).push(V::load(&rows.tangent_impulse), &mut a, &mut b);
+            normals.normal(rows).apply_impulse(V::load(&rows.normal_impulse), &mut a, &mut b);
+            normals.tangent(rows).apply_impulse(V::load(&rows.tangent_impulse), &mut a, &mut b);
         }
-        V::scatter(a, bodies.velocity, &group.a);
-        V::scatter(b, bodies.velocity, &group.b);
+        V::scatter(a, bodies.velocity, &group.sides.a);
+        V::scatter(b, bodies.velocity, &group.sides.b);
     }
 }

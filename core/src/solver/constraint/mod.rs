@@ -1,5 +1,20 @@
 //! Constraints between two bodies, laid out for vectors: groups of eight, their rows, and what a pass does to a group.
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | `group.rs` | eight contacts side by side; one of them alone |
+//! | `columns.rs` | one column of groups for each kind of constraint |
+//! | `layout.rs` | in which group and lane each contact goes |
+//! | `rows.rs` | how rows are made of contacts |
+//! | `kernels.rs` | what passes do to a group |
+//! | `groups.rs` | all of a tile's; how to find that of a contact |
+//! | `restitution.rs` | bounces |
 
+#[allow(unsafe_code)]
+pub(crate) mod columns;
+pub(crate) mod group;
 pub(crate) mod groups;
 pub(crate) mod kernels;
+pub(crate) mod layout;
+mod restitution;
 pub(crate) mod rows;

@@ -1,18 +1,19 @@
 //! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
 
-use super::groups::{Bounce, Group, Groups, NO_CONTACT};
-use crate::collide::broad_phase::Pair;
+use super::columns::{Each, Members, NO_CONTACT, Slices, Visitor, lengths};
+use super::group::Group;
+use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
-use crate::model::contact::Contact;
-use crate::model::math::{dot, max, turn};
+use crate::model::contact::{Contact, ContactPoint};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
 use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
-use crate::solver::place::STATIC;
+use crate::solver::index::SolverIndex;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::Vec2;
+use std::marker::PhantomData;
+use std::mem::offset_of;
 
 /// What rows are made of.
 #[derive(Clone, Copy)]
@@ -25,13 +26,9 @@ pub(crate) struct Source<'a> {
 
 /// Groups of one slice of one color, to be written by one thread.
 struct Unit<'a> {
-    singles: &'a mut [Group<1>],
-    doubles: &'a mut [Group<2>],
-    in_singles: &'a [[u32; LANES]],
-    in_doubles: &'a [[u32; LANES]],
-    /// The first body of the batch, and which of its statics this slice uses.
-    base: u32,
-    slice: u32,
+    groups: Slices<'a>,
+    members: Each<&'a [Members]>,
+    local: Local,
 }
 
 /// Writes the rows of a unit.
@@ -44,14 +41,22 @@ impl Kernel for Write<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { unit, source } = self;
-        let local = Local { base: unit.base, slice: unit.slice };
-        for (group, members) in unit.singles.iter_mut().zip(unit.in_singles) {
-            write::<V, 1>(group, &Inputs::collect(members, source, local));
-        }
-        for (group, members) in unit.doubles.iter_mut().zip(unit.in_doubles) {
-            write::<V, 2>(group, &Inputs::collect(members, source, local));
-        }
+        let Unit { groups, members, local } = self.unit;
+        groups.visit(members, &WriteRows::<V> { source: self.source, local, lanes: PhantomData });
+    }
+}
+
+/// Writes the rows of a group.
+struct WriteRows<'a, V> {
+    source: Source<'a>,
+    local: Local,
+    lanes: PhantomData<V>,
+}
+
+impl<V: Lanes> Visitor for WriteRows<'_, V> {
+    #[inline(always)]
+    fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members) {
+        write::<V, N>(group, &Inputs::collect(members, self.source, self.local));
     }
 }
 
@@ -64,8 +69,8 @@ struct Local {
 
 impl Local {
     #[inline(always)]
-    fn place(self, place: u32) -> u32 {
-        if place == STATIC { self.slice } else { place - self.base }
+    fn place(self, place: SolverIndex) -> u32 {
+        place.within(self.base, self.slice)
     }
 }
 
@@ -73,7 +78,7 @@ impl Local {
 struct Inputs {
     a: [u32; LANES],
     b: [u32; LANES],
-    /// The contacts, four numbers at a time (see [`Contact`]): normal, offset; rotations; two points.
+    /// The contacts, four numbers at a time; see [`Numbers`].
     contact: [[Quad; LANES]; QUADS],
     separation: [Row; 2],
     /// Roots of the masses of both bodies, as the solver has them.
@@ -81,17 +86,48 @@ struct Inputs {
     weight_b: [Quad; LANES],
     friction_a: Row,
     friction_b: Row,
-    /// One for a box, zero for a circle.
-    boxy_a: Row,
-    boxy_b: Row,
+    /// One for a shape that changes as it turns, zero for a round one.
+    not_round_a: Row,
+    not_round_b: Row,
 }
 
 /// A contact in fours.
 const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
 
+/// The numbers of eight contacts, by where they lie in a [`Contact`].
+struct Numbers<V>([[V; 4]; QUADS]);
+
+impl<V: Lanes> Numbers<V> {
+    #[inline(always)]
+    fn load(contacts: &[[Quad; LANES]; QUADS]) -> Self {
+        let [a, b, c, d, e] = contacts;
+        Self([V::load_quads(a), V::load_quads(b), V::load_quads(c), V::load_quads(d), V::load_quads(e)])
+    }
+
+    /// The number at an offset in bytes.
+    #[inline(always)]
+    fn at(&self, offset: usize) -> V {
+        let number = offset / size_of::<f32>();
+        self.0[number / 4][number % 4]
+    }
+
+    /// Anchor, impulse along the normal, impulse along the tangent of a point.
+    #[inline(always)]
+    fn point(&self, point: usize) -> (Vectors<V>, V, V) {
+        let first = offset_of!(Contact, points) + point * size_of::<ContactPoint>();
+        let anchor = Vectors {
+            x: self.at(first + offset_of!(ContactPoint, anchor.x)),
+            y: self.at(first + offset_of!(ContactPoint, anchor.y)),
+        };
+        let normal_impulse = self.at(first + offset_of!(ContactPoint, normal_impulse));
+        let tangent_impulse = self.at(first + offset_of!(ContactPoint, tangent_impulse));
+        (anchor, normal_impulse, tangent_impulse)
+    }
+}
+
 impl Inputs {
     #[inline(always)]
-    fn collect(members: &[u32; LANES], source: Source<'_>, local: Local) -> Self {
+    fn collect(members: &Members, source: Source<'_>, local: Local) -> Self {
         const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
         const ZERO: Row = [0.0; LANES];
         let mut inputs = Self {
@@ -103,8 +139,8 @@ impl Inputs {
             weight_b: NONE,
             friction_a: ZERO,
             friction_b: ZERO,
-            boxy_a: ZERO,
-            boxy_b: ZERO,
+            not_round_a: ZERO,
+            not_round_b: ZERO,
         };
         let Source { tile, contacts, bodies, setup } = source;
         for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
@@ -118,14 +154,14 @@ impl Inputs {
             let [a, b] = contacts.bodies[contact];
             let (place_a, place_b) = (bodies.place_of(a), bodies.place_of(b));
             (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
-            inputs.weight_a[lane] = bodies.weight[place_a as usize];
-            inputs.weight_b[lane] = bodies.weight[place_b as usize];
+            inputs.weight_a[lane] = bodies.weight[place_a.get()];
+            inputs.weight_b[lane] = bodies.weight[place_b.get()];
             let kind_a = setup.kind(tile.bodies.kind[a as usize]);
             let kind_b = setup.kind(tile.bodies.kind[b as usize]);
             inputs.friction_a[lane] = kind_a.material.friction;
             inputs.friction_b[lane] = kind_b.material.friction;
-            inputs.boxy_a[lane] = kind_a.boxy();
-            inputs.boxy_b[lane] = kind_b.boxy();
+            inputs.not_round_a[lane] = kind_a.not_round;
+            inputs.not_round_b[lane] = kind_b.not_round;
         }
         inputs
     }
@@ -163,44 +199,41 @@ impl<V: Lanes> Vectors<V> {
 #[inline(always)]
 fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
-    let [normal_x, normal_y, offset_x, offset_y] = V::load_quads(&inputs.contact[0]);
+    let contact = Numbers::<V>::load(&inputs.contact);
     let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
     let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
-    let (boxy_a, boxy_b) = (V::load(&inputs.boxy_a), V::load(&inputs.boxy_b));
-    let normal = Vectors { x: normal_x, y: normal_y };
-    let tangent = Vectors { x: normal_y, y: normal_x.mul(V::splat(-1.0)) };
-    let offset = Vectors { x: offset_x, y: offset_y };
+    let (not_round_a, not_round_b) = (V::load(&inputs.not_round_a), V::load(&inputs.not_round_b));
+    let normal = Vectors { x: contact.at(offset_of!(Contact, normal.x)), y: contact.at(offset_of!(Contact, normal.y)) };
+    let tangent = Vectors { x: normal.y, y: normal.x.mul(V::splat(-1.0)) };
+    let offset = Vectors { x: contact.at(offset_of!(Contact, offset.x)), y: contact.at(offset_of!(Contact, offset.y)) };
     let (on_a, on_b) = (normal.scaled(root_mass_a), normal.scaled(root_mass_b));
-    group.a = inputs.a;
-    group.b = inputs.b;
-    on_a.x.store(&mut group.normal_ax);
-    on_a.y.store(&mut group.normal_ay);
-    on_b.x.store(&mut group.normal_bx);
-    on_b.y.store(&mut group.normal_by);
-    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut group.friction);
+    let sides = &mut group.sides;
+    sides.a = inputs.a;
+    sides.b = inputs.b;
+    on_a.x.store(&mut sides.normal_ax);
+    on_a.y.store(&mut sides.normal_ay);
+    on_b.x.store(&mut sides.normal_bx);
+    on_b.y.store(&mut sides.normal_by);
+    V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut sides.friction);
     // The roots of a static's inverse masses are zero.
-    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut group.fixed);
+    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut sides.fixed);
     let linear = on_a.dot(on_a).add(on_b.dot(on_b));
     // Where there is no contact nothing may come of it, not even the inverse of zero.
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
-    let [x0, y0, _, normal0] = V::load_quads(&inputs.contact[2]);
-    let [tangent0, _, x1, y1] = V::load_quads(&inputs.contact[3]);
-    let [_, normal1, tangent1, _] = V::load_quads(&inputs.contact[4]);
-    let points = [(x0, y0, normal0, tangent0), (x1, y1, normal1, tangent1)];
+    let points = [contact.point(0), contact.point(1)];
     for (k, rows) in group.points.iter_mut().enumerate() {
-        let (x, y, normal_impulse, tangent_impulse) = points[k];
-        let arm_a = Vectors { x, y };
+        let (arm_a, normal_impulse, tangent_impulse) = points[k];
         let arm_b = arm_a.minus(offset);
-        // A circle's anchor lies on the line of its center and the normal; rounding must not spin it.
-        let normal_a = boxy_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
-        let normal_b = boxy_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
+        // A round body's anchor lies on the line of its center and the normal; rounding must not spin it.
+        let normal_a = not_round_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
+        let normal_b = not_round_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
         let (tangent_a, tangent_b) = (root_a.mul(arm_a.cross(tangent)), root_b.mul(arm_b.cross(tangent)));
         normal_a.store(&mut rows.normal_a);
         normal_b.store(&mut rows.normal_b);
         tangent_a.store(&mut rows.tangent_a);
         tangent_b.store(&mut rows.tangent_b);
-        boxy_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
-        boxy_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
+        not_round_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
+        not_round_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
         inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b))).store(&mut rows.normal_mass);
         inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b))).store(&mut rows.tangent_mass);
         rows.first_separation = inputs.separation[k];
@@ -215,26 +248,18 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
 impl Groups {
     /// Writes the rows of all contacts where [`Groups::lay_out`] has put them.
     pub(crate) fn write(&mut self, batches: &Batches, source: Source<'_>, team: Team) {
-        let Self { singles, doubles, in_singles, in_doubles, colors, .. } = self;
-        let (mut singles, mut doubles) = (&mut singles[..], &mut doubles[..]);
-        let (mut in_singles, mut in_doubles) = (&in_singles[..], &in_doubles[..]);
+        let Self { columns, members, colors, .. } = self;
+        let (mut groups, colors) = (columns.slices(), &*colors);
+        let mut members = members.each_ref().map(|members| &members[..]);
         let mut next = |batch: &Batch, color: usize, slice: u32| {
-            let (single, double) = colors[color].slice(slice);
-            Unit {
-                singles: singles.split_off_mut(..single.len()).expect("groups lie in order"),
-                doubles: doubles.split_off_mut(..double.len()).expect("groups lie in order"),
-                in_singles: in_singles.split_off(..single.len()).expect("as many as groups"),
-                in_doubles: in_doubles.split_off(..double.len()).expect("as many as groups"),
-                base: batch.bodies.start as u32,
-                slice,
-            }
+            let counts = lengths(&colors[color].slice(slice));
+            let own = |column: usize| members[column].split_off(..counts[column]).expect("as many as groups");
+            let (groups, members) = (groups.split_off(counts), std::array::from_fn(own));
+            Unit { groups, members, local: Local { base: batch.bodies.start as u32, slice } }
         };
         let each = batches.all.iter().flat_map(|batch| {
-            let colors = &*colors;
-            batch
-                .colors
-                .clone()
-                .flat_map(move |color| (0..colors[color].slices).map(move |slice| (batch, color, slice)))
+            let slices = move |color: usize| (0..colors[color].slices).map(move |slice| (batch, color, slice));
+            batch.colors.clone().flat_map(slices)
         });
         if team.is_alone() {
             each.for_each(|(batch, color, slice)| dispatch(Write { unit: next(batch, color, slice), source }));
@@ -243,34 +268,4 @@ impl Groups {
             team.for_each(units, |unit| dispatch(Write { unit, source }));
         }
     }
-
-    /// Finds the points that may bounce, in canonical order.
-    pub(crate) fn find_bounces(&mut self, source: Source<'_>) {
-        self.bounces.clear();
-        for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
-            let sides = source.contacts.bodies[i];
-            let [a, b] =
-                sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);
-            let restitution = max(a, b);
-            if restitution > 0.0 && self.is_solved(i as u32) {
-                for point in 0..contact.point_count() {
-                    let closing = closing_speed(source.tile, sides, contact, point);
-                    if closing > source.setup.params.restitution_threshold {
-                        let (contact, point) = (i as u32, point as u32);
-                        self.bounces.push(Bounce { contact, point, speed: restitution * closing });
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Speed at which a point's surfaces come nearer, in m/s.
-fn closing_speed(tile: &Tile, [a, b]: Pair, contact: &Contact, point: usize) -> f32 {
-    let anchor = contact.points[point].anchor;
-    let velocity = |body: u32, arm: Vec2| {
-        let i = body as usize;
-        tile.bodies.velocity[i] + turn(tile.bodies.angular_velocity[i], arm)
-    };
-    -dot(velocity(b, anchor - contact.offset) - velocity(a, anchor), contact.normal)
 }

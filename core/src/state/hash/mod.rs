@@ -16,7 +16,7 @@ mod tests;
 pub struct Hashes {
     /// Over id, position, rotation and velocities of every owned body.
     pub state: u128,
-    /// Over pair, tile, features, impulses and frozen geometry of every contact every tile holds.
+    /// Over pair, tile, features, impulses and manifold of every contact every tile holds.
     pub contact: u128,
 }
 

@@ -22,6 +22,7 @@ use crate::model::body::{Bodies, Body};
 use crate::model::contact::{Contact, ContactCache, PairKey, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::state::hash::Hashes;
+use crate::state::layout::layout;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use crate::world::World;
@@ -67,6 +68,10 @@ struct Header {
     state: u128,
     contact: u128,
 }
+
+layout!(Header {
+    format: 0, tile: 4, checksum: 8, bodies: 16, rested: 20, ghosts: 24, contacts: 28, state: 32, contact: 48
+} 64);
 
 const HEADER: usize = size_of::<Header>();
 /// What comes before the bytes that the checksum is of.

@@ -1,0 +1,181 @@
+//! Lanes do what plain numbers do: operation by operation, and in whole steps.
+
+use super::*;
+use crate::Loopback;
+use crate::model::body::{Body, StaticBody};
+use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::math::{self, Rot};
+use crate::model::params::{Exchange, Params, Solver};
+use crate::testing::{circle, rectangle};
+use crate::tiling::blueprint::Blueprint;
+use crate::tiling::partition::TileGrid;
+use crate::world::World;
+use glam::{DVec2, Vec2};
+use std::hint::black_box;
+
+thread_local! {
+    /// Whether [`dispatch`] runs everything of this thread on plain arrays.
+    pub(super) static PORTABLE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What came of an operation, by its name: a row, or a column of quads.
+type Results = Vec<(&'static str, Row)>;
+
+/// Every operation there is.
+struct Everything<'a> {
+    a: &'a Row,
+    b: &'a Row,
+    quads: &'a [Quad],
+    index: &'a [u32; LANES],
+}
+
+impl Kernel for Everything<'_> {
+    type Output = Results;
+    #[inline(always)]
+    fn run<V: Lanes>(self) -> Results {
+        let (a, b) = (V::load(self.a), V::load(self.b));
+        let mut results: Results = Vec::new();
+        let mut note = |name, value: V| {
+            let mut row = [0.0; LANES];
+            value.store(&mut row);
+            results.push((name, row));
+        };
+        note("load", a);
+        note("splat", V::splat(self.a[2]));
+        note("add", a.add(b));
+        note("sub", a.sub(b));
+        note("mul", a.mul(b));
+        note("div", a.div(b));
+        note("sqrt", a.sqrt());
+        note("max", a.max(b));
+        note("min", a.min(b));
+        note("if_positive", a.if_positive(b, a));
+        let mut quads = self.quads.to_vec();
+        let cells = Cell::from_mut(&mut quads[..]).as_slice_of_cells();
+        let columns = V::gather(cells, self.index);
+        columns.into_iter().for_each(|column| note("gather", column));
+        let [p, q, r, s] = V::load_quads(self.quads[..LANES].try_into().unwrap());
+        [p, q, r, s].into_iter().for_each(|column| note("load_quads", column));
+        V::scatter([q, p, s, r], cells, self.index);
+        let mut block = [[0.0; 4]; LANES];
+        V::store_quads([s, r, q, p], &mut block);
+        for column in 0..4 {
+            results.push(("scatter", std::array::from_fn(|l| quads[self.index[l] as usize][column])));
+            results.push(("store_quads", block.map(|quad| quad[column])));
+        }
+        results
+    }
+}
+
+/// The same on plain numbers.
+fn expected(Everything { a, b, quads, index }: Everything<'_>) -> Results {
+    let each = |f: fn(f32, f32) -> f32| -> Row { std::array::from_fn(|l| f(black_box(a[l]), black_box(b[l]))) };
+    let mut results = vec![
+        ("load", *a),
+        ("splat", [a[2]; LANES]),
+        ("add", each(|a, b| a + b)),
+        ("sub", each(|a, b| a - b)),
+        ("mul", each(|a, b| a * b)),
+        ("div", each(|a, b| a / b)),
+        ("sqrt", each(|a, _| a.sqrt())),
+        ("max", each(math::max)),
+        ("min", each(math::min)),
+        ("if_positive", each(|a, b| if a > 0.0 { b } else { a })),
+    ];
+    let column = |of: &dyn Fn(usize) -> Quad, column: usize| -> Row { std::array::from_fn(|l| of(l)[column]) };
+    results.extend((0..4).map(|c| ("gather", column(&|l| quads[index[l] as usize], c))));
+    results.extend((0..4).map(|c| ("load_quads", column(&|l| quads[l], c))));
+    for c in 0..4 {
+        results.push(("scatter", column(&|l| quads[l], [1, 0, 3, 2][c])));
+        results.push(("store_quads", column(&|l| quads[l], [3, 2, 1, 0][c])));
+    }
+    results
+}
+
+fn compare(results: Results, expected: &Results, lanes: &str) {
+    assert_eq!(results.len(), expected.len());
+    for ((name, row), (same, right)) in results.into_iter().zip(expected) {
+        assert_eq!(name, *same);
+        for lane in 0..LANES {
+            assert!(
+                row[lane].to_bits() == right[lane].to_bits(),
+                "`{name}` of the {lanes} lanes gives {:?} in lane {lane}, where plain numbers give {:?}: mend it in \
+                 core/src/parallel/lanes.rs. Every lane does what plain f32 does, bit for bit; so machines agree.",
+                row[lane],
+                right[lane]
+            );
+        }
+    }
+}
+
+#[test]
+fn every_operation_does_in_each_lane_what_plain_numbers_do() {
+    // Hidden from the compiler: the sign it gives to 0/0 when it folds it is not the processor's.
+    let a = black_box([0.0, -0.0, 1.5, -2.25, 3.0e-39, 1.0e30, -7.0, f32::INFINITY]);
+    let b = black_box([-0.0, 0.0, -1.5, 2.25, 1.0e-39, 3.0e30, 0.1, 2.0]);
+    let quads: Vec<Quad> = (1..11).map(|i| [i as f32, 0.1 * i as f32, -(i as f32), 1.0 / i as f32]).collect();
+    let all = || Everything { a: &a, b: &b, quads: &quads, index: &[7, 0, 3, 9, 1, 8, 2, 5] };
+    let right = expected(all());
+    compare(all().run::<Portable>(), &right, "portable");
+    compare(dispatch(all()), &right, "widest");
+}
+
+/// A heap of discs and boxes that bounce, over four tiles.
+fn heap(solver: Solver, exchange: Exchange) -> World {
+    let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(8.0), 2, 2).unwrap();
+    let mut kinds = vec![circle(0.2), rectangle(0.5, 0.3), rectangle(0.3, 0.4)];
+    kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.4);
+    let wall = |id, x, y, width, height| StaticBody {
+        id: GlobalId(id),
+        position: DVec2::new(x, y),
+        rotation: Rot::from_angle(0.02),
+        kind: rectangle(width, height),
+    };
+    let statics = vec![wall(0, 4.0, 0.0, 9.0, 0.4), wall(1, 0.0, 4.0, 0.4, 9.0), wall(2, 8.0, 4.0, 0.4, 9.0)];
+    let params = Params { solver, exchange, max_linear_speed: 9.0, max_angular_speed: 7.0, ..Params::default() };
+    let tiles: Vec<TileId> = (0..4).map(TileId).collect();
+    let mut world = World::new(&Blueprint { params, grid, kinds, statics }, &tiles).unwrap();
+    for i in 0..120_u32 {
+        let (x, y) = (f64::from(i % 12), f64::from(i / 12));
+        let body = Body {
+            id: GlobalId(u64::from(i) + 3),
+            position: DVec2::new(1.0 + 0.53 * x + 0.01 * y, 0.6 + 0.51 * y),
+            rotation: Rot::from_angle(0.3 * i as f32),
+            velocity: Vec2::new((i % 7) as f32 - 3.0, -((i % 5) as f32)),
+            angular_velocity: (i % 3) as f32 - 1.0,
+            kind: KindId(i % 3),
+        };
+        world.add(body).unwrap();
+    }
+    world
+}
+
+#[test]
+fn whole_steps_on_portable_lanes_give_the_same_bits() {
+    for solver in [Solver::SoftStep, Solver::Pgs] {
+        for exchange in [Exchange::Step, Exchange::Substep] {
+            // In a pool of one, all is this thread's.
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            let run = |portable: bool, world: &mut World| {
+                pool.install(|| {
+                    PORTABLE.set(portable);
+                    let report = crate::step(world, &mut Loopback).unwrap();
+                    (world.hashes(), report.contacts)
+                })
+            };
+            let (mut widest, mut portable) = (heap(solver, exchange), heap(solver, exchange));
+            let mut contacts = 0;
+            for step in 0..60 {
+                let (expected, found) = (run(false, &mut widest), run(true, &mut portable));
+                contacts += expected.1;
+                assert!(
+                    expected == found,
+                    "{solver:?}, exchange {exchange:?}: in step {step} portable lanes and this processor's widest come to \
+                     different bits. If the test of every operation passes, some kernel computes with something else \
+                     than `Lanes`: make it one of their operations, in both."
+                );
+            }
+            assert!(contacts > 1000, "hardly anything to solve: {contacts}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The columns in which groups lie: one for each kind of constraint, today contacts of one point and contacts of two.
+//!
+//! Everywhere else a column is a number below [`COLUMNS`]: batches, colors, layout and threads know no kind from another.
+//! So a new kind of constraint is one more field of each struct here, and a line where these are listed; what its rows are
+//! and what a pass does to them is told in `group.rs`, `rows.rs` and `kernels.rs`, as for contacts.
+
+use super::group::{Group, PointRows, Sides};
+use super::kernels::{Pass, Table};
+use crate::model::contact::Contact;
+use crate::parallel::lanes::{LANES, Lanes};
+use crate::parallel::shared::Shared;
+use std::ops::Range;
+
+/// How many there are.
+pub(crate) const COLUMNS: usize = 2;
+
+/// Something for each column.
+pub(crate) type Each<T> = [T; COLUMNS];
+
+/// The contacts of a group, lane by lane, in canonical order, or [`NO_CONTACT`].
+pub(crate) type Members = [u32; LANES];
+
+/// Marks a lane without a contact.
+pub(crate) const NO_CONTACT: u32 = u32::MAX;
+
+/// The column in which a contact lies.
+#[inline(always)]
+pub(crate) fn column_of(contact: &Contact) -> usize {
+    contact.point_count() - 1
+}
+
+/// How many groups there are in some ranges.
+pub(crate) fn lengths(groups: &Each<Range<usize>>) -> Each<usize> {
+    groups.each_ref().map(|range| range.len())
+}
+
+/// The groups of a tile.
+#[derive(Default, Debug)]
+pub(crate) struct Columns {
+    single: Vec<Group<1>>,
+    double: Vec<Group<2>>,
+}
+
+impl Columns {
+    /// Makes room for so many groups; what was in them stays.
+    pub(crate) fn resize(&mut self, groups: Each<usize>) {
+        self.single.resize(groups[0], Group::EMPTY);
+        self.double.resize(groups[1], Group::EMPTY);
+    }
+
+    /// The rows of a group.
+    pub(crate) fn rows(&self, column: usize, group: usize) -> (&Sides, &[PointRows]) {
+        match column {
+            0 => (&self.single[group].sides, &self.single[group].points),
+            _ => (&self.double[group].sides, &self.double[group].points),
+        }
+    }
+
+    /// The rows of a group, to change its points.
+    pub(crate) fn rows_mut(&mut self, column: usize, group: usize) -> (&Sides, &mut [PointRows]) {
+        fn both<const N: usize>(group: &mut Group<N>) -> (&Sides, &mut [PointRows]) {
+            (&group.sides, &mut group.points)
+        }
+        match column {
+            0 => both(&mut self.single[group]),
+            _ => both(&mut self.double[group]),
+        }
+    }
+
+    /// Shows each group's points with its members.
+    pub(crate) fn each(&self, members: &Each<Vec<Members>>, mut show: impl FnMut(&[PointRows], &Members)) {
+        let [single, double] = members;
+        self.single.iter().zip(single).for_each(|(group, members)| show(&group.points, members));
+        self.double.iter().zip(double).for_each(|(group, members)| show(&group.points, members));
+    }
+
+    /// All groups.
+    pub(crate) fn slices(&mut self) -> Slices<'_> {
+        Slices { single: &mut self.single, double: &mut self.double }
+    }
+}
+
+/// Groups of every column that lie together.
+pub(crate) struct Slices<'a> {
+    single: &'a mut [Group<1>],
+    double: &'a mut [Group<2>],
+}
+
+/// What is written into a group of any column.
+pub(crate) trait Visitor {
+    fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members);
+}
+
+impl<'a> Slices<'a> {
+    /// Takes so many groups out, the first of every column.
+    pub(crate) fn split_off(&mut self, groups: Each<usize>) -> Self {
+        const IN_ORDER: &str = "groups lie in order";
+        Self {
+            single: self.single.split_off_mut(..groups[0]).expect(IN_ORDER),
+            double: self.double.split_off_mut(..groups[1]).expect(IN_ORDER),
+        }
+    }
+
+    /// Shows each group to a visitor, with its members.
+    #[inline(always)]
+    pub(crate) fn visit(self, members: Each<&[Members]>, visitor: &impl Visitor) {
+        for (group, members) in self.single.iter_mut().zip(members[0]) {
+            visitor.group(group, members);
+        }
+        for (group, members) in self.double.iter_mut().zip(members[1]) {
+            visitor.group(group, members);
+        }
+    }
+
+    /// One pass over all of them.
+    #[inline(always)]
+    pub(crate) fn pass<V: Lanes>(self, pass: impl Pass, bodies: Table<'_>) {
+        for group in self.single {
+            pass.group::<V, 1>(group, bodies);
+        }
+        for group in self.double {
+            pass.group::<V, 2>(group, bodies);
+        }
+    }
+
+    /// For several threads.
+    pub(crate) fn share(self) -> SharedColumns<'a> {
+        SharedColumns { single: Shared::new(self.single), double: Shared::new(self.double) }
+    }
+}
+
+/// Groups that several threads work on at once, each on some of its own.
+pub(crate) struct SharedColumns<'a> {
+    single: Shared<'a, Group<1>>,
+    double: Shared<'a, Group<2>>,
+}
+
+impl SharedColumns<'_> {
+    /// Some groups for this thread alone.
+    ///
+    /// # Safety
+    /// As [`Shared::range`]: as long as they are borrowed, nobody else may use any of them.
+    #[inline(always)]
+    pub(crate) unsafe fn range(&self, groups: Each<Range<usize>>) -> Slices<'_> {
+        let [single, double] = groups;
+        // SAFETY: the caller sees to it that nobody else uses these.
+        unsafe { Slices { single: self.single.range(single), double: self.double.range(double) } }
+    }
+}

@@ -1,0 +1,104 @@
+//! In which group and lane each contact goes: by batch, color and column.
+
+use super::columns::{COLUMNS, Each, NO_CONTACT, column_of};
+use super::groups::{Groups, Lane};
+use crate::model::contact::Contact;
+use crate::parallel::lanes::LANES;
+use crate::solver::batches::{Batch, Batches};
+use crate::solver::coloring::{COLORS, Coloring};
+use std::ops::Range;
+
+/// The groups of one color of a batch.
+#[derive(Clone, Debug)]
+pub(crate) struct Color {
+    /// Within the batch's groups.
+    groups: Each<Range<usize>>,
+    /// Into how many pieces the groups are cut.
+    pub(crate) slices: u32,
+}
+
+impl Color {
+    /// The groups of one piece.
+    #[inline(always)]
+    pub(crate) fn slice(&self, slice: u32) -> Each<Range<usize>> {
+        let mut groups = self.groups.clone();
+        for range in &mut groups {
+            let (start, length) = (range.start, range.len());
+            let at = |slice: u32| start + length * slice as usize / self.slices as usize;
+            *range = at(slice)..at(slice + 1);
+        }
+        groups
+    }
+}
+
+/// Whether there is anything at all.
+fn any(counts: &Each<usize>) -> bool {
+    counts.iter().any(|&count| count > 0)
+}
+
+impl Groups {
+    /// Decides in which group and lane each contact goes. Returns the most colors of a batch.
+    pub(crate) fn lay_out(&mut self, contacts: &[Contact], batches: &mut Batches, coloring: &Coloring) -> usize {
+        self.colors.clear();
+        self.members.iter_mut().for_each(Vec::clear);
+        self.lanes.clear();
+        self.lanes.resize(contacts.len(), Lane::NONE);
+        let mut most_colors = 0;
+        for batch in &mut batches.all {
+            let first = self.colors.len();
+            let range = batch.contacts.clone();
+            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch);
+            batch.colors = first..self.colors.len();
+            // All that overflows counts as one color.
+            most_colors = most_colors.max(batch.colors.len().min(COLORS + 1));
+        }
+        self.columns.resize(self.members.each_ref().map(Vec::len));
+        most_colors
+    }
+
+    fn lay_out_batch(&mut self, contacts: &[Contact], own: &[u32], colors: &[u8], batch: &mut Batch) {
+        let first = self.members.each_ref().map(Vec::len);
+        let column_of = |contact: u32| column_of(&contacts[contact as usize]);
+        let mut counts = [[0; COLUMNS]; COLORS + 1];
+        for (&contact, &color) in own.iter().zip(colors) {
+            counts[color as usize][column_of(contact)] += 1;
+        }
+        // Where the next contact of each color goes, in lanes of the batch's columns.
+        let mut next = [[0; COLUMNS]; COLORS];
+        let mut end = [0; COLUMNS];
+        let mut color = |groups: Each<usize>, end: &mut Each<usize>| {
+            let begin = *end;
+            end.iter_mut().zip(groups).for_each(|(end, groups)| *end += groups);
+            let slices = batch.slices(groups.iter().sum());
+            self.colors.push(Color { groups: std::array::from_fn(|column| begin[column]..end[column]), slices });
+        };
+        for (next, count) in next.iter_mut().zip(&counts).filter(|(_, count)| any(count)) {
+            *next = end.map(|groups| groups * LANES);
+            color(count.map(|contacts| contacts.div_ceil(LANES)), &mut end);
+        }
+        // What overflows: a group, and a color, for each.
+        let mut overflow = end.map(|groups| groups * LANES);
+        if any(&counts[COLORS]) {
+            for (&contact, _) in own.iter().zip(colors).filter(|&(_, &color)| color as usize == COLORS) {
+                let mut groups = [0; COLUMNS];
+                groups[column_of(contact)] = 1;
+                color(groups, &mut end);
+            }
+        }
+        for (column, members) in self.members.iter_mut().enumerate() {
+            members.resize(first[column] + end[column], [NO_CONTACT; LANES]);
+            batch.groups[column] = first[column]..members.len();
+        }
+        for (&contact, &color) in own.iter().zip(colors) {
+            let column = column_of(contact);
+            let (next, step) = match next.get_mut(color as usize) {
+                Some(next) => (&mut next[column], 1),
+                None => (&mut overflow[column], LANES),
+            };
+            let (lane, group) = (*next % LANES, first[column] + *next / LANES);
+            *next += step;
+            self.members[column][group][lane] = contact;
+            self.lanes[contact as usize] = Lane::new(column, group, lane, batch.bodies.start);
+        }
+    }
+}
