@@ -82,7 +82,7 @@ pub use model::contact::{Contact, ContactPoint};
 pub use model::error::{CodecError, SetupError, StepError};
 pub use model::id::{GlobalId, KindId, TileId};
 pub use model::math::Rot;
-pub use model::params::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
+pub use model::params::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Params, Solver};
 pub use model::shape::{Kind, Material, Shape};
 pub use state::facts::{Facts, TileFacts};
 pub use state::hash::Hashes;

@@ -11,7 +11,7 @@
 //! writes the file anew, and CHANGELOG.md says **results**.
 
 use atoll::Config;
-use atoll_core::{Exchange, Hashes, Rot};
+use atoll_core::{Exchange, Hashes, Instructions, Rot};
 use atoll_tests::program::{self, watched};
 use atoll_tests::scenes;
 use std::collections::BTreeMap;
@@ -115,8 +115,9 @@ fn renew(results: &Results) {
 }
 
 /// What no configuration has yet: bodies that bounce, and walls that stand aslant.
-fn bouncing(exchange: Exchange) -> [String; 2] {
+fn bouncing(exchange: Exchange, instructions: Instructions) -> [String; 2] {
     let mut scene = scenes::room(12, 5);
+    scene.params.instructions = instructions;
     scene.kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.7);
     scene.statics.iter_mut().for_each(|wall| wall.rotation = Rot::from_angle(0.03));
     let mut sim = scene.start_on((3, 2), exchange);
@@ -125,19 +126,20 @@ fn bouncing(exchange: Exchange) -> [String; 2] {
     [format!("{state:032x}"), format!("{contact:032x}")]
 }
 
-/// The hashes of every case, by runs in this process with some more settings.
-fn results(how: Overrides) -> Results {
+/// The hashes of every case, by runs in this process on some set of instructions, as a configuration and as the library
+/// call it.
+fn results((word, instructions): (&'static str, Instructions)) -> Results {
     let run = |(config, overrides): (&str, Overrides)| {
         let path = format!("configs/{config}.toml");
         let text = std::fs::read_to_string(program::root().join(&path)).unwrap();
-        let all: Vec<_> = overrides.iter().chain(how).copied().collect();
+        let all: Vec<_> = overrides.iter().copied().chain([("instructions", word)]).collect();
         let config_read = Config::from_toml_str(&path, &text, &all).unwrap();
         let case = name(config, overrides);
         let summary =
             watched(&case, move || atoll::run(&config_read)).unwrap_or_else(|error| panic!("{case}: {error}"));
         (case, [summary.state_hash, summary.contact_hash])
     };
-    let worlds = BOUNCING.iter().map(|&(case, exchange)| (case.to_owned(), bouncing(exchange)));
+    let worlds = BOUNCING.iter().map(|&(case, exchange)| (case.to_owned(), bouncing(exchange, instructions)));
     cases().map(run).chain(worlds).collect()
 }
 
@@ -159,11 +161,20 @@ fn judge(results: &Results, what: &str) {
 
 #[test]
 fn results_are_golden() {
-    let results = results(&[]);
+    let results = results(("auto", Instructions::Auto));
     if std::env::var_os("ATOLL_GOLDEN").is_some_and(|wish| wish == "renew") {
         renew(&results);
     }
     judge(&results, "this build");
+}
+
+/// Whole runs on lanes that are not this processor's widest. What `auto` takes without AVX2 is portable.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn results_are_golden_on_portable_lanes() {
+    if is_x86_feature_detected!("avx2") {
+        judge(&results(("portable", Instructions::Portable)), "portable lanes");
+    }
 }
 
 /// A choice that changed nothing would guard nothing.

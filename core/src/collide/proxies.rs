@@ -3,6 +3,7 @@
 use super::broad_phase::Pair;
 use crate::model::body::Bodies;
 use crate::model::math::{self, dot};
+use crate::parallel::lanes::LaneSet;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use glam::{DVec2, Vec2};
@@ -36,6 +37,7 @@ pub(crate) struct Proxies {
     pub(crate) size: [f32; 2],
     /// Length of a step, in seconds.
     pub(crate) dt: f32,
+    pub(crate) lanes: LaneSet,
 }
 
 impl Proxies {
@@ -76,7 +78,7 @@ impl Proxies {
         team.for_each(parts.collect(), |(range, part)| load(bodies, dynamic, corner, setup, range, part));
         (self.owned, self.dynamic) = (owned, dynamic);
         self.size = setup.grid.tile_size().as_vec2().to_array();
-        self.dt = setup.params.dt;
+        (self.dt, self.lanes) = (setup.params.dt, setup.lanes);
     }
 
     /// Whether the grown AABBs of two bodies overlap in local coordinates, with room for their rounding.

@@ -69,6 +69,9 @@ pub enum SetupError {
     /// Frozen ghosts take nothing over within a step.
     #[error("ghosts = \"frozen\" goes with exchange = \"step\" only: read-only copies are heard of once a step")]
     FrozenSubsteps,
+    /// Inner loops compiled for what is not there.
+    #[error("instructions = \"avx2\": this processor has no AVX2; use \"auto\"")]
+    NoAvx2,
     /// A tile outside the grid, or named twice.
     #[error("tile {tile}: outside the grid, or given twice")]
     BadTile {

@@ -60,6 +60,18 @@ pub enum Parallel {
     Auto,
 }
 
+/// For which instructions the inner loops are compiled. The same bits, whichever.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Instructions {
+    /// The widest vectors that this processor has.
+    #[default]
+    Auto,
+    /// None but those that every processor of its kind has: what all others are held against.
+    Portable,
+    /// AVX2, of x86-64; refused where there is none.
+    Avx2,
+}
+
 /// How a ghost takes part in the contacts of a tile that does not own it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ghosts {
@@ -127,6 +139,8 @@ pub struct Params {
     pub island_search: IslandSearch,
     /// How a tile's contacts are shared among threads (auto). Changes no bit of the result.
     pub parallel: Parallel,
+    /// For which instructions the inner loops are compiled (auto). Changes no bit of the result.
+    pub instructions: Instructions,
     /// What ghosts are (dynamic).
     pub ghosts: Ghosts,
     /// Islands that rest are left out until something touches them (no). On one tile only.
@@ -164,6 +178,7 @@ impl Default for Params {
             linear_slop: 0.005,
             island_search: IslandSearch::default(),
             parallel: Parallel::default(),
+            instructions: Instructions::default(),
             ghosts: Ghosts::default(),
             sleep: false,
             sleep_speed: 0.05,

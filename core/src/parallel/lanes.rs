@@ -4,6 +4,7 @@
 //! arrays, and for AVX2 with vector registers. Every operation is the IEEE one, lane by lane, so both give the same
 //! bits; how many lanes a register has never decides how work is grouped.
 
+use crate::model::params::Instructions;
 use std::cell::Cell;
 
 #[cfg(test)]
@@ -130,7 +131,7 @@ pub(crate) use avx2::Avx2;
 mod avx2 {
     //! Eight lanes in one 256-bit register.
     //!
-    //! Every method is inlined into a function compiled for AVX2, which [`super::dispatch`] calls only after the
+    //! Every method is inlined into a function compiled for AVX2, which [`super::LaneSet::run`] calls only after the
     //! processor was asked; no other code names this type.
     use super::{LANES, Lanes, Quad, Row};
     use std::arch::x86_64::*;
@@ -276,23 +277,51 @@ pub(crate) trait Kernel {
     fn run<V: Lanes>(self) -> Self::Output;
 }
 
-/// Runs a kernel with the widest registers this processor has. The result does not depend on which.
-#[inline]
-pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(test)]
-    if tests::PORTABLE.get() {
-        return kernel.run::<Portable>();
-    }
+/// The lanes that kernels run on; made only where the processor has what it takes.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(crate) struct LaneSet(Set);
+
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+enum Set {
+    #[default]
+    Portable,
     #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-            kernel.run::<Avx2>()
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has AVX2.
-            return unsafe { with_avx2(kernel) };
+    Avx2,
+}
+
+impl LaneSet {
+    /// Those that are wanted; none where this processor lacks them.
+    pub(crate) fn of(wanted: Instructions) -> Option<Self> {
+        match wanted {
+            Instructions::Portable => Some(Self(Set::Portable)),
+            Instructions::Auto => Some(Self::of(Instructions::Avx2).unwrap_or_default()),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => is_x86_feature_detected!("avx2").then_some(Self(Set::Avx2)),
+            #[cfg(not(target_arch = "x86_64"))]
+            Instructions::Avx2 => None,
         }
     }
-    kernel.run::<Portable>()
+
+    /// Whether the processor has AVX2, and it is wanted.
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn has_avx2(self) -> bool {
+        self.0 == Set::Avx2
+    }
+
+    /// Runs a kernel. The result does not depend on which lanes these are.
+    #[inline]
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            Set::Portable => kernel.run::<Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => {
+                #[target_feature(enable = "avx2")]
+                fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+                    kernel.run::<Avx2>()
+                }
+                // SAFETY: the processor has said that it has AVX2, or this would not be this set.
+                unsafe { with_avx2(kernel) }
+            }
+        }
+    }
 }

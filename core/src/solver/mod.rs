@@ -33,7 +33,6 @@ use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::params::{Exchange, Parallel};
 use crate::parallel::crew::{Crew, Member, Needed};
-use crate::parallel::lanes::dispatch;
 use crate::parallel::shared::Shared;
 use crate::parallel::team::Team;
 use crate::state::violation::Violation;
@@ -112,7 +111,7 @@ impl Solver {
         };
         let alone = |job: Job<'_>| {
             let substeps = substeps(&job);
-            dispatch(Run { job: &job, member: Member::alone(), substeps, setup });
+            setup.lanes.run(Run { job: &job, member: Member::alone(), substeps, setup });
         };
         // Nothing to share: no list of jobs.
         if team.is_alone() || setup.params.parallel == Parallel::Serial {
@@ -122,7 +121,7 @@ impl Solver {
         let (large, small): (Vec<_>, Vec<_>) = to_do.partition(|job| job.large);
         for job in &large {
             let crew = Crew::<Needed>::new();
-            team.together(|| dispatch(Run { job, member: crew.member(), substeps: substeps(job), setup }));
+            team.together(|| setup.lanes.run(Run { job, member: crew.member(), substeps: substeps(job), setup }));
         }
         team.for_each(small, alone);
     }

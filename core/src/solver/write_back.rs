@@ -5,7 +5,7 @@ use super::index::SolverIndex;
 use super::motion::{Motion, integrate_rotation};
 use crate::model::id::GlobalId;
 use crate::model::math::Rot;
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Row, dispatch};
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -34,7 +34,7 @@ pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, 
     };
     let parts = team.ranges(owned, GRAIN).map(|range| rest.split_off(range.len())).collect();
     let substeps = setup.params.integrations();
-    let not_finite = team.for_each(parts, |part| dispatch(WriteBack { owned: part, solved, motion, substeps }));
+    let not_finite = team.for_each(parts, |part| setup.lanes.run(WriteBack { owned: part, solved, motion, substeps }));
     tile.counts.not_finite = not_finite.into_iter().flatten().min();
 }
 

@@ -7,6 +7,7 @@ use crate::model::math::{self, Rot};
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::{Kind, KindRow};
 use crate::model::softness::Softness;
+use crate::parallel::lanes::LaneSet;
 use crate::tiling::partition::TileGrid;
 use glam::Vec2;
 
@@ -52,6 +53,7 @@ pub(crate) struct Setup {
     pub(crate) inset: f64,
     /// Length of a substep, in seconds.
     pub(crate) h: f32,
+    pub(crate) lanes: LaneSet,
     pub(crate) softness: Softness,
     pub(crate) static_softness: Softness,
     /// Whether the impulses of a whole step must be summed: for restitution, and to average border contacts.
@@ -102,6 +104,7 @@ impl Setup {
             halo_width,
             inset: 2.0 * halo_width,
             h: params.substep(),
+            lanes: LaneSet::of(params.instructions).ok_or(SetupError::NoAvx2)?,
             softness: Softness::contact(&params),
             static_softness: Softness::static_contact(&params),
             totals: bouncy || params.exchange == Exchange::Substep,

@@ -73,6 +73,7 @@ pub(super) static KEYS: &[Key] = &[
     key("run.transport", How, &OptionalWord(|c| &mut c.run.transport, words::TRANSPORT)),
     key("run.tiles", What, &Tiles),
     key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),
+    key("run.instructions", How, &Word(|c| &mut c.params.instructions, words::INSTRUCTIONS)),
     key("run.mpi_exchange", How, &Word(|c| &mut c.run.mpi_exchange, words::MPI_EXCHANGE)),
     // Of numbers without bounds here, the physics checks them.
     key("physics.hertz", What, &Hertz),
@@ -170,6 +171,7 @@ mod tests {
             ("run.transport", "channel"),
             ("run.tiles", "[4, 5]"),
             ("run.peer_timeout", "2.5"),
+            ("run.instructions", "portable"),
             ("run.mpi_exchange", "sparse"),
             ("physics.gravity", "[1, -9]"),
             ("physics.broad_phase", "quadtree"),

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::scene::{SceneKind, SceneSpec};
-use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Params, Solver};
+use atoll_core::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Params, Solver};
 use glam::Vec2;
 use std::path::Path;
 use std::time::Duration;
@@ -98,6 +98,7 @@ fn every_key_can_be_given() {
         transport = "channel"
         tiles = [4, 5]
         peer_timeout = 2.5
+        instructions = "portable"
         mpi_exchange = "sparse"
         [physics]
         hertz = 120
@@ -138,6 +139,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
     assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
+    assert_eq!(config.params.instructions, Instructions::Portable);
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
     assert_eq!((config.params.max_linear_speed, config.params.margin_cap), (f32::INFINITY, 0.4));
     assert_eq!((config.params.sort_interval, config.params.parallel), (16, Parallel::Serial));

@@ -1,7 +1,7 @@
 //! The words that a configuration may say, one table each, for reading and for writing.
 
 use super::sections::{MpiExchange, TransportKind};
-use atoll_core::{BroadPhase, Exchange, Ghosts, IslandSearch, Parallel, Solver};
+use atoll_core::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Solver};
 
 /// Words and what they mean.
 pub(super) type Words<T> = &'static [(&'static str, T)];
@@ -17,6 +17,10 @@ pub(super) const TRANSPORT: Words<TransportKind> = &[
 /// `run.mpi_exchange`
 pub(super) const MPI_EXCHANGE: Words<MpiExchange> =
     &[("alltoallv", MpiExchange::Alltoallv), ("sparse", MpiExchange::Sparse)];
+
+/// `run.instructions`
+pub(super) const INSTRUCTIONS: Words<Instructions> =
+    &[("auto", Instructions::Auto), ("portable", Instructions::Portable), ("avx2", Instructions::Avx2)];
 
 /// `physics.broad_phase`
 pub(super) const BROAD_PHASE: Words<BroadPhase> = &[("grid", BroadPhase::Grid), ("quadtree", BroadPhase::Quadtree)];

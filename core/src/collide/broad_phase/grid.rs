@@ -133,9 +133,9 @@ impl Grid {
     }
 
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
-        let (sorted, dt, owned) = (&self.sorted, proxies.dt, proxies.owned);
+        let (sorted, dt, owned, lanes) = (&self.sorted, proxies.dt, proxies.owned, proxies.lanes);
         team.append(pairs, sorted.len, GRAIN, |places, pairs| {
-            Search { sorted, dt, owned, places, pairs }.neighbours(&self.start, layout.columns);
+            Search { sorted, dt, owned, lanes, places, pairs }.neighbours(&self.start, layout.columns);
         });
     }
 

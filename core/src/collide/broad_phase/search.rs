@@ -6,6 +6,7 @@
 
 use super::Pair;
 use crate::collide::proxies::Proxies;
+use crate::parallel::lanes::LaneSet;
 use std::ops::Range;
 
 /// Bodies in cell order: copies of what the search compares, so that it reads memory in order.
@@ -63,6 +64,7 @@ pub(super) struct Search<'a> {
     pub(super) owned: usize,
     /// Length of a step, in seconds.
     pub(super) dt: f32,
+    pub(super) lanes: LaneSet,
     /// Whose neighbours are looked for, as places in cell order.
     pub(super) places: Range<usize>,
     pub(super) pairs: &'a mut Vec<Pair>,
@@ -87,21 +89,12 @@ fn runs(start: &[u32], columns: usize, cell: usize, place: usize) -> [(usize, us
     [(place + 1, start[cell + 2] as usize), (start[above - 1] as usize, start[above + 2] as usize)]
 }
 
-/// Whether a test asks for the search without AVX2.
-#[inline(always)]
-fn portable_wanted() -> bool {
-    #[cfg(test)]
-    return super::tests::PORTABLE.get();
-    #[cfg(not(test))]
-    false
-}
-
 impl Search<'_> {
     /// Every pair of neighbours of which one, the first in cell order, is among `places`. `start` holds where each cell begins, `columns` how many cells a row has.
     pub(super) fn neighbours(mut self, start: &[u32], columns: usize) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && !portable_wanted() {
-            // SAFETY: the processor has just said that it has AVX2.
+        if self.lanes.has_avx2() {
+            // SAFETY: the processor has AVX2, or these lanes would not be there.
             return unsafe { self.neighbours_avx2(start, columns) };
         }
         for place in self.places.clone() {

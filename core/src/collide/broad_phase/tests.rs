@@ -8,8 +8,9 @@ use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
-use crate::model::params::Params;
+use crate::model::params::{Instructions, Params};
 use crate::model::shape::{Kind, Shape};
+use crate::parallel::lanes::LaneSet;
 use crate::parallel::team::Team;
 use crate::testing::{any_kind, any_rotation, cases, circle, distance, rectangle};
 use crate::tiling::blueprint::{Blueprint, Setup};
@@ -17,21 +18,8 @@ use crate::tiling::partition::TileGrid;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
-use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
-
-thread_local! {
-    /// Makes the search of this thread do without AVX2.
-    pub(super) static PORTABLE: Cell<bool> = const { Cell::new(false) };
-}
-
-fn portable<R>(work: impl FnOnce() -> R) -> R {
-    PORTABLE.set(true);
-    let result = work();
-    PORTABLE.set(false);
-    result
-}
 
 /// A tile, stuffed by hand, and its setup.
 pub(super) struct Stuffed {
@@ -216,9 +204,10 @@ proptest! {
     }
 
     #[test]
-    fn the_search_finds_the_same_at_any_width(tile in any_tile(200, 4)) {
+    fn the_search_finds_the_same_at_any_width(mut tile in any_tile(200, 4)) {
         let wide = tile.by_grid(&mut Grid::default());
-        prop_assert_eq!(portable(|| tile.by_grid(&mut Grid::default())), wide);
+        tile.proxies.lanes = LaneSet::of(Instructions::Portable).unwrap();
+        prop_assert_eq!(tile.by_grid(&mut Grid::default()), wide);
     }
 
     /// What is told apart as no pair does not touch in this step, whatever the definition of a pair makes of it. (Not

@@ -5,18 +5,13 @@ use crate::Loopback;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::{self, Rot};
-use crate::model::params::{Exchange, Params, Solver};
+use crate::model::params::{Exchange, Instructions, Params, Solver};
 use crate::testing::{circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::TileGrid;
 use crate::world::World;
 use glam::{DVec2, Vec2};
 use std::hint::black_box;
-
-thread_local! {
-    /// Whether [`dispatch`] runs everything of this thread on plain arrays.
-    pub(super) static PORTABLE: Cell<bool> = const { Cell::new(false) };
-}
 
 /// What came of an operation, by its name: a row, or a column of quads.
 type Results = Vec<(&'static str, Row)>;
@@ -117,11 +112,11 @@ fn every_operation_does_in_each_lane_what_plain_numbers_do() {
     let all = || Everything { a: &a, b: &b, quads: &quads, index: &[7, 0, 3, 9, 1, 8, 2, 5] };
     let right = expected(all());
     compare(all().run::<Portable>(), &right, "portable");
-    compare(dispatch(all()), &right, "widest");
+    compare(LaneSet::of(Instructions::Auto).unwrap().run(all()), &right, "widest");
 }
 
 /// A heap of discs and boxes that bounce, over four tiles.
-fn heap(solver: Solver, exchange: Exchange) -> World {
+fn heap(solver: Solver, exchange: Exchange, instructions: Instructions) -> World {
     let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(8.0), 2, 2).unwrap();
     let mut kinds = vec![circle(0.2), rectangle(0.5, 0.3), rectangle(0.3, 0.4)];
     kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.4);
@@ -132,7 +127,8 @@ fn heap(solver: Solver, exchange: Exchange) -> World {
         kind: rectangle(width, height),
     };
     let statics = vec![wall(0, 4.0, 0.0, 9.0, 0.4), wall(1, 0.0, 4.0, 0.4, 9.0), wall(2, 8.0, 4.0, 0.4, 9.0)];
-    let params = Params { solver, exchange, max_linear_speed: 9.0, max_angular_speed: 7.0, ..Params::default() };
+    let params =
+        Params { solver, exchange, instructions, max_linear_speed: 9.0, max_angular_speed: 7.0, ..Params::default() };
     let tiles: Vec<TileId> = (0..4).map(TileId).collect();
     let mut world = World::new(&Blueprint { params, grid, kinds, statics }, &tiles).unwrap();
     for i in 0..120_u32 {
@@ -154,19 +150,15 @@ fn heap(solver: Solver, exchange: Exchange) -> World {
 fn whole_steps_on_portable_lanes_give_the_same_bits() {
     for solver in [Solver::SoftStep, Solver::Pgs] {
         for exchange in [Exchange::Step, Exchange::Substep] {
-            // In a pool of one, all is this thread's.
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-            let run = |portable: bool, world: &mut World| {
-                pool.install(|| {
-                    PORTABLE.set(portable);
-                    let report = crate::step(world, &mut Loopback).unwrap();
-                    (world.hashes(), report.contacts)
-                })
+            let run = |world: &mut World| {
+                let report = crate::step(world, &mut Loopback).unwrap();
+                (world.hashes(), report.contacts)
             };
-            let (mut widest, mut portable) = (heap(solver, exchange), heap(solver, exchange));
+            let mut widest = heap(solver, exchange, Instructions::Auto);
+            let mut portable = heap(solver, exchange, Instructions::Portable);
             let mut contacts = 0;
             for step in 0..60 {
-                let (expected, found) = (run(false, &mut widest), run(true, &mut portable));
+                let (expected, found) = (run(&mut widest), run(&mut portable));
                 contacts += expected.1;
                 assert!(
                     expected == found,

@@ -5,7 +5,7 @@ use super::group::Group;
 use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::contact::{Contact, ContactPoint};
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row, dispatch};
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
 use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
@@ -262,10 +262,12 @@ impl Groups {
             batch.colors.clone().flat_map(slices)
         });
         if team.is_alone() {
-            each.for_each(|(batch, color, slice)| dispatch(Write { unit: next(batch, color, slice), source }));
+            each.for_each(|(batch, color, slice)| {
+                source.setup.lanes.run(Write { unit: next(batch, color, slice), source })
+            });
         } else {
             let units = each.map(|(batch, color, slice)| next(batch, color, slice)).collect();
-            team.for_each(units, |unit| dispatch(Write { unit, source }));
+            team.for_each(units, |unit| source.setup.lanes.run(Write { unit, source }));
         }
     }
 }
