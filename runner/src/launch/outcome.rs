@@ -133,7 +133,7 @@ mod tests {
         let died = |rank| Err(RankFailure::Died { rank: Rank(rank), how: "was killed by signal 9".to_owned() });
         let misses = || {
             let error = TransportError::PeerLost { rank: Rank(1), reason: "rank 1 may be slow".to_owned() };
-            failed(4, RankError::Transport(error))
+            failed(2, RankError::Transport(error))
         };
         let usage = TransportError::Usage { message: "rank 1 was asked twice".to_owned() };
         let refused = || failed(2, RankError::Transport(usage.clone()));
