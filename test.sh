@@ -115,6 +115,10 @@ step cargo test --workspace
 # Documentation has had its tests; what is compiled for speed is tested again, with every transport.
 step cargo test --release --workspace --lib --bins --tests ${features[@]+"${features[@]}"}
 
+# What threads and processes share, in every order in which they may meet (crew.rs, seat/loom.rs).
+step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/loom" \
+    cargo test --release -p atoll-core -p atoll-transport --lib loom
+
 if [[ ${features[*]} == *mpi* ]]; then
     if has mpicc.mpich; then
         # The same again over MPICH, in a folder of its own: two MPIs cannot share what is built.
