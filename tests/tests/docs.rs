@@ -89,3 +89,39 @@ fn links_lead_somewhere() {
     }
     assert!(followed >= 10, "only {followed} links were found");
 }
+
+/// Every path in backticks on the page of the architecture, from the root, from the sources of a package, or from the folder
+/// named last before it in its line.
+#[test]
+fn files_that_the_architecture_names_exist() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let is_path = |span: &&str| {
+        let plain = span.chars().all(|c| c.is_alphanumeric() || "_./{},-".contains(c));
+        plain && (span.contains('/') || [".rs", ".sh", ".txt"].iter().any(|end| span.ends_with(end)))
+    };
+    // `a/{b,c}.rs` stands for two.
+    let each = |path: &str| match path.split_once('{').zip(path.split_once('}')) {
+        Some(((before, rest), (_, after))) => {
+            let names = rest.split_once('}').expect("a brace that closes").0;
+            names.split(',').map(|name| format!("{before}{name}{after}")).collect()
+        }
+        None => vec![path.to_owned()],
+    };
+    let (mut found, mut missing) = (0, Vec::new());
+    for line in text.lines() {
+        let mut nearest = root().to_owned();
+        for path in line.split('`').skip(1).step_by(2).filter(is_path).flat_map(each) {
+            let homes = ["", "core/src", "transport/src", "runner/src"].map(|home| root().join(home));
+            let file = homes.iter().chain([&nearest]).map(|home| home.join(&path)).find(|file| file.exists());
+            match file {
+                Some(file) => {
+                    nearest = if file.is_dir() { file } else { file.parent().expect("a folder").to_owned() };
+                    found += 1;
+                }
+                None => missing.push(path),
+            }
+        }
+    }
+    assert!(missing.is_empty(), "ARCHITECTURE.md names what is not there: {missing:?}");
+    assert!(found > 60, "only {found} paths were found");
+}
