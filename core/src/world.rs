@@ -1,7 +1,8 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
-use crate::exchange::halo::{Halo, Verdict};
+use crate::exchange::halo::Halo;
 use crate::exchange::mail::{Inbox, Mailbag, Outbox};
+use crate::exchange::verdict::Verdict;
 use crate::model::body::Body;
 use crate::model::error::{SetupError, StepError};
 use crate::model::id::{GlobalId, TileId};

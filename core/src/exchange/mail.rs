@@ -5,8 +5,8 @@
 //! ranges. Within a rank nothing is copied: outbox and inbox swap their bags, and a receiver is told where to look. Which
 //! thread a tile was on decides in which bag its messages lie, and shows nowhere: receivers sort by source.
 
-use super::halo::Verdict;
 use super::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
+use super::verdict::Verdict;
 use crate::model::body::Body;
 use crate::model::id::TileId;
 

@@ -6,3 +6,4 @@ pub(crate) mod halo;
 pub(crate) mod mail;
 pub(crate) mod migrate;
 pub(crate) mod record;
+pub(crate) mod verdict;

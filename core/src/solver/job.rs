@@ -1,9 +1,9 @@
 //! A batch with its part of the solver's buffers, for one thread or a crew of them.
 
 use super::bodies::Ghost;
+use super::constraint::columns::Color;
 use super::constraint::columns::SharedColumns;
 use super::constraint::kernels::{Pass, Table};
-use super::constraint::layout::Color;
 use super::motion::{Motion, integrate_rotation};
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{LANES, Lanes, Quad};

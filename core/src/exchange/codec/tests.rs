@@ -1,9 +1,9 @@
 //! Frames there and back, and bytes that are no frames.
 
 use super::{COUNTS, FORMAT, Frames};
-use crate::exchange::halo::Verdict;
 use crate::exchange::mail::{Inbox, Mailbag, Message, Outbox};
 use crate::exchange::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
+use crate::exchange::verdict::Verdict;
 use crate::model::body::Body;
 use crate::model::error::CodecError;
 use crate::model::id::{GlobalId, KindId, TileId};

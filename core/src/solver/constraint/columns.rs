@@ -147,3 +147,26 @@ impl SharedColumns<'_> {
         unsafe { Slices { single: self.single.range(single), double: self.double.range(double) } }
     }
 }
+
+/// The groups of one color of a batch.
+#[derive(Clone, Debug)]
+pub(crate) struct Color {
+    /// Within the batch's groups.
+    pub(super) groups: Each<Range<usize>>,
+    /// Into how many pieces the groups are cut.
+    pub(crate) slices: u32,
+}
+
+impl Color {
+    /// The groups of one piece.
+    #[inline(always)]
+    pub(crate) fn slice(&self, slice: u32) -> Each<Range<usize>> {
+        let mut groups = self.groups.clone();
+        for range in &mut groups {
+            let (start, length) = (range.start, range.len());
+            let at = |slice: u32| start + length * slice as usize / self.slices as usize;
+            *range = at(slice)..at(slice + 1);
+        }
+        groups
+    }
+}

@@ -1,9 +1,7 @@
 //! All constraints of a tile, and how to find that of a contact.
 
-use super::columns::{Columns, Each, Members, Slices};
+use super::columns::{Color, Columns, Each, Members, Slices};
 use super::group::{PointRows, Sides};
-use super::layout::Color;
-use super::restitution::Bounce;
 use crate::exchange::record::BorderPoint;
 use crate::model::math::max;
 use crate::parallel::lanes::Quad;
@@ -20,6 +18,15 @@ pub(crate) struct Groups {
     pub(super) lanes: Vec<Lane>,
     /// Points that may bounce.
     pub(super) bounces: Vec<Bounce>,
+}
+
+/// A point that may bounce.
+#[derive(Debug)]
+pub(crate) struct Bounce {
+    pub(super) contact: u32,
+    pub(super) point: u32,
+    /// Restitution times approach speed, in m/s.
+    pub(super) speed: f32,
 }
 
 /// Where a contact's constraint lies.

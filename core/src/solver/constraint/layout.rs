@@ -1,35 +1,11 @@
 //! In which group and lane each contact goes: by batch, color and column.
 
-use super::columns::{COLUMNS, Each, NO_CONTACT, column_of};
+use super::columns::{COLUMNS, Color, Each, NO_CONTACT, column_of};
 use super::groups::{Groups, Lane};
 use crate::model::contact::Contact;
 use crate::parallel::lanes::LANES;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::coloring::{COLORS, Coloring};
-use std::ops::Range;
-
-/// The groups of one color of a batch.
-#[derive(Clone, Debug)]
-pub(crate) struct Color {
-    /// Within the batch's groups.
-    groups: Each<Range<usize>>,
-    /// Into how many pieces the groups are cut.
-    pub(crate) slices: u32,
-}
-
-impl Color {
-    /// The groups of one piece.
-    #[inline(always)]
-    pub(crate) fn slice(&self, slice: u32) -> Each<Range<usize>> {
-        let mut groups = self.groups.clone();
-        for range in &mut groups {
-            let (start, length) = (range.start, range.len());
-            let at = |slice: u32| start + length * slice as usize / self.slices as usize;
-            *range = at(slice)..at(slice + 1);
-        }
-        groups
-    }
-}
 
 /// Whether there is anything at all.
 fn any(counts: &Each<usize>) -> bool {

@@ -1,6 +1,6 @@
 //! Restitution: points that came in fast and pressed get part of their speed back, once, after the last substep.
 
-use super::groups::Groups;
+use super::groups::{Bounce, Groups};
 use super::rows::Source;
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
@@ -8,15 +8,6 @@ use crate::model::math::{dot, max, turn};
 use crate::solver::bodies::SolverBodies;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
-
-/// A point that may bounce.
-#[derive(Debug)]
-pub(crate) struct Bounce {
-    contact: u32,
-    point: u32,
-    /// Restitution times approach speed, in m/s.
-    speed: f32,
-}
 
 impl Groups {
     /// Finds the points that may bounce, in canonical order.

@@ -1,0 +1,46 @@
+//! What all ranks must hear, and act on at the same step.
+
+use crate::model::id::GlobalId;
+
+/// What every rank must know of every other: rides on each exchange.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Verdict {
+    /// Somebody asks the run to stop.
+    pub stop: bool,
+    /// A check failed: the step and the lowest body concerned.
+    pub failure: Option<(u64, GlobalId)>,
+}
+
+impl Verdict {
+    /// Joins two: any stop, the earliest failure.
+    pub fn merge(self, other: Self) -> Self {
+        let failure = match (self.failure, other.failure) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        Self { stop: self.stop | other.stop, failure }
+    }
+
+    /// As a word for the outside to carry: the least word of all ranks stands for all their verdicts joined. A failure
+    /// hides a stop, which makes no difference: it ends the run.
+    pub fn to_word(self) -> u128 {
+        match self {
+            // A run never counts as many steps as would make this one of the words below.
+            Self { failure: Some((step, id)), .. } => u128::from(step) << 64 | u128::from(id.0),
+            Self { stop: true, .. } => Self::STOP,
+            Self { stop: false, .. } => Self::NOTHING,
+        }
+    }
+
+    /// Reads [`to_word`](Self::to_word).
+    pub fn from_word(word: u128) -> Self {
+        match word {
+            Self::NOTHING => Self::default(),
+            Self::STOP => Self { stop: true, failure: None },
+            _ => Self { stop: false, failure: Some(((word >> 64) as u64, GlobalId(word as u64))) },
+        }
+    }
+
+    const NOTHING: u128 = u128::MAX;
+    const STOP: u128 = u128::MAX - 1;
+}
