@@ -21,6 +21,9 @@ pub(super) fn outcome(plan: &Plan, ends: Ends, before: u64) -> Result<Summary, R
             Ok(Ok(None)) => {}
             Ok(Ok(Some(gathered))) => summary = Some(Summary::new(plan, gathered)),
             Ok(Err(error)) => errors.push((Nearness::of_error(&error), told(error, complete, steps))),
+            Err(RankFailure::NotStarted { rank, reason }) => {
+                errors.push((Nearness::Cause, RunError::Threads { rank, threads: 1, reason }));
+            }
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
                 let error = RunError::PeerLost { rank, complete, steps, reason };

@@ -28,7 +28,12 @@ pub(crate) fn agree<T>(
         Ok(prepared) => hello(plan_of(prepared)),
         Err(error) => {
             // Output is the business of one rank.
-            let of_one = matches!(error, RunError::BadOutput { .. } | RunError::Folder(FolderError::Unusable { .. }));
+            let of_one = matches!(
+                error,
+                RunError::BadOutput { .. }
+                    | RunError::TakenOutput { .. }
+                    | RunError::Folder(FolderError::Unusable { .. })
+            );
             let name = if of_one { COMMON_ERROR } else { ERROR };
             vec![(name.to_owned(), in_words(error))]
         }
@@ -53,7 +58,7 @@ fn hello(plan: &Plan) -> Hello {
         ("number of ranks", run.ranks.to_string()),
         ("configuration", plan.config.hash(plan.tiles)),
         ("mpi_exchange", format!("{:?}", run.mpi_exchange).to_lowercase()),
-        ("output", format!("{:?}", plan.output.as_ref().map(|output| (output.folder.path(), output.every)))),
+        ("output", format!("{:?}", plan.output.as_ref().map(|output| (&output.folder, output.every)))),
         ("snapshots of steps", format!("{:?}", plan.found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>())),
     ];
     lines.map(|(name, value)| (name.to_owned(), value)).into()
