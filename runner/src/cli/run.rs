@@ -28,7 +28,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     #[cfg(feature = "iceoryx2")]
     if let Some(rank) = launch::iceoryx2::RankProcess::of_this() {
         let goes_on = rank.goes_on();
-        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on));
+        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on || is_begun(args)));
         // Whoever signals all processes at once means what the launcher is about to say.
         let stop = stop_on_signals(false, || {});
         return Ok(rank.run(plan, Observer { stop, ..observer(args, goes_on) }));
@@ -43,15 +43,17 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     // First of all: what is in a folder may change while another run writes there.
     let held = hold(args)?;
     let outputs = Outputs::check(args)?;
-    let first = checked(plan(args, &config, false)).map_err(|error| outputs.copy_summary(error))?;
+    let begun = held.is_some() && is_begun(args);
+    let first = checked(plan(args, &config, begun)).map_err(|error| outputs.copy_summary(error))?;
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
         launch::iceoryx2::check(&first, &configuration(args, false))?;
     }
     let held = hold_new(args, &first, held)?;
-    let first = match begun_meanwhile(args, &first) {
-        true => checked(plan(args, &config, false)).map_err(|error| outputs.copy_summary(error))?,
-        false => first,
+    let first = if !begun && is_begun(args) {
+        checked(plan(args, &config, true)).map_err(|error| outputs.copy_summary(error))?
+    } else {
+        first
     };
     tell(&first);
     #[cfg(feature = "iceoryx2")]
@@ -116,10 +118,15 @@ fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
     Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?)
 }
 
-/// Works out what the arguments ask for; `goes_on` says that the run was begun before, with these arguments.
+/// Whether there is a run to go on with. Only who holds the folder can rely on it.
+fn is_begun(args: &RunArgs) -> bool {
+    args.resume.is_some() && folder(args).is_some_and(|folder| folder.holds_run())
+}
+
+/// Works out what the arguments ask for; `goes_on` says that the run was begun before.
 fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError> {
     match folder(args) {
-        Some(folder) if goes_on || args.resume.is_some() && folder.holds_run() => Plan::going_on(config, folder),
+        Some(folder) if goes_on => Plan::going_on(config, folder),
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
@@ -172,12 +179,6 @@ fn hold_new(args: &RunArgs, plan: &Plan, held: Option<Claim>) -> Result<Option<C
     }
 }
 
-/// Whether a plan to begin a run was made before another began it.
-fn begun_meanwhile(args: &RunArgs, plan: &Plan) -> bool {
-    let begins = plan.output.as_ref().filter(|output| output.begins && args.resume.is_some());
-    begins.is_some_and(|output| output.folder.holds_run())
-}
-
 /// Makes the folder of a run ready, if it has one.
 fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
     plan.output.as_ref().map(|output| output.claim(held)).transpose()
@@ -200,8 +201,10 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     let speaks = job.speaks();
     let held =
         job.all_well(if speaks && config.is_ok() { check_kept(args).and_then(|()| hold(args)) } else { Ok(None) })?;
-    let prepare = |config: Config, outputs: &Outputs| {
-        let plan = plan(args, &config, false);
+    // Only who holds the folder can tell.
+    let begun = job.told(speaks && held.is_some() && is_begun(args));
+    let prepare = |config: &Config, outputs: &Outputs, begun| {
+        let plan = plan(args, config, begun);
         let plan = if speaks { checked(plan) } else { plan };
         plan.map_err(|error| outputs.copy_summary(error))
     };
@@ -213,13 +216,12 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         let config = job.adapt(config)?;
         // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
-        Ok((prepare(config, &outputs)?, outputs))
+        Ok((prepare(&config, &outputs, begun)?, outputs))
     });
     let (mut plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
     let held = job.all_well(if speaks { hold_new(args, &plan, held) } else { Ok(None) })?;
-    // All know alike that there was nothing to go on from, and only here whether that is so still.
-    if args.resume.is_some() && plan.found.snapshots.is_empty() {
-        plan = job.agree(prepare(plan.config, &outputs), |plan| plan)?;
+    if job.told(speaks && !begun && is_begun(args)) {
+        plan = job.agree(prepare(&plan.config, &outputs, true), |plan| plan)?;
     }
     let _claim = job.all_well(if speaks { claim(&plan, held) } else { Ok(None) })?;
     if speaks {
@@ -279,8 +281,12 @@ impl Outputs {
 
     /// Where the summary and the timings are to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
-        if let Some(folder) = folder(args).filter(|folder| args.out.is_some() || !folder.holds_run()) {
-            folder.check_free(args.overwrite)?;
+        if let Some(folder) = folder(args)
+            && let Err(error) = folder.check_free(args.overwrite)
+            // In this order, as another run may begin there just now.
+            && !is_begun(args)
+        {
+            return Err(error.into());
         }
         let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
         let [json, timings] = WholeFile::check_two(files(args))?;

@@ -29,8 +29,8 @@ impl RunFolder {
     /// # Errors
     /// If another run writes here, or nobody can.
     pub fn hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Option<Claim>, FolderError> {
-        // What is no run, and cannot become one, is left as it is.
-        if !self.path().is_dir() || !self.holds_run() && self.check_free(false).is_err() {
+        // What is no run, and cannot become one, is left as it is. Asked in this order, as one may begin meanwhile.
+        if !self.path().is_dir() || self.check_free(false).is_err() && !self.holds_run() {
             return Ok(None);
         }
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;

@@ -58,7 +58,7 @@ fn hello(plan: &Plan) -> Hello {
         ("number of ranks", run.ranks.to_string()),
         ("configuration", plan.config.hash(plan.tiles)),
         ("mpi_exchange", format!("{:?}", run.mpi_exchange).to_lowercase()),
-        ("output", format!("{:?}", plan.output.as_ref().map(|output| (&output.folder, output.every)))),
+        ("output", format!("{:?}", plan.output.as_ref().map(|output| (output.folder.path(), output.every)))),
         ("snapshots of steps", format!("{:?}", plan.found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>())),
     ];
     lines.map(|(name, value)| (name.to_owned(), value)).into()
