@@ -129,6 +129,14 @@ mod tests {
     }
 
     #[test]
+    fn a_rank_without_a_thread_is_no_lost_one() {
+        let not_started = RankFailure::NotStarted { rank: Rank(2), reason: "no more".to_owned() };
+        let error = outcome(&plan(), vec![failed(0, lost(2)), failed(0, lost(2)), Err(not_started)], 0).unwrap_err();
+        assert_eq!(error.to_string(), "rank 2 cannot start a thread: no more; use fewer threads or ranks");
+        assert_eq!(error.exit(), Exit::Usage);
+    }
+
+    #[test]
     fn the_nearest_to_the_cause_is_told_and_of_equals_the_lowest_rank() {
         let aborted = |rank| Err(RankFailure::Aborted { rank: Rank(rank), reason: "no more".to_owned() });
         let killed = |rank| Err(RankFailure::Outlived { rank: Rank(rank) });
