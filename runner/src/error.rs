@@ -50,11 +50,13 @@ pub enum RunError {
     Setup(#[from] SetupError),
     /// More than this machine can hold.
     #[error(
-        "too large for this machine: {bodies} bodies on {tiles} tiles with {ranks} ranks need about {:.1} GB of memory, and {:.1} GB are free: use fewer",
-        *.needed as f64 / 1e9,
-        *.available as f64 / 1e9
+        "too large for {within}: {bodies} bodies on {tiles} tiles with {ranks} ranks need about {} of memory, and {} are free: use fewer",
+        size(*.needed),
+        size(*.available)
     )]
     TooLarge {
+        /// What sets the bound.
+        within: &'static str,
         /// Bodies asked for.
         bodies: u64,
         /// Tiles asked for, or by default.
@@ -84,6 +86,16 @@ pub enum RunError {
         /// What the system said.
         reason: String,
     },
+    /// A path to write to at which there is, or will be, what must not be lost.
+    #[error("{option} {}: that is {what} and must not be written over; give another path", .path.display())]
+    TakenOutput {
+        /// What it was given with.
+        option: &'static str,
+        /// The path.
+        path: PathBuf,
+        /// What is there.
+        what: String,
+    },
     /// A folder for the run's output that cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -95,9 +107,6 @@ pub enum RunError {
         /// How many it was to make.
         steps: u64,
     },
-    /// A summary that cannot be read.
-    #[error(transparent)]
-    Ended(#[from] EndedError),
     /// A recording that cannot be written or read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -105,7 +114,10 @@ pub enum RunError {
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
     /// A rank whose threads cannot be had.
-    #[error("rank {rank} cannot start {threads} threads: {reason}; use fewer threads or ranks")]
+    #[error(
+        "rank {rank} cannot start {}: {reason}; use fewer threads or ranks",
+        if *.threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") }
+    )]
     Threads {
         /// The rank.
         rank: Rank,
@@ -215,6 +227,15 @@ pub enum RunError {
         /// What the system said.
         reason: String,
     },
+    /// What a run wrote was not there any more at its end.
+    #[error(
+        "{} is gone: somebody removed it while the run wrote there, so the folder does not hold all of the run; begin anew \
+         with --out", .path.display()
+    )]
+    Gone {
+        /// A file that should be there.
+        path: PathBuf,
+    },
     /// A run that could not write any more, and stopped.
     #[error(
         "{why}; stopped after {complete} of {steps} steps, and what was written before is whole: mend this and go on with \
@@ -232,6 +253,12 @@ pub enum RunError {
     },
 }
 
+/// Bytes, as people read them.
+fn size(bytes: u64) -> String {
+    let (bytes, giga) = (bytes as f64, 1e9);
+    if bytes < 0.1 * giga { format!("{:.1} MB", bytes * 1e-6) } else { format!("{:.1} GB", bytes / giga) }
+}
+
 impl RunError {
     /// Whether a world of so many bodies ended with as many, if so many were lost.
     ///
@@ -245,15 +272,16 @@ impl RunError {
     /// The exit code that tells of this error.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Recording(RecordingError::Write { .. }) | Self::Output { .. } | Self::StoppedWriting { .. } => {
-                Exit::Output
-            }
+            Self::Recording(RecordingError::Write { .. })
+            | Self::Output { .. }
+            | Self::Gone { .. }
+            | Self::StoppedWriting { .. } => Exit::Output,
             Self::Config(_)
             | Self::Setup(_)
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
+            | Self::TakenOutput { .. }
             | Self::Folder(_)
-            | Self::Ended(_)
             | Self::Snapshot(_)
             | Self::Recording(_)
             | Self::TooLarge { .. }

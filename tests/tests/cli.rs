@@ -247,6 +247,21 @@ fn a_state_that_is_not_finite_ends_all_ranks_with_exit_code_4() {
     }
 }
 
+/// They are computed like any others, and the user may want to know.
+#[test]
+fn bodies_that_escaped_are_told_at_the_end() {
+    let desk = Desk::new(SMALL);
+    let options = ["--quiet", "--set", "gravity=[1e6,0]", "--steps", "60"];
+    let mut command = desk.atoll(options);
+    let json = desk.path().join("summary.json");
+    let ended = run(command.env("RUST_LOG", "off").arg("--json").arg(&json));
+    let escaped = program::summary(&json)["escaped"].as_u64().unwrap();
+    assert!(ended.code == Some(0) && escaped > 0 && ended.stdout.contains("state hash"), "{ended}");
+    assert_eq!(ended.complaints().len(), 1, "{ended}");
+    let line = format!("atoll: {escaped} of 400 bodies escaped: they ended outside of the domain, or of their room");
+    assert!(ended.stderr.starts_with(&line), "{ended}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn output_that_cannot_be_written_in_the_end_gives_exit_code_5() {

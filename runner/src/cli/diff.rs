@@ -1,10 +1,12 @@
 //! `atoll diff`: whether two runs recorded the same.
 
 use super::args::DiffArgs;
-use super::output::{self, WholeFile};
+use super::console::complain;
+use super::output::{self, Kept, WholeFile};
 use super::progress::{Progress, Show};
 use crate::compare;
 use crate::error::{Exit, RunError};
+use crate::folder::Ended;
 use std::io::{self, IsTerminal};
 
 /// Does it.
@@ -13,8 +15,14 @@ use std::io::{self, IsTerminal};
 /// Whatever keeps it from an answer, or the answer from being written.
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, RunError> {
     let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
+    Kept { runs: vec![&args.a, &args.b], configuration: None }.check(options)?;
     let [json, plot] = WholeFile::check_two(options)?;
 
+    for run in [&args.a, &args.b] {
+        if let Err(error) = Ended::read(run) {
+            complain(&error.counts_as_missing());
+        }
+    }
     // On a terminal only: it takes seconds, and a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;

@@ -1,12 +1,13 @@
 //! `atoll info`: what the folder of a run, a snapshot or a segment of a recording holds.
 
 use super::args::InfoArgs;
+use super::console::complain;
 use super::output;
 use crate::config::{Config, OneLine};
 use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
-use crate::folder::{Ended, EndedError, RunFolder};
+use crate::folder::{Ended, RunFolder};
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,8 +20,9 @@ use std::{fs, iter};
 pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
     let path = &args.path;
     let folder = RunFolder::new("info", path);
+    let mut trouble = None;
     let text = match path.extension().and_then(OsStr::to_str) {
-        _ if folder.holds_run() => of_run(&folder)?,
+        _ if folder.holds_run() => of_run(&folder, &mut trouble)?,
         Some("atoll") => of_snapshot_file(path)?,
         Some("parquet") => of_segment(path)?,
         _ if path.is_dir() => match Snapshot::open(path)? {
@@ -36,16 +38,18 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         }
     };
     output::show(&text)?;
-    Ok(Exit::Done)
+    let refusal = |error| folder.refusal(format!("{error}; remove it, or bring back a good copy of it")).into();
+    trouble.map_or(Ok(Exit::Done), |error| Err(refusal(error)))
 }
 
-fn of_run(folder: &RunFolder) -> Result<String, RunError> {
+/// `trouble` is a snapshot that is damaged, of which the text tells as well.
+fn of_run(folder: &RunFolder, trouble: &mut Option<SnapshotError>) -> Result<String, RunError> {
     let config = Config::load_begun(&folder.configuration())?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {} x {} tiles\n", tiles[0], tiles[1]);
     row(&mut text, "config hash", &config.hash(tiles));
-    row(&mut text, "state", &state(folder, config.run.steps)?);
+    row(&mut text, "state", &state(folder, config.run.steps));
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
     let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
     if found.snapshots.is_empty() {
@@ -55,24 +59,34 @@ fn of_run(folder: &RunFolder) -> Result<String, RunError> {
         let size = snapshot.files.iter().map(|file| file.path.as_path());
         let told = match snapshot.check() {
             Ok(()) => format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state),
-            Err(error) => error.to_string(),
+            Err(error) => {
+                let told = error.to_string();
+                trouble.get_or_insert(error);
+                told
+            }
         };
         row(&mut text, "snapshot", &format!("after step {}: {told}", snapshot.step()));
     }
     for error in found.unusable {
         row(&mut text, "snapshot", &error.to_string());
+        trouble.get_or_insert(error);
     }
     Ok(text)
 }
 
 /// How far a run came.
-fn state(folder: &RunFolder, steps: u64) -> Result<String, EndedError> {
-    let Some(ended) = Ended::read(folder.path())? else {
-        return Ok(format!("to make {steps} steps; under way, or ended before it could say how"));
+fn state(folder: &RunFolder, steps: u64) -> String {
+    let ended = match Ended::read(folder.path()) {
+        Ok(Some(ended)) => ended,
+        Ok(None) => return format!("to make {steps} steps; under way, or ended before it could say how"),
+        Err(error) => {
+            complain(&error.counts_as_missing());
+            return format!("to make {steps} steps; its summary cannot be read");
+        }
     };
     let how = if !ended.interrupted && ended.steps == steps { "complete," } else { "ended after" };
     let hash = ended.state_hash.unwrap_or_default();
-    Ok(format!("{how} {} of {steps} steps: state hash {}", ended.steps, OneLine(&hash)))
+    format!("{how} {} of {steps} steps: state hash {}", ended.steps, OneLine(&hash))
 }
 
 fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {

@@ -3,26 +3,39 @@
 use super::console::complain;
 use crate::rank::StopFlag;
 use std::error::Error;
+#[cfg(unix)]
+use std::sync::{Arc, atomic::AtomicBool};
 use std::time::{Duration, Instant};
 use tracing::warn;
 
 /// Signals so close to each other are one request: `timeout` and closing terminals signal a process and its group.
 const AS_ONE: Duration = Duration::from_millis(500);
 
-/// A flag that Ctrl-C, SIGTERM and SIGHUP raise. The second time, `quit` is called. Where these signals cannot be
+/// Who asks.
+#[derive(Clone, Copy)]
+enum Cause {
+    /// Somebody, or a batch system.
+    User,
+    /// The limit on processor time; there is another behind it at which the system kills.
+    #[cfg_attr(not(unix), expect(dead_code))]
+    Limit,
+}
+
+/// A flag that Ctrl-C, SIGTERM, SIGHUP and SIGXCPU raise. The second time, `quit` is called. Where these signals cannot be
 /// handled, the flag is one that nobody raises, and a warning says so. `announce` tells whether to say what happens.
 pub(super) fn stop_on_signals(announce: bool, quit: impl Fn() + Send + 'static) -> StopFlag {
     let flag = StopFlag::default();
     let raised = flag.clone();
     let mut first = None;
-    let heard = move || {
+    let heard = move |cause| {
         let first = *first.get_or_insert_with(Instant::now);
-        if raised.request() {
-            if announce {
-                complain(&"stopping after this step; interrupt again to quit at once");
-            }
-        } else if first.elapsed() > AS_ONE {
-            quit();
+        match (raised.request(), cause) {
+            (true, _) if !announce => {}
+            (true, Cause::User) => complain(&"stopping after this step; interrupt again to quit at once"),
+            (true, Cause::Limit) => complain(&"the limit on processor time is reached: stopping after this step"),
+            (false, Cause::User) if first.elapsed() > AS_ONE => quit(),
+            // The system says so every second.
+            (false, _) => {}
         }
     };
     if let Err(error) = listen(heard) {
@@ -33,18 +46,29 @@ pub(super) fn stop_on_signals(announce: bool, quit: impl Fn() + Send + 'static) 
 
 /// Calls `heard` at every signal, on a thread of its own.
 #[cfg(unix)]
-fn listen(mut heard: impl FnMut() + Send + 'static) -> Result<(), Box<dyn Error>> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let all = if outlives_its_terminal() { &[SIGINT, SIGTERM][..] } else { &[SIGINT, SIGTERM, SIGHUP] };
+fn listen(mut heard: impl FnMut(Cause) + Send + 'static) -> Result<(), Box<dyn Error>> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXCPU};
+    let all = [SIGINT, SIGTERM, SIGXCPU, SIGHUP];
+    let all = if outlives_its_terminal() { &all[..3] } else { &all };
     let mut signals = signal_hook::iterator::Signals::new(all)?;
-    let listen = move || signals.forever().for_each(|_| heard());
+    let cause = |signal| if signal == SIGXCPU { Cause::Limit } else { Cause::User };
+    let listen = move || signals.forever().for_each(|signal| heard(cause(signal)));
     std::thread::Builder::new().name("signals".to_owned()).spawn(listen)?;
     Ok(())
 }
 
 #[cfg(not(unix))]
-fn listen(heard: impl FnMut() + Send + 'static) -> Result<(), Box<dyn Error>> {
-    Ok(ctrlc::set_handler(heard)?)
+fn listen(mut heard: impl FnMut(Cause) + Send + 'static) -> Result<(), Box<dyn Error>> {
+    Ok(ctrlc::set_handler(move || heard(Cause::User))?)
+}
+
+/// Lets a write beyond the limit on the size of files fail, which can be told, instead of ending the program.
+pub(super) fn outlive_file_limits() {
+    // Whatever hears the signal keeps it from doing so.
+    #[cfg(unix)]
+    if let Err(error) = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::<AtomicBool>::default()) {
+        warn!("a file that grows beyond its limit will end the program: {error}");
+    }
 }
 
 /// Whether it was started by `nohup` or the like, which lets it ignore SIGHUP.

@@ -22,7 +22,9 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    let result = console::init().and_then(|()| match &cli.command {
+    let begun = console::init();
+    interrupt::outlive_file_limits();
+    let result = begun.and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::run(args),
         Command::Info(args) => info::run(args),
@@ -31,8 +33,12 @@ pub fn main() -> ExitCode {
         if !matches!(error, RunError::ToldElsewhere { .. }) {
             console::complain(&error);
         }
-        // One code tells of all that keeps a comparison from its answer.
-        if matches!(cli.command, Command::Diff(_)) { Exit::Usage } else { error.exit() }
+        match (&cli.command, error.exit()) {
+            (_, Exit::Output) => Exit::Output,
+            // One code tells of all that keeps a comparison from its answer.
+            (Command::Diff(_), _) => Exit::Usage,
+            (_, exit) => exit,
+        }
     });
     ExitCode::from(exit as u8)
 }

@@ -1,6 +1,7 @@
 //! What is written when all is done: to standard output, and to files, each whole or not at all.
 
 use crate::error::RunError;
+use crate::folder::RunFolder;
 use crate::folder::durable::{temporary, write_durably};
 use std::fmt::Display;
 use std::fs::{self, File};
@@ -17,6 +18,52 @@ pub(super) fn show(text: &dyn Display) -> Result<(), RunError> {
             Err(RunError::Output { path: PathBuf::from("standard output"), reason: error.to_string() })
         }
         _ => Ok(()),
+    }
+}
+
+/// What must not be written over by what is written when all is done.
+#[derive(Default, Debug)]
+pub(super) struct Kept<'a> {
+    /// Folders that are, or are to be, those of runs, whatever is there now.
+    pub runs: Vec<&'a Path>,
+    /// The file that says what to run.
+    pub configuration: Option<&'a Path>,
+}
+
+impl Kept<'_> {
+    /// Refuses paths at which there is, or will be, what is to be kept; of that, too, what any run has left anywhere.
+    /// Nothing is written or created.
+    ///
+    /// # Errors
+    /// Naming the first such path, and what is there.
+    pub(super) fn check(&self, options: [(&'static str, Option<&Path>); 2]) -> Result<(), RunError> {
+        for (option, path) in options {
+            if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
+                return Err(RunError::TakenOutput { option, path: path.to_owned(), what });
+            }
+        }
+        Ok(())
+    }
+
+    /// What is to be kept at a path, if anything is. Where the path's folder is not there, nothing is.
+    fn at(&self, path: &Path) -> Option<String> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // The name itself, and what it leads to.
+        let named = folder.canonicalize().ok().zip(path.file_name()).map(|(folder, name)| folder.join(name));
+        let places: Vec<PathBuf> = named.into_iter().chain(path.canonicalize()).collect();
+        let configuration = self.configuration.and_then(|file| file.canonicalize().ok());
+        if configuration.is_some_and(|file| places.contains(&file)) {
+            return Some("the configuration of this run".to_owned());
+        }
+        let runs: Vec<PathBuf> = self.runs.iter().filter_map(|run| run.canonicalize().ok()).collect();
+        let is_run = |folder: &RunFolder| runs.iter().any(|run| run == folder.path()) || folder.holds_run();
+        let keeps = |folder: &Path, place: &Path| {
+            let name = place.strip_prefix(folder).ok().and_then(|within| within.iter().next());
+            let folder = RunFolder::new("", folder);
+            name.is_some_and(|name| folder.owns(name)) && is_run(&folder)
+        };
+        let owner = |place: &PathBuf| place.ancestors().find(|folder| keeps(folder, place)).map(Path::to_owned);
+        places.iter().find_map(owner).map(|run| format!("a file of the run in {}", run.display()))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::args::RunArgs;
 use super::console::{Console, complain};
 use super::interrupt::stop_on_signals;
-use super::output::{self, WholeFile};
+use super::output::{self, Kept, WholeFile};
 use super::progress::Show;
 use crate::config::Config;
 #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
@@ -16,7 +16,7 @@ use crate::rank::Observer;
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
 use crate::summary::{Summary, timings};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
 
@@ -28,7 +28,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     #[cfg(feature = "iceoryx2")]
     if let Some(rank) = launch::iceoryx2::RankProcess::of_this() {
         let goes_on = rank.goes_on();
-        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on));
+        let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on || is_begun(args)));
         // Whoever signals all processes at once means what the launcher is about to say.
         let stop = stop_on_signals(false, || {});
         return Ok(rank.run(plan, Observer { stop, ..observer(args, goes_on) }));
@@ -39,14 +39,25 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         return over_mpi(args, config);
     }
     let config = config?;
+    check_kept(args)?;
     // First of all: what is in a folder may change while another run writes there.
     let held = hold(args)?;
     let outputs = Outputs::check(args)?;
-    let first = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
-    tell(&first);
+    let begun = held.is_some() && is_begun(args);
+    let first = checked(plan(args, &config, begun)).map_err(|error| outputs.copy_summary(error))?;
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
         launch::iceoryx2::check(&first, &configuration(args, false))?;
+    }
+    let held = hold_new(args, &first, held)?;
+    let first = if !begun && is_begun(args) {
+        checked(plan(args, &config, true)).map_err(|error| outputs.copy_summary(error))?
+    } else {
+        first
+    };
+    tell(&first);
+    #[cfg(feature = "iceoryx2")]
+    if first.transport == TransportKind::Iceoryx2 {
         let _claim = claim(&first, held)?;
         let quit = StopFlag::default();
         let second = quit.clone();
@@ -81,7 +92,7 @@ fn supervise(
             }
             ended => return ended,
         }
-        current = plan(args, config, true)?;
+        current = checked(plan(args, config, true))?;
         tell(&current);
     }
 }
@@ -107,13 +118,23 @@ fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
     Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?)
 }
 
-/// Works out what the arguments ask for; `goes_on` says that the run was begun before, with these arguments.
+/// Whether there is a run to go on with. Only who holds the folder can rely on it.
+fn is_begun(args: &RunArgs) -> bool {
+    args.resume.is_some() && folder(args).is_some_and(|folder| folder.holds_run())
+}
+
+/// Works out what the arguments ask for; `goes_on` says that the run was begun before.
 fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError> {
     match folder(args) {
-        Some(folder) if goes_on || args.resume.is_some() && folder.holds_run() => Plan::going_on(config, folder),
+        Some(folder) if goes_on => Plan::going_on(config, folder),
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
+}
+
+/// A plan whose run can go on with what is recorded.
+fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
+    plan.and_then(|plan| plan.check_recording().map(|()| plan))
 }
 
 fn observer(args: &RunArgs, goes_on: bool) -> Observer {
@@ -130,11 +151,32 @@ fn tell(plan: &Plan) {
     }
 }
 
+/// What is written to files of their own when the run is over, with the options that say where.
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 2] {
+    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())]
+}
+
+/// Refuses to write them over what this run reads or keeps, or what another has left.
+fn check_kept(args: &RunArgs) -> Result<(), RunError> {
+    let runs = args.out.iter().chain(&args.resume).map(PathBuf::as_path).collect();
+    Kept { runs, configuration: args.config.as_deref() }.check(files(args))
+}
+
 /// Keeps other runs from the folder of this one, if it has one that is there.
 fn hold(args: &RunArgs) -> Result<Option<Claim>, RunError> {
-    let tell: &dyn Fn(&str) = &|text| complain(&text);
     let Some(folder) = folder(args) else { return Ok(None) };
-    Ok(folder.hold(args.resume.is_some().then_some(tell))?)
+    Ok(folder.hold(args.resume.is_some().then_some(&|text| complain(&text)))?)
+}
+
+/// What comes with `--resume` waits for whatever run writes there, also where the folder was not there a moment ago. Whoever
+/// was first may have begun the run by then.
+fn hold_new(args: &RunArgs, plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
+    match &plan.output {
+        Some(output) if held.is_none() && args.resume.is_some() => {
+            Ok(Some(output.folder.make_and_hold(Some(&|text| complain(&text)))?))
+        }
+        _ => Ok(held),
+    }
 }
 
 /// Makes the folder of a run ready, if it has one.
@@ -157,7 +199,15 @@ fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
 fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, RunError> {
     let mut job = launch::mpi::Job::join(complain)?;
     let speaks = job.speaks();
-    let held = job.all_well(if speaks && config.is_ok() { hold(args) } else { Ok(None) })?;
+    let held =
+        job.all_well(if speaks && config.is_ok() { check_kept(args).and_then(|()| hold(args)) } else { Ok(None) })?;
+    // Only who holds the folder can tell.
+    let begun = job.told(speaks && held.is_some() && is_begun(args));
+    let prepare = |config: &Config, outputs: &Outputs, begun| {
+        let plan = plan(args, config, begun);
+        let plan = if speaks { checked(plan) } else { plan };
+        plan.map_err(|error| outputs.copy_summary(error))
+    };
     let prepared = config.and_then(|config| {
         if args.restarts > 0 {
             let reason = "with transport mpi, start again with --resume, as configs/slurm/ does".to_owned();
@@ -166,10 +216,13 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         let config = job.adapt(config)?;
         // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
-        let plan = plan(args, &config, false).map_err(|error| outputs.copy_summary(error))?;
-        Ok((plan, outputs))
+        Ok((prepare(&config, &outputs, begun)?, outputs))
     });
-    let (plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    let (mut plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    let held = job.all_well(if speaks { hold_new(args, &plan, held) } else { Ok(None) })?;
+    if job.told(speaks && !begun && is_begun(args)) {
+        plan = job.agree(prepare(&plan.config, &outputs, true), |plan| plan)?;
+    }
     let _claim = job.all_well(if speaks { claim(&plan, held) } else { Ok(None) })?;
     if speaks {
         tell(&plan);
@@ -193,6 +246,13 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
         outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
     let shown = output::show(summary);
     folder.and(json).and(timings).and(shown)?;
+    if summary.escaped > 0 {
+        let (escaped, bodies) = (summary.escaped, summary.bodies);
+        complain(&format!(
+            "{escaped} of {bodies} bodies escaped: they ended outside of the domain, or of their room, where nothing holds \
+             them; a higher physics.hertz, or a limit such as physics.max_linear_speed, may help"
+        ));
+    }
 
     RunError::check_bodies(summary.bodies, summary.bodies_lost)?;
     Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
@@ -221,12 +281,15 @@ impl Outputs {
 
     /// Where the summary and the timings are to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
-        if let Some(folder) = folder(args).filter(|folder| args.out.is_some() || !folder.holds_run()) {
-            folder.check_free(args.overwrite)?;
+        if let Some(folder) = folder(args)
+            && let Err(error) = folder.check_free(args.overwrite)
+            // In this order, as another run may begin there just now.
+            && !is_begun(args)
+        {
+            return Err(error.into());
         }
         let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        let options = [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())];
-        let [json, timings] = WholeFile::check_two(options)?;
+        let [json, timings] = WholeFile::check_two(files(args))?;
         Ok(Self { json, timings, folder })
     }
 }

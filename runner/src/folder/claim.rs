@@ -22,14 +22,15 @@ pub struct Claim {
 }
 
 impl RunFolder {
-    /// Keeps other runs from writing here, if there is such a folder. Where it is given whom to tell, as for a run that is
-    /// to go on, it waits for one that is about to end.
+    /// Keeps other runs from writing here, if there is such a folder. Where it is given whom to tell it waits a while for the
+    /// end of one that still does: so does whatever comes with `--resume`, whether it is to go on or to begin; a run that only
+    /// begins, with `--out`, is refused at once.
     ///
     /// # Errors
     /// If another run writes here, or nobody can.
     pub fn hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Option<Claim>, FolderError> {
-        // What is no run, and cannot become one, is left as it is.
-        if !self.path().is_dir() || !self.holds_run() && self.check_free(false).is_err() {
+        // What is no run, and cannot become one, is left as it is. Asked in this order, as one may begin meanwhile.
+        if !self.path().is_dir() || self.check_free(false).is_err() && !self.holds_run() {
             return Ok(None);
         }
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
@@ -56,6 +57,19 @@ impl RunFolder {
         Ok(Some(Claim { _lock: Some(lock).filter(|_| shared) }))
     }
 
+    /// Makes the folder if it is not there, and keeps other runs from it, as [`hold`](Self::hold) does. Another run may have
+    /// begun there before it was held.
+    ///
+    /// # Errors
+    /// If it cannot be written to, another run writes there, or it holds something else.
+    pub fn make_and_hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Claim, FolderError> {
+        create_folder_durably(self.path()).map_err(|error| self.not_writable(&error))?;
+        self.hold(waiting)?.ok_or_else(|| match self.check_free(false) {
+            Err(error) => error,
+            Ok(()) => self.refusal("it was removed while the run began; try again"),
+        })
+    }
+
     /// Makes the folder that of a run about to begin or to go on: what an overwritten run left is gone, and the configuration
     /// is there. `held` is what [`hold`](Self::hold) gave before the folder was looked at.
     ///
@@ -66,10 +80,9 @@ impl RunFolder {
         let claim = match held {
             Some(claim) => claim,
             None => {
-                create_folder_durably(self.path()).map_err(failed)?;
-                let claim = self.hold(None)?;
+                let claim = self.make_and_hold(None)?;
                 self.check_free(false)?;
-                claim.ok_or_else(|| self.refusal("it was removed while the run began; try again"))?
+                claim
             }
         };
         if begins {

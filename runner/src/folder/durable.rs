@@ -49,6 +49,11 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
+/// Whether a file that was there is not any more. Where the system does not say, it is.
+pub(crate) fn is_gone(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_err_and(|error| error.kind() == io::ErrorKind::NotFound)
+}
+
 /// Whether a file of that name is what somebody who was killed left who would have written `path`.
 pub(crate) fn is_temporary(name: &OsStr, path: &Path) -> bool {
     let parts = name.to_str().zip(path.file_name().and_then(OsStr::to_str));

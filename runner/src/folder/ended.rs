@@ -19,13 +19,20 @@ pub enum EndedError {
         reason: String,
     },
     /// It cannot be understood.
-    #[error("{} is no summary of a run: {}; bring back a good copy of it", .path.display(), OneLine(.reason))]
+    #[error("{} is no summary of a run: {}; remove it, or bring back a good copy of it", .path.display(), OneLine(.reason))]
     Damaged {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
     },
+}
+
+impl EndedError {
+    /// As a note where work goes on without it.
+    pub fn counts_as_missing(&self) -> String {
+        format!("{self}; until then it counts as missing")
+    }
 }
 
 /// A run that has come to its end, or was told to stop and did so in order.

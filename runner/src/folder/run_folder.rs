@@ -80,6 +80,14 @@ impl RunFolder {
         }
     }
 
+    /// Whether a run keeps a file or a folder of that name in its folder: nobody else may write there.
+    pub fn owns(&self, name: &OsStr) -> bool {
+        let fixed = [self.configuration(), self.summary(), self.snapshots(), self.lock()];
+        fixed.iter().any(|path| path.file_name() == Some(name))
+            || name.to_str().is_some_and(recording::is_rank_folder)
+            || self.is_unfinished(name)
+    }
+
     /// Whether a file of that name in here is one that a killed run did not finish.
     fn is_unfinished(&self, name: &OsStr) -> bool {
         [self.configuration(), self.summary()].iter().any(|path| is_temporary(name, path))

@@ -10,7 +10,7 @@ use crate::rank::{self, Observer, RankError};
 use crate::summary::Summary;
 use atoll_core::StepError;
 use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
-use atoll_transport::{Rank, RankFailure, Transport};
+use atoll_transport::{Collective, Rank, RankFailure, Transport};
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
@@ -112,6 +112,14 @@ impl Job {
             Ok(()) => result,
             Err(Refusal::Known(error)) => Err(self.common(&error)),
             Err(Refusal::Transport(error)) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
+        }
+    }
+
+    /// What the rank that speaks for all says. Where ranks cannot talk, the job ends.
+    pub(crate) fn told(&mut self, says: bool) -> bool {
+        match self.endpoint.all_gather(&[u8::from(says)]) {
+            Ok(all) => all.first().is_some_and(|first| first == &[1]),
+            Err(error) => self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost),
         }
     }
 

@@ -21,6 +21,9 @@ pub(super) fn outcome(plan: &Plan, ends: Ends, before: u64) -> Result<Summary, R
             Ok(Ok(None)) => {}
             Ok(Ok(Some(gathered))) => summary = Some(Summary::new(plan, gathered)),
             Ok(Err(error)) => errors.push((Nearness::of_error(&error), told(error, complete, steps))),
+            Err(RankFailure::NotStarted { rank, reason }) => {
+                errors.push((Nearness::Cause, RunError::Threads { rank, threads: 1, reason }));
+            }
             Err(failure) => {
                 let (rank, reason) = (failure.rank(), failure.to_string());
                 let error = RunError::PeerLost { rank, complete, steps, reason };
@@ -123,6 +126,14 @@ mod tests {
         let error = outcome(&plan(), vec![failed(4, lost(1)), Err(panicked), failed(3, lost(1))], 9).unwrap_err();
         assert_eq!(error.to_string(), "rank 1 was lost after 3 of 9 steps: rank 1 panicked: boom");
         assert_eq!(error.exit() as u8, 3);
+    }
+
+    #[test]
+    fn a_rank_without_a_thread_is_no_lost_one() {
+        let not_started = RankFailure::NotStarted { rank: Rank(2), reason: "no more".to_owned() };
+        let error = outcome(&plan(), vec![failed(0, lost(2)), failed(0, lost(2)), Err(not_started)], 0).unwrap_err();
+        assert_eq!(error.to_string(), "rank 2 cannot start a thread: no more; use fewer threads or ranks");
+        assert_eq!(error.exit(), Exit::Usage);
     }
 
     #[test]

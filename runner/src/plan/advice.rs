@@ -1,7 +1,8 @@
 //! What a user may want to know of a plan before it is run.
 
-use super::{Plan, tiles};
+use super::Plan;
 use crate::config::{OutputConfig, TransportKind};
+use crate::folder::Ended;
 use std::thread;
 
 impl Plan {
@@ -24,7 +25,7 @@ impl Plan {
                  as with `mpirun --map-by slot:PE={threads} --bind-to core`"
             ));
         }
-        let halo = tiles::halo_width(&self.blueprint.kinds, &self.blueprint.params);
+        let halo = atoll_core::halo_width(&self.blueprint.kinds, &self.blueprint.params);
         let side = self.blueprint.grid.tile_size().min_element();
         if tiles > 1 && side < halo {
             notes.push(format!(
@@ -34,7 +35,10 @@ impl Plan {
         if self.output.is_none() && self.config.output != OutputConfig::default() {
             notes.push("[output] says what to write, and there is no --out: nothing is written".to_owned());
         }
-        notes.extend(self.output.as_ref().filter(|output| !output.begins).map(|output| {
+        let goes_on = self.output.as_ref().filter(|output| !output.begins);
+        let unreadable = goes_on.and_then(|output| Ended::read(output.folder.path()).err());
+        notes.extend(unreadable.map(|error| error.counts_as_missing()));
+        notes.extend(goes_on.map(|output| {
             let folder = output.folder.path().display();
             match self.found.snapshots.first() {
                 Some(snapshot) => format!("going on with {folder} after step {}", snapshot.step()),

@@ -1,28 +1,60 @@
 //! How much memory a run takes, and whether this machine has it.
 
-use crate::config::OutputConfig;
+use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
+use atoll_core::Blueprint;
+use std::fs;
 
-/// Refuses a world that this machine cannot hold, before it tries to. `here` is how many of the ranks it surely holds.
+/// A thread's stack.
+const STACK: u64 = 2 << 20;
+
+/// What a process takes whatever it computes, beside what it has when it asks.
+const PROCESS: u64 = 16 << 20;
+
+/// Refuses a world that this machine cannot hold, or a process not within its limits, before it tries to.
 pub(super) fn check(
+    blueprint: &Blueprint,
     bodies: u64,
-    tiles: u64,
-    ranks: u64,
-    here: u64,
+    config: &Config,
     output: Option<&OutputConfig>,
 ) -> Result<(), RunError> {
-    // A body takes 48 bytes and its contacts as much again and more; an empty tile a few buffers, and four bytes in
-    // every rank's map of tiles; a pair of ranks a channel. What is written is copied first: records twice.
+    let (ranks, tiles) = (config.run.ranks as u64, blueprint.grid.tiles() as u64);
+    // What is written is copied first: records twice.
     let copies = if output.is_some_and(|output| output.record_every.is_some()) { 100 } else { 0 };
     let saved = if output.is_some() { 200 } else { 0 };
-    let each = 200 + copies + saved;
-    let needed = (bodies.saturating_mul(each) + tiles * 1000) / ranks * here + here * (4 * tiles + 500 * ranks);
-    let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|facts| {
-        let line = facts.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-        Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-    });
-    match available {
-        Some(available) if needed > available => Err(RunError::TooLarge { bodies, tiles, ranks, needed, available }),
+    let world = blueprint.memory(bodies).saturating_add(bodies.saturating_mul(copies + saved));
+    // Every rank has its share, four bytes for each tile in a map, and a channel to every other.
+    let of = |held: u64| (world / ranks).saturating_mul(held).saturating_add(held * (4 * tiles + 500 * ranks));
+    let check = |within: &'static str, needed: u64, available: Option<u64>| match available {
+        Some(available) if needed > available => {
+            Err(RunError::TooLarge { within, bodies, tiles, ranks, needed, available })
+        }
         _ => Ok(()),
-    }
+    };
+    // Of an MPI job the others may be anywhere.
+    let here = if config.transport() == TransportKind::Mpi { 1 } else { ranks };
+    check("this machine", of(here), free())?;
+    let in_process = match config.transport() {
+        TransportKind::Local | TransportKind::Channel => ranks,
+        TransportKind::Iceoryx2 | TransportKind::Mpi => 1,
+    };
+    let threads = in_process * (config.run.threads as u64 + u64::from(output.is_some()));
+    check("the limit on a process (ulimit -v)", of(in_process) + threads * STACK + PROCESS, left_of_limit())
+}
+
+/// Bytes that the machine has to spare, if it says so.
+fn free() -> Option<u64> {
+    let facts = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = facts.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Bytes that this process may still ask for, if there is a limit.
+fn left_of_limit() -> Option<u64> {
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let soft = limits.lines().find_map(|line| line.strip_prefix("Max address space")?.split_whitespace().next())?;
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let size = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?;
+    let taken = size.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024;
+    Some(soft.parse::<u64>().ok()?.saturating_sub(taken))
 }

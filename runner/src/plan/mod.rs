@@ -9,6 +9,7 @@ pub(crate) use assignment::Assignment;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
+use crate::folder::recording::{Recording, RunFacts};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
@@ -94,7 +95,9 @@ impl Plan {
     pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
         let (scene, tiles) = scene_and_tiles(config);
         folder.check_same_run(config, tiles)?;
-        let (steps, ended) = (config.run.steps, Ended::read(folder.path())?);
+        // One that cannot be read counts as missing, unless nothing else tells how far the run came.
+        let (steps, ended) = (config.run.steps, Ended::read(folder.path()));
+        let (ended, unreadable) = ended.map_or_else(|error| (None, Some(error)), |ended| (ended, None));
         if let Some(ended) = ended.as_ref().filter(|ended| !ended.interrupted && ended.steps == steps) {
             RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
             return Err(RunError::Complete { summary: folder.summary(), steps });
@@ -110,11 +113,30 @@ impl Plan {
             let reason = format!("{made} steps are made there already, and {steps} asked for");
             return Err(folder.refusal(format!("{reason}; give --steps as many or more")).into());
         }
+        if let (Some(error), None) = (unreadable, newest) {
+            let reason = "there is no snapshot to go on from, so that without it the run begins anew";
+            return Err(folder.refusal(format!("{error}; {reason}")).into());
+        }
         if let (Some(made), None) = (ended, newest) {
             let reason = format!("{made} steps of this run are made, and there is no snapshot to go on from");
             return Err(folder.refusal(format!("{reason}; begin another run with --out")).into());
         }
         Self::from_found(config, scene, tiles, found, Some((folder, false)))
+    }
+
+    /// Whether all that was recorded before the snapshot from which the run goes on is there, and of this run, by what every
+    /// file says about itself. For one process of a run to ask.
+    ///
+    /// # Errors
+    /// If not: what is recorded from there on would be of no use.
+    pub fn check_recording(&self) -> Result<(), RunError> {
+        let newest = self.found.snapshots.iter().map(Snapshot::step).max();
+        let Some((output, newest)) = self.output.as_ref().zip(newest) else { return Ok(()) };
+        let Some(every) = output.every.record_every else { return Ok(()) };
+        let facts = RunFacts::new(&self.config, self.scene.domain(), self.tiles, every);
+        let run = (output.folder.configuration(), facts);
+        Recording::check_until(output.folder.path(), run, newest)
+            .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())
     }
 
     /// `folder` is written to, and says whether the run begins there.
@@ -126,22 +148,13 @@ impl Plan {
         folder: Option<(RunFolder, bool)>,
     ) -> Result<Self, RunError> {
         let transport = config.transport();
-        let ranks = config.run.ranks as u64;
-        // Of an MPI job the others may be anywhere.
-        let here = if transport == TransportKind::Mpi { 1 } else { ranks };
-        memory::check(
-            scene.bodies(),
-            u64::from(tiles[0]) * u64::from(tiles[1]),
-            ranks,
-            here,
-            folder.is_some().then_some(&config.output),
-        )?;
         let (low, high) = scene.domain();
         let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
         let params = config.params.clone();
         let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
         // An empty world costs nothing and checks the blueprint for all of them.
         World::new(&blueprint, &[])?;
+        memory::check(&blueprint, scene.bodies(), config, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;
         let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {

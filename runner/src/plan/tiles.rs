@@ -24,8 +24,9 @@ pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
     })
 }
 
-/// The width of the halo in meters: the largest bounding radius of a dynamic body and the greatest margin.
-pub(crate) fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
+/// The width of the halo in meters that the default is made with, which no change may bend: without what
+/// [`atoll_core::halo_width`] adds for rounding.
+fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
     let radii = kinds.iter().map(|kind| f64::from(kind.shape.bounding_radius()));
     radii.fold(0.0, f64::max) + f64::from(params.margin_cap)
 }

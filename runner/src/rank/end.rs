@@ -4,6 +4,7 @@ use super::recorder::Recorder;
 use super::trouble::all_well;
 use super::{Observer, RankError};
 use crate::error::RunError;
+use crate::folder::durable::is_gone;
 use crate::folder::{RunFolder, snapshot};
 use crate::plan::{Output, Plan};
 use atoll_core::World;
@@ -58,12 +59,17 @@ pub(super) fn finish(
     let kept = recorder.snapshot_before();
     together(transport, observer, folder, || recorder.close(patience))?;
     let time = recorder.time();
-    let trouble = recorder.failure().map(|why| RunError::StoppedWriting {
-        why: why.to_string(),
-        complete: world.step_count(),
-        steps: plan.config.run.steps,
-        folder: folder.path().to_owned(),
-    });
+    let trouble = match recorder.failure() {
+        // Whatever else went wrong follows from that.
+        _ if is_gone(&folder.configuration()) => Some(RunError::Gone { path: folder.configuration() }),
+        Some(RunError::Gone { path }) => Some(RunError::Gone { path: path.clone() }),
+        why => why.map(|why| RunError::StoppedWriting {
+            why: why.to_string(),
+            complete: world.step_count(),
+            steps: plan.config.run.steps,
+            folder: folder.path().to_owned(),
+        }),
+    };
     all_well(transport, trouble.as_ref())?;
     if let (Rank(0), Some(kept)) = (transport.rank(), kept)
         && let Err(error) = snapshot::remove_before(&folder.snapshots(), kept)

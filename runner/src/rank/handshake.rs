@@ -28,7 +28,12 @@ pub(crate) fn agree<T>(
         Ok(prepared) => hello(plan_of(prepared)),
         Err(error) => {
             // Output is the business of one rank.
-            let of_one = matches!(error, RunError::BadOutput { .. } | RunError::Folder(FolderError::Unusable { .. }));
+            let of_one = matches!(
+                error,
+                RunError::BadOutput { .. }
+                    | RunError::TakenOutput { .. }
+                    | RunError::Folder(FolderError::Unusable { .. })
+            );
             let name = if of_one { COMMON_ERROR } else { ERROR };
             vec![(name.to_owned(), in_words(error))]
         }

@@ -53,7 +53,7 @@ pub fn run<R: Send>(
             .into_iter()
             .map(|(rank, thread)| match thread {
                 Ok(thread) => thread.join().map_err(|payload| RankFailure::from_panic(rank, payload)),
-                Err(error) => Err(not_started(rank, format!("no thread for it: {error}"))),
+                Err(error) => Err(not_started(rank, error.to_string())),
             })
             .collect()
     })

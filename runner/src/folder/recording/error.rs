@@ -1,7 +1,6 @@
 //! What can go wrong with a recording.
 
 use crate::config::OneLine;
-use crate::folder::ended::EndedError;
 use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -33,9 +32,6 @@ pub enum RecordingError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The summary of the run.
-    #[error(transparent)]
-    Ended(#[from] EndedError),
     /// There is no record.
     #[error(
         "{} holds no recording: there is no step of which all ranks have closed a segment (rank-*/steps-*.parquet); give the \

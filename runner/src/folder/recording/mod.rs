@@ -52,6 +52,11 @@ pub fn rank_folder(run: &Path, rank: u32) -> PathBuf {
     run.join(format!("rank-{rank:05}"))
 }
 
+/// Whether the folder of a rank may have that name.
+pub(crate) fn is_rank_folder(name: &str) -> bool {
+    rank_of_folder(name).is_some()
+}
+
 /// The rank whose folder has that name.
 fn rank_of_folder(name: &str) -> Option<u32> {
     name.strip_prefix("rank-")?.parse().ok().filter(|rank| name == format!("rank-{rank:05}"))

@@ -38,21 +38,47 @@ impl Recording {
     ///
     /// # Errors
     /// If there are no records, a file cannot be read, files do not go together, or one is missing. What is missing after
-    /// the last complete record is what a killed run lost, and no error, unless the run's summary says that it came further.
+    /// the last complete record is what a killed run lost, and no error, unless the run's summary says that it came further. A
+    /// summary that cannot be read counts as missing.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
+        let nothing = || RecordingError::Nothing { path: folder.to_owned() };
+        let mut recording = Self::index(folder, None, u64::MAX)?.ok_or_else(nothing)?;
+        recording.ended = Ended::read(folder).ok().flatten();
+        (recording.steps, recording.incomplete) =
+            recording.find_complete(recording.ended.as_ref().map(|ended| ended.steps))?;
+        if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
+    }
+
+    /// Whether everything is there that a run has recorded until a step, by what all files say about themselves. `run` tells
+    /// which run that is, and which file says so.
+    ///
+    /// # Errors
+    /// If something is missing, damaged, or of another run.
+    pub(crate) fn check_until(folder: &Path, run: (PathBuf, RunFacts), step: u64) -> Result<(), RecordingError> {
+        let missing = || RecordingError::Missing { folder: folder.to_owned(), step: 0 };
+        let recording = Self::index(folder, Some(run), step)?.ok_or_else(missing)?;
+        recording.find_complete(Some(step)).map(drop)
+    }
+
+    /// Reads what the segments that begin until a step say about themselves. `first` is what they are compared with, or else
+    /// the first of them. None if there are none.
+    fn index(
+        folder: &Path,
+        mut first: Option<(PathBuf, RunFacts)>,
+        until: u64,
+    ) -> Result<Option<Self>, RecordingError> {
         let (mut files, mut parts) = (Vec::new(), Vec::new());
-        // Of the first file, to compare with, and of the last step, which is what the run came to be.
-        let (mut first, mut last) = (None, None);
-        for (rank, path) in segments(folder)? {
+        // Of the last step, which is what the run came to be.
+        let mut last = None;
+        for (rank, path) in segments(folder, until)? {
             let segment = Segment::open(&path)?;
             if segment.rank != rank {
                 let reason = format!("it is of rank {}", segment.rank);
                 return Err(RecordingError::BadSegment { path, reason });
             }
-            let first = first.get_or_insert_with(|| segment.facts.clone());
-            if let Some(what) = first.other_run(&segment.facts) {
-                let paths = [files.swap_remove(0), path];
-                return Err(RecordingError::OtherRun { paths, what });
+            let (other, facts) = first.get_or_insert_with(|| (path.clone(), segment.facts.clone()));
+            if let Some(what) = facts.other_run(&segment.facts) {
+                return Err(RecordingError::OtherRun { paths: [other.clone(), path], what });
             }
             let (ranks, file) = (segment.ranks, files.len());
             parts.extend(segment.records.iter().map(|record| {
@@ -65,13 +91,9 @@ impl Recording {
             }
             files.push(path);
         }
-        let nothing = || RecordingError::Nothing { path: folder.to_owned() };
-        let (_, facts) = last.ok_or_else(nothing)?;
         parts.sort_by_key(|part| (part.step, part.rank));
-        let (folder, ended) = (folder.to_owned(), Ended::read(folder)?);
-        let mut recording = Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended };
-        (recording.steps, recording.incomplete) = recording.find_complete()?;
-        if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
+        let folder = folder.to_owned();
+        Ok(last.map(|(_, facts)| Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended: None }))
     }
 
     /// The folder it is in.
@@ -99,7 +121,7 @@ impl Recording {
         self.incomplete
     }
 
-    /// What the run's summary says, once it has ended.
+    /// What the run's summary says, once it has ended, if it can be read.
     pub fn ended(&self) -> Option<&Ended> {
         self.ended.as_ref()
     }
@@ -131,8 +153,9 @@ impl Recording {
         start..start + self.parts[start..].partition_point(|part| part.step == step)
     }
 
-    /// The steps that all ranks hold, none of which may be missing, and how many only some hold.
-    fn find_complete(&self) -> Result<(Vec<u64>, usize), RecordingError> {
+    /// The steps that all ranks hold, none of which may be missing, and how many only some hold. The run is known to have
+    /// `made` so many steps, or not known to have ended.
+    fn find_complete(&self, made: Option<u64>) -> Result<(Vec<u64>, usize), RecordingError> {
         let (mut complete, mut incomplete) = (Vec::new(), 0);
         for parts in self.parts.chunk_by(|a, b| a.step == b.step) {
             self.check_together(parts)?;
@@ -144,7 +167,7 @@ impl Recording {
             }
         }
         let every = self.facts.record_every;
-        let told = self.ended.as_ref().map(|ended| ended.steps - ended.steps % every);
+        let told = made.map(|made| made - made % every);
         let last = complete.last().copied().max(told);
         let unbroken = complete.iter().zip(0..).take_while(|(step, count)| **step == count * every).count();
         let missing = unbroken as u64 * every;
@@ -177,14 +200,14 @@ impl Recording {
     }
 }
 
-/// All complete segments of a run, with the ranks in whose folders they are, in a fixed order.
-fn segments(folder: &Path) -> Result<Vec<(u32, PathBuf)>, RecordingError> {
+/// The complete segments of a run that begin until a step, with the ranks in whose folders they are, in a fixed order.
+fn segments(folder: &Path, until: u64) -> Result<Vec<(u32, PathBuf)>, RecordingError> {
     let mut segments = Vec::new();
     for name in names(folder)? {
         let Some(rank) = rank_of_folder(&name) else { continue };
         let of_rank = folder.join(name);
         let files = names(&of_rank)?;
-        let files = files.iter().filter(|name| steps_of_segment(name).is_some());
+        let files = files.iter().filter(|name| steps_of_segment(name).is_some_and(|(first, _)| first <= until));
         segments.extend(files.map(|name| (rank, of_rank.join(name))));
     }
     Ok(segments)

@@ -259,10 +259,33 @@ fn what_is_missing_is_named() {
     assert!(complaint(folder.path()).starts_with("DIR/rank-00000: the segment that holds step 50 is missing"));
     remove(&folder, 1, second);
     assert!(complaint(folder.path()).starts_with("DIR: the segment that holds step 50 is missing"));
-    told(r#"{"steps": "many\nand"}"#);
-    assert!(complaint(folder.path()).starts_with("DIR/summary.json is no summary of a run: invalid type: string"));
-    told("{");
-    assert!(complaint(folder.path()).starts_with("DIR/summary.json is no summary of a run: EOF"));
+    // One that tells nothing.
+    for torn in [r#"{"steps": "many\nand"}"#, "{"] {
+        told(torn);
+        let recording = Recording::open(folder.path()).unwrap();
+        assert_eq!((recording.steps().last(), recording.ended()), (Some(&45), None));
+    }
+}
+
+#[test]
+fn what_a_run_goes_on_from_must_be_all_there() {
+    let told = |folder: &TempDir, step| {
+        let run = (folder.path().join("run.toml"), facts(5));
+        Recording::check_until(folder.path(), run, step).map_err(|error| error.to_string())
+    };
+    let folder = recorded();
+    let path = |rank, name: &str| rank_folder(folder.path(), rank).join(name);
+    // Whatever comes after the step is about to be removed.
+    fs::write(path(0, "steps-0000000050-0000000060.parquet"), "").unwrap();
+    assert_eq!((told(&folder, 45), told(&folder, 49)), (Ok(()), Ok(())));
+    assert!(told(&folder, 50).unwrap_err().contains("is damaged, or no segment of a recording"));
+    fs::remove_file(path(0, "steps-0000000050-0000000060.parquet")).unwrap();
+    assert!(told(&folder, 50).unwrap_err().contains("rank-00000: the segment that holds step 50 is missing"));
+    let other = RunFacts { record_every: 3, ..facts(5) };
+    let error = Recording::check_until(folder.path(), (folder.path().join("run.toml"), other), 45).unwrap_err();
+    assert!(error.to_string().contains("run.toml and ") && error.to_string().contains("of different runs"), "{error}");
+    let nothing = tempfile::tempdir().unwrap();
+    assert!(told(&nothing, 0).unwrap_err().contains("the segment that holds step 0 is missing"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::error::reason;
 use super::facts::RunFacts;
 use super::record::Record;
 use super::{RECORDS_PER_SEGMENT, RecordingError, layout, open_segment_name, segment_name};
-use crate::folder::durable::{sync_folder, sync_folder_of};
+use crate::folder::durable::{is_gone, sync_folder, sync_folder_of};
 use parquet::column::writer::ColumnWriterImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -30,6 +30,8 @@ pub struct RecordingWriter {
     schema: TypePtr,
     properties: WriterPropertiesPtr,
     open: Option<OpenSegment>,
+    /// First and last steps of the segments that were completed.
+    complete: Vec<(u32, u32)>,
     /// Whether there are complete segments whose names are perhaps not on the disk yet.
     named: bool,
 }
@@ -46,7 +48,7 @@ impl RecordingWriter {
         texts.push(("atoll.ranks".to_owned(), ranks.to_string()));
         let texts = texts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
         let (schema, properties) = (layout::schema(), layout::properties(texts));
-        Ok(Self { folder, schema, properties, open: None, named: false })
+        Ok(Self { folder, schema, properties, open: None, complete: Vec::new(), named: false })
     }
 
     /// Adds a record, and closes the segment if that is its last.
@@ -73,13 +75,24 @@ impl RecordingWriter {
     /// If it cannot be written. The segment is then given up.
     pub fn close_segment(&mut self) -> Result<(), RecordingError> {
         let Some(mut segment) = self.open.take() else { return Ok(()) };
-        let path = self.folder.join(segment_name(segment.first.into(), segment.last.into()));
+        let path = self.path(segment.first, segment.last);
         let finished = segment.finish().and_then(|()| Ok(fs::rename(&segment.path, &path)?));
         if let Err(error) = finished {
             return Err(segment.give_up(&error));
         }
+        self.complete.push((segment.first, segment.last));
         self.named = true;
         Ok(())
+    }
+
+    /// A segment that was completed and is not there any more, if there is one.
+    pub(crate) fn gone(&self) -> Option<PathBuf> {
+        let paths = self.complete.iter().map(|&(first, last)| self.path(first, last));
+        paths.into_iter().find(|path| is_gone(path))
+    }
+
+    fn path(&self, first: u32, last: u32) -> PathBuf {
+        self.folder.join(segment_name(first.into(), last.into()))
     }
 
     /// Waits until the names of all complete segments are on the disk as well.

@@ -1,6 +1,7 @@
 //! The thread that writes what a rank recorded and saved, in the order in which it did.
 
 use crate::error::RunError;
+use crate::folder::durable::is_gone;
 use crate::folder::recording::{Record, RecordingWriter, RunFacts};
 use crate::folder::snapshot::{self, SnapshotWriter};
 use crate::plan::{Output, Plan};
@@ -41,6 +42,8 @@ pub(super) struct Writer {
     recording: Option<RecordingWriter>,
     snapshot: SnapshotWriter,
     snapshots: PathBuf,
+    /// The file of the last one.
+    saved: Option<PathBuf>,
     /// After the first failure nothing is written any more, so that what is there is of one piece.
     failure: Arc<OnceLock<RunError>>,
 }
@@ -59,7 +62,7 @@ impl Writer {
         };
         let recording = output.every.record_every.map(recording).transpose()?;
         let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, identity);
-        Ok(Self { recording, snapshot, snapshots: output.folder.snapshots(), failure })
+        Ok(Self { recording, snapshot, snapshots: output.folder.snapshots(), saved: None, failure })
     }
 
     /// Does what it is asked for until nobody can ask any more, and gives the buffers back.
@@ -85,6 +88,7 @@ impl Writer {
             }
         }
         self.attempt(Self::close);
+        self.attempt(Self::check_there);
     }
 
     fn attempt(&mut self, write: impl FnOnce(&mut Self) -> Result<(), RunError>) {
@@ -111,7 +115,15 @@ impl Writer {
         let written = self.snapshot.write(&self.snapshots, saved.step, &saved.tiles, &saved.blocks);
         let path = written.map_err(|(path, error)| RunError::Output { path, reason: error.to_string() })?;
         debug!(step = saved.step, bytes = saved.blocks.len(), "saved to {}", path.display());
+        self.saved = Some(path);
         Ok(())
+    }
+
+    /// Whether everything is there still that was written and not removed by the run itself.
+    fn check_there(&mut self) -> Result<(), RunError> {
+        let saved = self.saved.take().filter(|path| is_gone(path));
+        let gone = self.recording.as_ref().and_then(RecordingWriter::gone).or(saved);
+        gone.map_or(Ok(()), |path| Err(RunError::Gone { path }))
     }
 
     /// Completes what was recorded so far.

@@ -1,0 +1,267 @@
+//! The folder of a run: who may write there, what is not written over, and what is refused, told or made good where something in
+//! there is gone or damaged.
+
+use atoll_tests::program::{self, Ended, Running, diff};
+use atoll_tests::ways::Way;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use tempfile::{TempDir, tempdir};
+
+/// A small world.
+const SMALL: [&str; 6] = ["--quiet", "--bodies", "1000", "--tiles=2x2", "--ranks", "2"];
+
+/// What most runs here write: segments until steps 10, 20 and 30, and snapshots after 20 and 30.
+const OUTPUT: [&str; 6] = ["--steps", "30", "--record-every", "5", "--checkpoint-every", "10"];
+
+fn begin(option: &str, folder: &Path) -> Command {
+    let mut command = program::command();
+    command.args(["run", "configs/quickstart.toml"]).args(SMALL).args(OUTPUT).arg(option).arg(folder);
+    command
+}
+
+fn resume(folder: &Path) -> Command {
+    let mut command = program::command();
+    command.args(["run", "--quiet", "--resume"]).arg(folder);
+    command
+}
+
+/// A folder with the folder of a run in it.
+fn recorded(name: &str) -> (TempDir, PathBuf) {
+    let folder = tempdir().unwrap();
+    let run = folder.path().join(name);
+    let ended = program::run(&mut begin("--out", &run));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(0), 0), "{ended}");
+    (folder, run)
+}
+
+fn copy(run: &Path, name: &str) -> PathBuf {
+    let to = run.with_file_name(name);
+    assert!(Command::new("cp").arg("-r").args([run, &to]).status().unwrap().success());
+    to
+}
+
+/// Every file below a folder but its lock, with what it holds.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(contents(&path));
+        } else if !path.ends_with("lock") {
+            all.push((path.clone(), fs::read(path).unwrap()));
+        }
+    }
+    all.sort();
+    all
+}
+
+#[track_caller]
+fn assert_refused(ended: &Ended, code: i32, expected: &str) {
+    let complaints = ended.complaints();
+    let told = complaints.len() == 1 && complaints[0].starts_with("atoll: ") && complaints[0].contains(expected);
+    assert!(ended.code == Some(code) && told, "expected {expected:?}, {code}: {ended}");
+}
+
+fn flip(path: &Path, at: usize) {
+    let mut bytes = fs::read(path).unwrap();
+    bytes[at] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn what_a_run_keeps_is_not_written_over() {
+    let (folder, run) = recorded("run");
+    let other = copy(&run, "other");
+    let before = contents(folder.path());
+    let segment = "rank-00001/steps-0000000000-0000000010.parquet";
+    let snapshot = "snapshots/step-0000000020/rank-00000-of-00002.atoll";
+    let config = folder.path().join("world.toml");
+    fs::copy(program::root().join("configs/quickstart.toml"), &config).unwrap();
+    for name in ["run.toml", "summary.json", "lock", segment, snapshot, "rank-00007/x", ".run.toml.7.tmp"] {
+        let options = if name == segment { ["--timings", "--plot"] } else { ["--json", "--json"] };
+        // Of the run itself, and of any other; however the way there is written.
+        for file in [run.join(name), other.join("../other").join(name)] {
+            let expected = format!("that is a file of the run in {}/", folder.path().canonicalize().unwrap().display());
+            for mut command in [begin("--overwrite", &file), resume(&run)] {
+                if command.get_args().any(|word| word == "--overwrite") {
+                    command = begin("--out", &run);
+                    command.arg("--overwrite");
+                }
+                let ended = program::run(command.arg(options[0]).arg(&file));
+                // In a folder that is not there nothing can be written at all.
+                let expected = if name.ends_with('x') { "" } else { &expected };
+                assert_refused(&ended, 2, expected);
+            }
+            assert_refused(&diff(&run, &other, &[options[1], file.to_str().unwrap()]), 2, "");
+        }
+    }
+    let mut command = program::command();
+    command.arg("run").arg(&config).args(["--timings", "world.toml"]).current_dir(folder.path());
+    assert_refused(
+        &program::run(&mut command),
+        2,
+        "that is the configuration of this run and must not be written over",
+    );
+    fs::remove_file(config).unwrap();
+    assert_eq!(contents(folder.path()), before);
+    // What is there beside is the user's own.
+    let mine = run.join("mine.json");
+    let ended = program::run(begin("--out", &run).arg("--overwrite").arg("--json").arg(&mine));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_eq!(program::summary(&mine)["steps"], 30);
+}
+
+#[test]
+fn a_run_goes_on_only_with_the_whole_of_its_recording() {
+    let (folder, run) = recorded("run");
+    let other = folder.path().join("other");
+    let ended = program::run(begin("--out", &other).args(["--seed", "2"]));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let name = "rank-00001/steps-0000000000-0000000010.parquet";
+    let good = fs::read(run.join(name)).unwrap();
+    type Harm<'a> = (&'a str, Box<dyn Fn(&Path) + 'a>);
+    let harms: [Harm<'_>; 4] = [
+        (
+            "is damaged, or no segment of a recording",
+            Box::new(|path| fs::write(path, &good[..good.len() - 9]).unwrap()),
+        ),
+        ("is damaged, or no segment of a recording", Box::new(|path| fs::write(path, "").unwrap())),
+        (
+            "rank-00001: the segment that holds step 0 is missing; bring it back",
+            Box::new(|path| fs::remove_file(path).unwrap()),
+        ),
+        (
+            "are of different runs: scene.seed is 1 in the one and 2 in the other",
+            Box::new(|path| assert!(fs::copy(other.join(name), path).unwrap() > 0)),
+        ),
+    ];
+    for (expected, harm) in harms {
+        harm(&run.join(name));
+        let before = contents(&run);
+        for way in Way::all() {
+            let ended = program::run(way.resume(1, &run).args(["--quiet", "--steps", "40"]));
+            assert_refused(&ended, 2, expected);
+            assert!(ended.stderr.contains("or begin anew with --out and --overwrite"), "{way}: {ended}");
+        }
+        assert_eq!(contents(&run), before, "{expected}");
+        fs::write(run.join(name), &good).unwrap();
+    }
+    fs::remove_dir_all(run.join("rank-00000")).unwrap();
+    assert_refused(&program::run(resume(&run).args(["--steps", "40"])), 2, "the segment that holds step 0 is missing");
+}
+
+/// Of several that are started at once, one begins the run, and all others wait for its end.
+#[test]
+fn all_that_resume_wait_for_the_one_that_runs() {
+    let folder = tempdir().unwrap();
+    let mut waited = 0;
+    for time in 0..4 {
+        let run = folder.path().join(format!("run-{time}"));
+        let all: Vec<Running> = (0..3).map(|_| Running::start(&mut begin("--resume", &run))).collect();
+        let ends: Vec<Ended> = all.into_iter().map(Running::end).collect();
+        assert!(ends.iter().all(|ended| ended.code == Some(0)), "{ends:#?}");
+        let told = |text: &str| ends.iter().filter(|ended| ended.stderr.contains(text)).count();
+        waited += told("waiting for the run that still writes there");
+        assert_eq!(told("all 30 steps of this run are made already"), 2, "{ends:#?}");
+        assert_eq!(ends.iter().filter(|ended| ended.stdout.contains("state hash")).count(), 1, "{ends:#?}");
+    }
+    assert!(waited > 0, "nobody ever waited");
+}
+
+#[test]
+fn a_summary_that_cannot_be_read_counts_as_missing() {
+    let (_folder, run) = recorded("run");
+    let torn = copy(&run, "torn");
+    let summary = torn.join("summary.json");
+    let whole = fs::read(&summary).unwrap();
+    fs::write(&summary, &whole[..100]).unwrap();
+    let note = "summary.json is no summary of a run: ";
+    let info = program::run(program::command().arg("info").arg(&torn));
+    assert_refused(&info, 0, note);
+    assert!(info.stderr.contains("; remove it, or bring back a good copy of it; until then"), "{info}");
+    assert!(info.stdout.contains("its summary cannot be read") && info.stdout.contains("7 records"), "{info}");
+    let compared = diff(&run, &torn, &[]);
+    assert_refused(&compared, 0, note);
+    assert!(compared.stdout.contains("identical: 7 records"), "{compared}");
+    let ended = program::run(&mut resume(&torn));
+    assert!(ended.code == Some(0) && ended.stderr.contains(note), "{ended}");
+    assert_eq!(program::summary(&summary)["state_hash"], program::summary(&run.join("summary.json"))["state_hash"]);
+    assert_eq!((diff(&run, &torn, &[]).code, diff(&run, &torn, &[]).stderr), (Some(0), String::new()));
+    // Where nothing else tells how far the run came, nothing is removed.
+    fs::remove_dir_all(torn.join("snapshots")).unwrap();
+    fs::write(&summary, &whole[..100]).unwrap();
+    assert_refused(&program::run(&mut resume(&torn)), 2, "there is no snapshot to go on from");
+    assert!(torn.join("rank-00001/steps-0000000000-0000000010.parquet").exists());
+}
+
+#[test]
+fn info_fails_on_a_damaged_snapshot_and_tells_all_the_same() {
+    let (_folder, run) = recorded("run");
+    for at in [40, 20_000] {
+        let damaged = copy(&run, &format!("damaged-{at}"));
+        let snapshot = "snapshots/step-0000000020/rank-00001-of-00002.atoll";
+        flip(&damaged.join(snapshot), at);
+        let info = program::run(program::command().arg("info").arg(&damaged));
+        assert_refused(&info, 2, &format!("{snapshot}: this snapshot is damaged: "));
+        assert!(info.stderr.contains("bring back a good copy of it"), "{info}");
+        assert!(info.stdout.contains("7 records") && info.stdout.contains("after step 30: "), "{info}");
+    }
+}
+
+#[test]
+fn a_comparison_that_cannot_be_written_is_no_bad_input() {
+    if !Path::new("/dev/full").exists() {
+        return;
+    }
+    let (_folder, run) = recorded("run");
+    let to_full = |text: &str| {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("\"$ATOLL\" {text} > /dev/full")]).env("RUN", &run);
+        command.env("ATOLL", program::atoll(program::Profile::CURRENT));
+        program::run(program::at_home(&mut command))
+    };
+    assert_refused(&to_full("diff \"$RUN\" \"$RUN\""), 5, "cannot write standard output: No space left");
+    assert_refused(&to_full("info \"$RUN\""), 5, "cannot write standard output: No space left");
+    assert_refused(&diff(&run, &run, &["--json", "/dev/full"]), 5, "cannot write /dev/full: No space left");
+}
+
+#[test]
+fn a_run_whose_folder_was_removed_says_so() {
+    let folder = tempdir().unwrap();
+    for way in Way::all() {
+        for (option, first, gone) in [
+            ("--record-every", "rank-00000/steps-0000000000-0000000045.parquet", "rank-00000"),
+            ("--record-every", "rank-00000/steps-0000000000-0000000045.parquet", ""),
+            ("--checkpoint-every", "snapshots", ""),
+        ] {
+            let run = folder.path().join("run");
+            let mut command = way.command(1, "configs/quickstart.toml");
+            command.args(["--quiet", "--bodies", "400", "--steps", "4000000000", option, "5", "--out"]).arg(&run);
+            let running = Running::start(&mut command);
+            let deadline = Instant::now() + program::LIMIT;
+            while !run.join(first).exists() {
+                assert!(Instant::now() < deadline, "{way}: no {first}");
+                sleep(Duration::from_millis(2));
+            }
+            // While the run puts something in there this may fail, once or more.
+            let kept = if gone.is_empty() { "run.toml" } else { first };
+            while run.join(kept).exists() {
+                let _ = fs::remove_dir_all(run.join(gone));
+            }
+            running.signal("TERM");
+            let ended = running.end();
+            assert_eq!(ended.code, Some(5), "{way}, {option}, {gone:?}: {ended}");
+            assert!(
+                ended.stderr.contains(" is gone: somebody removed it") || ended.stderr.contains("cannot write "),
+                "{ended}"
+            );
+            if gone.is_empty() {
+                assert!(ended.stderr.contains("run.toml is gone: somebody removed it while the run wrote"), "{ended}");
+            }
+            let _ = fs::remove_dir_all(&run);
+        }
+    }
+}
