@@ -88,7 +88,7 @@ impl Writer {
             }
         }
         self.attempt(Self::close);
-        self.attempt(Self::check_there);
+        self.attempt(|writer| writer.check_there());
     }
 
     fn attempt(&mut self, write: impl FnOnce(&mut Self) -> Result<(), RunError>) {
@@ -100,6 +100,8 @@ impl Writer {
             Err(RunError::Output { path: self.snapshots.with_file_name(""), reason })
         });
         if let Err(error) = written {
+            // That something was removed explains the rest.
+            let error = self.check_there().err().unwrap_or(error);
             let _ = self.failure.set(error);
         }
     }
@@ -120,8 +122,8 @@ impl Writer {
     }
 
     /// Whether everything is there still that was written and not removed by the run itself.
-    fn check_there(&mut self) -> Result<(), RunError> {
-        let saved = self.saved.take().filter(|path| is_gone(path));
+    fn check_there(&self) -> Result<(), RunError> {
+        let saved = self.saved.clone().filter(|path| is_gone(path));
         let gone = self.recording.as_ref().and_then(RecordingWriter::gone).or(saved);
         gone.map_or(Ok(()), |path| Err(RunError::Gone { path }))
     }
