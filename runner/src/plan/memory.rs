@@ -3,10 +3,15 @@
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
 use atoll_core::Blueprint;
-use std::fs;
+use std::{fs, thread};
 
 /// A thread's stack.
 const STACK: u64 = 2 << 20;
+
+/// Addresses that the allocator of glibc sets aside for each thread, where there are as many, up to [`ARENAS`] for a core.
+/// What one thread has set aside another may lack.
+const ARENA: u64 = 64 << 20;
+const ARENAS: u64 = 8;
 
 /// What a process takes whatever it computes, beside what it has when it asks.
 const PROCESS: u64 = 16 << 20;
@@ -38,8 +43,12 @@ pub(super) fn check(
         TransportKind::Local | TransportKind::Channel => ranks,
         TransportKind::Iceoryx2 | TransportKind::Mpi => 1,
     };
-    let threads = in_process * (config.run.threads as u64 + u64::from(output.is_some()));
-    check("the limit on a process (ulimit -v)", of(in_process) + threads * STACK + PROCESS, left_of_limit())
+    // Those of the ranks, and those that hear signals and show progress.
+    let threads = in_process * (config.run.threads as u64 + u64::from(output.is_some())) + 2;
+    let left = left_of_limit();
+    let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let arenas = if left.is_some_and(|left| left >= ARENA) { threads.min(ARENAS * cores) * ARENA } else { 0 };
+    check("the limit on a process (ulimit -v)", of(in_process) + threads * STACK + arenas + PROCESS, left)
 }
 
 /// Bytes that the machine has to spare, if it says so.
