@@ -84,6 +84,11 @@ provide_python() {
     export ATOLL_PYTHON
 }
 
+# Where nobody will look into the programs, less is compiled into them: lines for backtraces in one profile, nothing in the other.
+if [[ -n ${CI:-} ]]; then
+    export CARGO_PROFILE_DEV_DEBUG=line-tables-only CARGO_PROFILE_RELEASE_DEBUG=none
+fi
+
 provide
 [[ -n ${ATOLL_PYTHON:-} ]] || step provide_python || leave_out 'the examples in Python: their packages cannot be had'
 features=()
