@@ -127,7 +127,7 @@ step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/lo
 if [[ ${features[*]} == *mpi* ]]; then
     if has mpicc.mpich; then
         # The same again over MPICH, in a folder of its own: two MPIs cannot share what is built.
-        step env MPICC=mpicc.mpich CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/mpich" \
+        step env MPICC=mpicc.mpich ATOLL_LOSSES=1 CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/mpich" \
             cargo test --release -p atoll-tests --features mpi --test mpi_conformance --test transports --test loss
     else
         leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
