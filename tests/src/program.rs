@@ -33,6 +33,9 @@ pub enum Profile {
 impl Profile {
     /// That of the test which asks.
     pub const CURRENT: Self = if cfg!(debug_assertions) { Self::Dev } else { Self::Release };
+
+    /// The one that it is not.
+    pub const OTHER: Self = if cfg!(debug_assertions) { Self::Release } else { Self::Dev };
 }
 
 /// The root of the repository.

@@ -8,27 +8,29 @@ use std::env::{self, VarError};
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, ParseError, Targets};
+use tracing_subscriber::prelude::*;
+
+/// What says which log lines are written: `warn`, `atoll=debug`, `off,atoll::rank=trace`.
+const FILTER: &str = "RUST_LOG";
 
 /// Starts logging: warnings and errors, or what `RUST_LOG` says.
 ///
 /// # Errors
 /// If `RUST_LOG` cannot be understood.
 pub(super) fn init() -> Result<(), RunError> {
-    let value = match env::var(EnvFilter::DEFAULT_ENV) {
-        Ok(value) => value,
-        Err(VarError::NotPresent) => "warn".to_owned(),
+    let filter = match env::var(FILTER) {
+        Ok(value) => value.parse().map_err(|error: ParseError| RunError::LogFilter { value, reason: format!("{error}") })?,
+        Err(VarError::NotPresent) => Targets::new().with_default(LevelFilter::WARN),
         Err(VarError::NotUnicode(value)) => {
             let reason = "not valid Unicode".to_owned();
             return Err(RunError::LogFilter { value: value.to_string_lossy().into_owned(), reason });
         }
     };
-    let filter =
-        EnvFilter::try_new(&value).map_err(|error| RunError::LogFilter { value, reason: error.to_string() })?;
     let stderr = std::io::stderr;
-    let colored = stderr().is_terminal();
+    let lines = tracing_subscriber::fmt::layer().with_ansi(stderr().is_terminal()).with_writer(stderr);
     // Fails only where a subscriber is already in place, which then serves as well.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colored).with_writer(stderr).try_init();
+    let _ = tracing_subscriber::registry().with(lines).with(filter).try_init();
     Ok(())
 }
 
