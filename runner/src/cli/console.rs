@@ -20,7 +20,9 @@ const FILTER: &str = "RUST_LOG";
 /// If `RUST_LOG` cannot be understood.
 pub(super) fn init() -> Result<(), RunError> {
     let filter = match env::var(FILTER) {
-        Ok(value) => value.parse().map_err(|error: ParseError| RunError::LogFilter { value, reason: format!("{error}") })?,
+        Ok(value) => {
+            value.parse().map_err(|error: ParseError| RunError::LogFilter { value, reason: format!("{error}") })?
+        }
         Err(VarError::NotPresent) => Targets::new().with_default(LevelFilter::WARN),
         Err(VarError::NotUnicode(value)) => {
             let reason = "not valid Unicode".to_owned();
