@@ -88,6 +88,7 @@ pub use model::shape::{Kind, Material, Shape};
 pub use state::facts::{Facts, TileFacts};
 pub use state::hash::Hashes;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
+pub use state::view::{ContactView, TileView};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::{Blueprint, halo_width};

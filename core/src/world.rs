@@ -10,6 +10,7 @@ use crate::model::math::float_mode_is_default;
 use crate::model::names::Names;
 use crate::parallel::team::Team;
 use crate::state::hash::Hashes;
+use crate::state::view::TileView;
 use crate::step::phase::{Phase, Stopwatch, Timings};
 use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
@@ -141,6 +142,11 @@ impl World {
     /// Every owned body.
     pub fn bodies(&self) -> impl Iterator<Item = Body> + '_ {
         self.tiles.iter().flat_map(|tile| (0..tile.owned).map(|i| tile.bodies.get(i)))
+    }
+
+    /// What there is to see of each of the [`tiles`](Self::tiles), in their order.
+    pub fn views(&self) -> impl Iterator<Item = TileView<'_>> {
+        self.tiles.iter().map(TileView::new)
     }
 
     /// The tiles, ascending.

@@ -23,11 +23,11 @@
 #![forbid(unsafe_code)]
 
 mod cli;
-pub mod compare;
 pub mod config;
 pub mod error;
 mod folder;
 mod launch;
+mod look;
 mod plan;
 mod rank;
 pub mod scene;
@@ -36,6 +36,7 @@ mod summary;
 pub use cli::main;
 pub use config::{Config, ConfigError, Override};
 pub use error::{Exit, RunError};
+pub use look::compare;
 pub use rank::{Listener, Observer, StopFlag};
 pub use summary::{PhaseTime, RankTimings, Summary};
 

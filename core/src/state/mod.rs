@@ -4,4 +4,5 @@ pub(crate) mod facts;
 pub(crate) mod hash;
 mod layout;
 pub(crate) mod snapshot;
+pub(crate) mod view;
 pub(crate) mod violation;

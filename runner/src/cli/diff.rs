@@ -4,9 +4,9 @@ use super::args::DiffArgs;
 use super::console::complain;
 use super::output::{self, Kept, WholeFile};
 use super::progress::{Progress, Show};
-use crate::compare;
 use crate::error::{Exit, RunError};
 use crate::folder::Ended;
+use crate::look::compare;
 use std::io::{self, IsTerminal};
 
 /// Does it.

@@ -72,4 +72,9 @@ pub struct Row {
     pub vy: f32,
     /// Angular velocity, in rad/s, counter-clockwise.
     pub omega: f32,
+    /// Row of the table of kinds.
+    pub kind: u32,
+    /// Nothing: so that rows are plain data.
+    #[doc(hidden)]
+    pub padding: u32,
 }

@@ -217,7 +217,7 @@ impl State {
         let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).ok();
         let position = DVec2::new(row.x, row.y);
         let tile = grid.filter(|_| position.is_finite()).map(|grid| grid.locate(position).0);
-        let &Row { id: _, x, y, angle, vx, vy, omega } = row;
+        let &Row { id: _, x, y, angle, vx, vy, omega, kind: _, padding: _ } = row;
         Self { tile, x, y, angle, vx, vy, omega }
     }
 

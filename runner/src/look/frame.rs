@@ -1,0 +1,47 @@
+//! What there is to see of a run: what stays as it is, and what is there after a step. Wherever it comes from, a recording or
+//! a run under way, pictures and files for other programs are made of this.
+
+use crate::folder::recording::Row;
+use atoll_core::{Kind, StaticBody, TileGrid};
+use glam::DVec2;
+
+/// What stays as it is throughout a run.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Setting {
+    /// The tiles of the domain.
+    pub grid: TileGrid,
+    /// Shapes and materials, which bodies refer to by number.
+    pub kinds: Vec<Kind>,
+    /// What never moves.
+    pub statics: Vec<StaticBody>,
+    /// Steps in a second.
+    pub hertz: f64,
+}
+
+/// What is there after a step. Used again, it allocates nothing.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Frame {
+    /// Steps made.
+    pub step: u64,
+    /// The dynamic bodies: those of one rank after those of another.
+    pub bodies: Vec<Row>,
+    /// Ranks, ascending, and where the bodies of each end.
+    pub ranks: Vec<(u32, usize)>,
+    /// What only a run under way knows.
+    pub live: Option<Live>,
+}
+
+/// What is known while a run is under way, and not recorded.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Live {
+    /// For each body how many contacts it has.
+    pub contacts: Vec<u16>,
+    /// For each body whether it sleeps.
+    pub asleep: Vec<bool>,
+    /// Copies of bodies that tiles hold of their neighbours', each with the tile that holds it.
+    pub ghosts: Vec<(Row, u32)>,
+    /// Where contacts are, each counted once, with the impulse along their normal in N s.
+    pub points: Vec<(DVec2, f32)>,
+    /// For each tile the rank that holds it.
+    pub rank_of_tile: Vec<u32>,
+}
