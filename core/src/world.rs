@@ -110,7 +110,7 @@ impl World {
     /// The same bodies at the same step, in a world that remembers no contacts: to look at.
     pub(crate) fn copy_bodies(&self) -> Self {
         let tiles = self.tiles.iter().map(|tile| tile.copy_bodies(&self.setup)).collect();
-        let verdict = Verdict { stop: false, ..self.verdict };
+        let verdict = Verdict { stop: false, meet: false, ..self.verdict };
         Self { step: self.step, verdict, ..Self::of(Arc::clone(&self.setup), tiles) }
     }
 
@@ -167,6 +167,12 @@ impl World {
     /// Asks all ranks to stop: every rank's next step reports `stopped`.
     pub fn request_stop(&mut self) {
         self.verdict.stop = true;
+    }
+
+    /// Asks all ranks to do something together after the next step: every rank's next step reports `meeting`, unless it
+    /// reports `stopped`.
+    pub fn request_meeting(&mut self) {
+        self.verdict.meet = true;
     }
 
     /// Asks that the next step, and the last one of a run that was asked to stop, measure how well its contacts are
@@ -232,8 +238,9 @@ impl World {
             );
         }
         if let Some(id) = not_finite {
-            self.verdict = self.verdict.merge(Verdict { stop: false, failure: Some((self.step, id)) });
+            self.verdict = self.verdict.merge(Verdict { failure: Some((self.step, id)), ..Verdict::default() });
         }
+        self.verdict.meet = false;
         self.measures = false;
         self.step += 1;
     }

@@ -7,28 +7,31 @@ use crate::model::id::GlobalId;
 pub struct Verdict {
     /// Somebody asks the run to stop.
     pub stop: bool,
+    /// Somebody asks all ranks to meet after this step.
+    pub meet: bool,
     /// A check failed: the step and the lowest body concerned.
     pub failure: Option<(u64, GlobalId)>,
 }
 
 impl Verdict {
-    /// Joins two: any stop, the earliest failure.
+    /// Joins two: any stop, any wish to meet, the earliest failure.
     pub fn merge(self, other: Self) -> Self {
         let failure = match (self.failure, other.failure) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
         };
-        Self { stop: self.stop | other.stop, failure }
+        Self { stop: self.stop | other.stop, meet: self.meet | other.meet, failure }
     }
 
     /// As a word for the outside to carry: the least word of all ranks stands for all their verdicts joined. A failure
-    /// hides a stop, which makes no difference: it ends the run.
+    /// hides a stop, and a stop a wish to meet, which makes no difference: they end the run.
     pub fn to_word(self) -> u128 {
         match self {
             // A run never counts as many steps as would make this one of the words below.
             Self { failure: Some((step, id)), .. } => u128::from(step) << 64 | u128::from(id.0),
             Self { stop: true, .. } => Self::STOP,
-            Self { stop: false, .. } => Self::NOTHING,
+            Self { meet: true, .. } => Self::MEET,
+            Self { .. } => Self::NOTHING,
         }
     }
 
@@ -36,11 +39,13 @@ impl Verdict {
     pub fn from_word(word: u128) -> Self {
         match word {
             Self::NOTHING => Self::default(),
-            Self::STOP => Self { stop: true, failure: None },
-            _ => Self { stop: false, failure: Some(((word >> 64) as u64, GlobalId(word as u64))) },
+            Self::MEET => Self { meet: true, ..Self::default() },
+            Self::STOP => Self { stop: true, ..Self::default() },
+            _ => Self { failure: Some(((word >> 64) as u64, GlobalId(word as u64))), ..Self::default() },
         }
     }
 
     const NOTHING: u128 = u128::MAX;
-    const STOP: u128 = u128::MAX - 1;
+    const MEET: u128 = u128::MAX - 1;
+    const STOP: u128 = u128::MAX - 2;
 }

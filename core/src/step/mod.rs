@@ -5,6 +5,7 @@ pub(crate) mod stage;
 
 use crate::exchange::halo::Halo;
 use crate::exchange::migrate;
+use crate::exchange::verdict::Verdict;
 use crate::model::error::StepError;
 use crate::model::id::GlobalId;
 use crate::model::params::Exchange;
@@ -23,6 +24,8 @@ pub struct StepReport {
     pub step: u64,
     /// Somebody asked the run to stop; every rank sees this in the same step.
     pub stopped: bool,
+    /// Somebody asked all ranks to meet; every rank sees this in the same step.
+    pub meeting: bool,
     /// Contacts solved, each counted by one tile.
     pub contacts: u64,
     /// Those of them between bodies of two tiles.
@@ -51,7 +54,7 @@ pub struct StepReport {
 /// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
     world.begin_step();
-    let stopped = migrate(world, halo)?;
+    let Verdict { stop: stopped, meet: meeting, .. } = migrate(world, halo)?;
     world.measures |= stopped;
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
@@ -94,7 +97,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
             });
         }
     }
-    report(world, stopped)
+    report(world, StepReport { step: world.step, stopped, meeting, ..StepReport::default() })
 }
 
 /// The figures of a world between two steps: energies, contacts, overlaps, of each tile that owns bodies
@@ -123,8 +126,8 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
     }))
 }
 
-/// The first sync point: migrants, then ghosts. Says whether to stop after this step.
-fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H::Error>> {
+/// The first sync point: migrants, then ghosts. What all ranks together have to say comes back.
+fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<Verdict, StepError<H::Error>> {
     if !world.has_failed() {
         world.each_tile(|bench| {
             bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
@@ -140,7 +143,7 @@ fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<bool, StepError<H
         bench.stage(Phase::Migrate, receive);
     });
     world.dismiss_idle();
-    Ok(verdict.stop)
+    Ok(verdict)
 }
 
 /// Broad phase, narrow phase.
@@ -224,8 +227,8 @@ fn average(bench: &mut Bench<'_>) {
     work.border.average(bench.tile, &mut work.solver, &work.contacts, bench.mail);
 }
 
-fn report<E>(world: &mut World, stopped: bool) -> Result<StepReport, StepError<E>> {
-    let mut report = StepReport { step: world.step, stopped, ..StepReport::default() };
+/// Completes the report of a step, and the step.
+fn report<E>(world: &mut World, mut report: StepReport) -> Result<StepReport, StepError<E>> {
     let (mut leaps, mut not_finite): (u64, Option<GlobalId>) = (0, None);
     for tile in world.tiles_of_step() {
         let counts = &tile.counts;

@@ -98,7 +98,7 @@ fn frame(outbox: &Outbox, own: usize, to: usize, ranks: usize) -> Vec<u8> {
 
 fn any_verdict() -> impl Strategy<Value = Verdict> {
     let failure = prop::option::of((any::<u64>(), any::<u64>().prop_map(GlobalId)));
-    (any::<bool>(), failure).prop_map(|(stop, failure)| Verdict { stop, failure })
+    (any::<bool>(), any::<bool>(), failure).prop_map(|(stop, meet, failure)| Verdict { stop, meet, failure })
 }
 
 fn any_letters() -> impl Strategy<Value = Letters> {
@@ -155,6 +155,7 @@ proptest! {
         let heard = Verdict::from_word(word);
         prop_assert_eq!(heard.failure, joined.failure);
         prop_assert!(heard.stop == joined.stop || joined.failure.is_some());
+        prop_assert!(heard.meet == joined.meet || joined.stop || joined.failure.is_some());
     }
 }
 
