@@ -1,0 +1,402 @@
+// The page: what is looked at, what the server is told, and what is shown beside the world.
+
+import { Drawing } from "./draw.js";
+import { decode } from "./frame.js";
+
+const at = (id) => document.getElementById(id);
+const canvas = at("canvas");
+const token = new URLSearchParams(location.search).get("token") ?? "";
+
+const COLORS = ["kind", "speed", "spin", "tile", "rank", "contacts", "asleep"];
+const KEYS = [
+  ["space", "play or pause"], ["→ ←", "a step on, a record back"], ["+ −", "zoom"], ["arrows + shift", "move"],
+  ["f", "all of the world"], ["t", "tiles and ranks"], ["1 to 7", "color"], ["n", "first difference"],
+  ["Esc", "let go of a body"],
+];
+
+/// Everything there is to know, besides what the controls hold.
+const state = {
+  drawing: null,
+  hello: null,
+  sources: [],
+  camera: { x: 0, y: 0, zoom: 1 },
+  playing: true,
+  body: null,
+  following: false,
+  step: 0,
+  due: false,
+  asked: "",
+};
+
+const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket?token=${encodeURIComponent(token)}`);
+socket.binaryType = "arraybuffer";
+const tell = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const say = (text) => { at("message").textContent = text; };
+
+socket.onopen = () => say("Waiting for the first picture…");
+socket.onclose = () => say(state.hello ? "The run is over; this is what was seen last." : "There is no run here, or this is not its address.");
+socket.onmessage = ({ data }) => {
+  if (typeof data === "string") {
+    const { type, ...message } = JSON.parse(data);
+    ({ hello, figures, body, note, ranks: new_ranks })[type]?.(message);
+  } else {
+    show(decode(data));
+  }
+};
+
+// --- what comes -----------------------------------------------------------------------------------------------------------
+
+function hello(message) {
+  state.hello = message;
+  start_drawing();
+  at("source").textContent = message.sources.map(({ name }) => name).join(" and ");
+  document.title = `${message.sources[0].name} · Atoll`;
+  at("names").replaceChildren(...(message.sources.length > 1 ? message.sources : []).map(({ name }) => {
+    const place = document.createElement("span"), text = document.createElement("i");
+    text.textContent = name;
+    place.append(text);
+    return place;
+  }));
+  options(at("color"), COLORS.filter((color) => message.colors.includes(color)).map((color) => [color, color]));
+  const times = [0.1, 0.25, 0.5, 1, 2, 4, 8].map((times) => [times, `${times} ×`]);
+  options(at("speed"), message.recorded ? times : [[0, "unbounded"], ...times]);
+  at("speed").value = message.recorded ? 1 : 0;
+  for (const id of ["scrub", "back"]) at(id).hidden = !message.recorded;
+  if (message.recorded) {
+    Object.assign(at("scrub"), { min: 0, max: message.steps.length - 1, value: 0 });
+  }
+  at("difference").hidden = message.first_difference === null;
+  fit();
+}
+
+function start_drawing() {
+  state.drawing = new Drawing(canvas);
+  state.sources = state.hello.sources.map((source) => {
+    const made = state.drawing.source(source.shapes);
+    state.drawing.grid(made, source.tiles, source.rank_of_tile, state.hello.rank_colors);
+    return made;
+  });
+}
+
+/// Tiles have changed hands.
+function new_ranks({ source, rank_of_tile }) {
+  const { tiles } = state.hello.sources[source];
+  state.hello.sources[source].rank_of_tile = rank_of_tile;
+  state.drawing.grid(state.sources[source], tiles, rank_of_tile, state.hello.rank_colors);
+}
+
+function show(frame) {
+  if (!state.drawing) return;
+  state.drawing.load(state.sources[frame.source], frame);
+  state.step = frame.step;
+  state.time = frame.time;
+  if (state.following && frame.followed && frame.source === state.body?.source) {
+    [state.camera.x, state.camera.y] = frame.followed;
+  }
+  state.marked = frame.followed;
+  legend(frame.legend);
+  say("");
+  clock();
+  redraw();
+  // The next may come once this one is drawn.
+  requestAnimationFrame(() => tell({ do: "ack", frame: frame.number }));
+  state.frames = (state.frames ?? 0) + 1;
+}
+
+function clock() {
+  const { recorded, steps, last_step, first_difference } = state.hello;
+  const last = recorded ? steps[steps.length - 1] : last_step;
+  at("clock").textContent = `${state.time.toFixed(2)} s · step ${count(state.step)} of ${count(last)}`;
+  at("clock").classList.toggle("difference", first_difference !== null && state.step >= first_difference);
+  if (recorded && document.activeElement !== at("scrub")) {
+    at("scrub").value = Math.max(0, steps.findLastIndex((step) => step <= state.step));
+  }
+}
+
+function figures({ playing, figures, phases, busy }) {
+  state.playing = playing;
+  at("play").textContent = playing ? "Pause" : "Play";
+  list(at("figures"), figures);
+  at("time").hidden = !phases.length;
+  list(at("phases"), phases.map(([name, ms]) => [name.replaceAll("_", " "), `${short(ms)} ms`]));
+  at("balance").hidden = !busy.length;
+  if (at("ranks").children.length !== busy.length) {
+    at("ranks").replaceChildren(...busy.map((_, rank) => {
+      const row = document.createElement("div");
+      row.className = "strip";
+      row.innerHTML = "<span></span><div><i></i></div><span></span>";
+      row.children[0].textContent = rank;
+      row.querySelector("i").style.background = css(state.hello.rank_colors[rank % state.hello.rank_colors.length]);
+      return row;
+    }));
+  }
+  busy.forEach((part, rank) => {
+    const row = at("ranks").children[rank];
+    row.querySelector("i").style.width = `${100 * part}%`;
+    row.children[2].textContent = `${Math.round(100 * part)} %`;
+  });
+}
+
+function body({ body }) {
+  state.body = body;
+  at("body").hidden = !body;
+  if (!body) {
+    state.following = false;
+    state.marked = null;
+  } else {
+    at("body-id").textContent = body.id;
+    list(at("body-figures"), body.figures);
+  }
+  at("follow").setAttribute("aria-pressed", state.following);
+  redraw();
+}
+
+function note({ text }) {
+  say(text);
+}
+
+function legend({ title, steps, range }) {
+  const parts = [];
+  const add = (name, text) => {
+    const made = document.createElement(name);
+    if (text !== undefined) made.textContent = text;
+    parts.push(made);
+    return made;
+  };
+  add("span", title);
+  if (range) {
+    add("span", range.low);
+    add("b").style.background = `linear-gradient(to right, ${range.colors.map(css).join(", ")})`;
+    add("span", range.high);
+  }
+  for (const [name, color] of steps ?? []) {
+    const entry = add("span");
+    const swatch = document.createElement("i");
+    swatch.style.background = css(color);
+    entry.append(swatch, name);
+  }
+  at("legend").replaceChildren(...parts);
+}
+
+// --- drawing --------------------------------------------------------------------------------------------------------------
+
+function redraw() {
+  if (!state.due) {
+    state.due = true;
+    requestAnimationFrame(draw);
+  }
+}
+
+function boxes() {
+  const count = Math.max(1, state.sources.length);
+  const width = Math.floor(canvas.width / count);
+  return Array.from({ length: count }, (_, i) => [i * width, 0, width, canvas.height]);
+}
+
+function paper() {
+  const [r, g, b] = getComputedStyle(at("stage")).backgroundColor.match(/[\d.]+/g).map(Number);
+  return [r / 255, g / 255, b / 255];
+}
+
+function draw() {
+  state.due = false;
+  const { drawing, hello } = state;
+  if (!hello || !drawing) return;
+  const ratio = devicePixelRatio;
+  const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  drawing.clear(paper());
+  boxes().forEach((box, i) => {
+    const source = hello.sources[i];
+    drawing.draw(state.sources[i], box, state.camera, source.domain, at("tiles").checked);
+    if (state.marked && state.body?.source === i) drawing.mark?.(box, state.camera, state.marked);
+  });
+  scale();
+  look();
+}
+
+/// Tells the server what is looked at, if that has changed.
+function look() {
+  const [, , width, height] = boxes()[0];
+  const { x, y, zoom } = state.camera;
+  const half = [width / 2 / zoom, height / 2 / zoom];
+  const message = JSON.stringify({
+    do: "look", view: [x - half[0], y - half[1], x + half[0], y + half[1]], size: [width, height], color: at("color").value,
+  });
+  if (message !== state.asked && width && height && socket.readyState === WebSocket.OPEN) {
+    state.asked = message;
+    socket.send(message);
+  }
+}
+
+/// A length of 1, 2 or 5 times a power of ten that takes about a sixth of the width.
+function scale() {
+  const most = canvas.clientWidth / 6 / (state.camera.zoom / devicePixelRatio);
+  const power = 10 ** Math.floor(Math.log10(most));
+  const length = power * [5, 2, 1].find((times) => times * power <= most);
+  const bar = at("scale").firstElementChild;
+  bar.style.width = `${length * state.camera.zoom / devicePixelRatio}px`;
+  const [unit, times] = length >= 1000 ? ["km", 1e-3] : length >= 1 ? ["m", 1] : length >= 0.01 ? ["cm", 100] : ["mm", 1000];
+  at("scale").lastElementChild.textContent = `${+(length * times).toPrecision(3)} ${unit}`;
+}
+
+function fit() {
+  const boundaries = state.hello.sources.map(({ domain }) => domain);
+  const low = [0, 1].map((axis) => Math.min(...boundaries.map((domain) => domain[axis])));
+  const high = [2, 3].map((axis) => Math.max(...boundaries.map((domain) => domain[axis])));
+  const width = canvas.clientWidth * devicePixelRatio / state.sources.length, height = canvas.clientHeight * devicePixelRatio;
+  state.camera = {
+    x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2,
+    zoom: 0.94 * Math.min(width / (high[0] - low[0]), height / (high[1] - low[1])),
+  };
+  state.following = false;
+  at("follow").setAttribute("aria-pressed", false);
+  redraw();
+}
+
+/// The source under the pointer, and the place in the world.
+function place({ offsetX, offsetY }) {
+  const [, , width, height] = boxes()[0];
+  const [x, y] = [offsetX * devicePixelRatio, offsetY * devicePixelRatio];
+  const source = Math.min(state.sources.length - 1, Math.floor(x / width));
+  const { camera } = state;
+  return { source, at: [camera.x + (x - source * width - width / 2) / camera.zoom, camera.y - (y - height / 2) / camera.zoom] };
+}
+
+function zoom(times, around) {
+  const { camera } = state;
+  // Nobody wants to see less than a micrometer or more than what doubles can tell apart.
+  const next = Math.min(1e9, Math.max(1e-9, camera.zoom * times));
+  const [x, y] = around ?? [camera.x, camera.y];
+  camera.x = x + (camera.x - x) * camera.zoom / next;
+  camera.y = y + (camera.y - y) * camera.zoom / next;
+  camera.zoom = next;
+  redraw();
+}
+
+// --- what the user does ---------------------------------------------------------------------------------------------------
+
+function play() {
+  state.playing = !state.playing;
+  at("play").textContent = state.playing ? "Pause" : "Play";
+  tell({ do: state.playing ? "play" : "pause" });
+}
+
+function step(by) {
+  if (state.playing) play();
+  tell({ do: "step", by });
+}
+
+function follow(on) {
+  state.following = on;
+  at("follow").setAttribute("aria-pressed", on);
+  if (on && state.marked) [state.camera.x, state.camera.y] = state.marked;
+  redraw();
+}
+
+let dragged = null;
+canvas.addEventListener("pointerdown", (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  dragged = { x: event.clientX, y: event.clientY, far: false };
+});
+canvas.addEventListener("pointermove", (event) => {
+  if (!dragged) return;
+  const [dx, dy] = [event.clientX - dragged.x, event.clientY - dragged.y];
+  dragged.far ||= Math.hypot(dx, dy) > 4;
+  if (dragged.far) {
+    state.camera.x -= dx * devicePixelRatio / state.camera.zoom;
+    state.camera.y += dy * devicePixelRatio / state.camera.zoom;
+    Object.assign(dragged, { x: event.clientX, y: event.clientY });
+    if (state.following) follow(false);
+    redraw();
+  }
+});
+canvas.addEventListener("pointerup", (event) => {
+  if (dragged && !dragged.far && state.hello) tell({ do: "pick", ...place(event) });
+  dragged = null;
+});
+canvas.addEventListener("pointercancel", () => { dragged = null; });
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
+  if (state.hello) zoom(2 ** (-event.deltaY * lines / 300), state.following ? undefined : place(event).at);
+}, { passive: false });
+canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+canvas.addEventListener("webglcontextrestored", () => { start_drawing(); state.asked = ""; redraw(); });
+
+at("play").onclick = play;
+at("step").onclick = () => step(1);
+at("back").onclick = () => step(-1);
+at("fit").onclick = fit;
+at("follow").onclick = () => follow(!state.following);
+at("let-go").onclick = () => tell({ do: "drop" });
+at("tiles").onchange = redraw;
+at("color").onchange = redraw;
+at("speed").onchange = ({ target }) => tell({ do: "speed", times: Number(target.value) });
+at("scrub").oninput = ({ target }) => tell({ do: "seek", step: state.hello.steps[Number(target.value)] });
+at("scrub").onchange = ({ target }) => target.blur();
+at("difference").onclick = () => tell({ do: "seek", step: state.hello.first_difference });
+
+addEventListener("keydown", (event) => {
+  if (!state.hello || event.ctrlKey || event.metaKey || event.altKey || ["SELECT", "INPUT"].includes(event.target.tagName)) return;
+  const { camera } = state;
+  const move = (x, y) => {
+    camera.x += x * 80 * devicePixelRatio / camera.zoom;
+    camera.y += y * 80 * devicePixelRatio / camera.zoom;
+    follow(false);
+  };
+  const toggle = () => { at("tiles").checked = !at("tiles").checked; redraw(); };
+  const color = COLORS[Number(event.key) - 1];
+  const act = {
+    " ": play, f: fit, t: toggle, "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
+    ArrowRight: () => (event.shiftKey ? move(1, 0) : step(1)),
+    ArrowLeft: () => (event.shiftKey ? move(-1, 0) : step(-1)),
+    ArrowUp: () => event.shiftKey && move(0, 1),
+    ArrowDown: () => event.shiftKey && move(0, -1),
+    n: () => state.hello.first_difference !== null && tell({ do: "seek", step: state.hello.first_difference }),
+    Escape: () => tell({ do: "drop" }),
+  }[event.key] ?? (state.hello.colors.includes(color) ? () => { at("color").value = color; redraw(); } : null);
+  if (act) {
+    event.preventDefault();
+    act();
+  }
+});
+
+new ResizeObserver(redraw).observe(at("stage"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+list(at("keys"), KEYS);
+
+// --- words and numbers ----------------------------------------------------------------------------------------------------
+
+function options(select, entries) {
+  select.replaceChildren(...entries.map(([value, text]) => new Option(text, value)));
+}
+
+/// A list of names and texts; what is there already is changed, so that nothing flickers.
+function list(place, entries) {
+  const cells = entries.flat();
+  while (place.children.length > cells.length) place.lastChild.remove();
+  while (place.children.length < cells.length) place.append(document.createElement(place.children.length % 2 ? "dd" : "dt"));
+  cells.forEach((text, i) => { if (place.children[i].textContent !== text) place.children[i].textContent = text; });
+}
+
+function count(number) {
+  return number.toLocaleString("en");
+}
+
+function short(number) {
+  return number >= 100 ? number.toFixed(0) : number >= 1 ? number.toFixed(1) : number.toFixed(2);
+}
+
+function css([r, g, b]) {
+  return `rgb(${[r, g, b].map((part) => Math.round(255 * part)).join(" ")})`;
+}
+
+/// For tests: draws, and counts the pixels that are not paper.
+window.atoll = {
+  state,
+  pixels() {
+    draw();
+    return boxes().map((box) => state.drawing.count(box, paper()));
+  },
+};
