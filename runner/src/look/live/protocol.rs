@@ -1,0 +1,307 @@
+//! What a page and the server tell each other over their socket.
+//!
+//! The page sends [`Wish`]es, as JSON. The server sends what it has to [`Say`], as JSON, and frames, as bytes, which
+//! `page/frame.js` reads. A frame is, little-endian:
+//!
+//! | bytes | |
+//! |---|---|
+//! | u32 x 4 | [`MAGIC`]; source; number of the frame, which the page acknowledges; step |
+//! | f64 | time, s |
+//! | f64 x 4 | rectangle that the positions below are fractions of: low x, low y, high x, high y, m |
+//! | u32 x 2 | width and height of the density image, 0 if there is none |
+//! | f64 x 4 | rectangle of the density image |
+//! | f64 x 2 | position of the body that was picked, m; not a number if there is none |
+//! | u32 x 2 | bodies; bytes of the legend |
+//! | | the legend, as JSON, with spaces up to a multiple of 4 bytes |
+//! | u8 x 4 each | the density image, rows from the top: red, green, blue, multiplied by what they cover, and that |
+//! | 12 bytes each | bodies: [`Dot`] |
+
+use super::super::picture::{ColorBy, View};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// The first word of a frame: `ATOL`.
+const MAGIC: u32 = u32::from_le_bytes(*b"ATOL");
+
+/// The most pixels that a page may ask for on one side.
+const MOST_PIXELS: u32 = 8192;
+
+/// What a page wants.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "lowercase", deny_unknown_fields)]
+pub(crate) enum Wish {
+    /// To see this from now on.
+    Look {
+        /// Low x, low y, high x, high y, in m.
+        view: [f64; 4],
+        /// Width and height in pixels.
+        size: [u32; 2],
+        /// What the colors tell.
+        color: ColorBy,
+    },
+    /// The next frame: this one was drawn.
+    Ack {
+        /// Its number.
+        frame: u32,
+    },
+    /// That time goes on.
+    Play,
+    /// That it stands still.
+    Pause,
+    /// That it stands still after so many steps, or records, more or less.
+    Step {
+        /// How many.
+        by: i32,
+    },
+    /// The last record that is not after a step.
+    Seek {
+        /// The step.
+        step: u64,
+    },
+    /// So many seconds in a second; 0: as many as can be.
+    Speed {
+        /// How many.
+        times: f64,
+    },
+    /// To know about the body that is there.
+    Pick {
+        /// Which of the worlds that are shown.
+        source: u32,
+        /// Where, in m.
+        at: [f64; 2],
+    },
+    /// To know no more about it.
+    Drop,
+}
+
+impl Wish {
+    /// Reads a message. None if it makes no sense.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let wish = serde_json::from_str(text).ok()?;
+        let sound = match &wish {
+            Self::Look { view: [x0, y0, x1, y1], size, .. } => {
+                let area = (x1 - x0) * (y1 - y0);
+                let pixels = |side: &u32| (1..=MOST_PIXELS).contains(side);
+                x0 < x1 && y0 < y1 && area.is_finite() && area > 0.0 && size.iter().all(pixels)
+            }
+            Self::Speed { times } => (0.0..=1e6).contains(times),
+            Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),
+            _ => true,
+        };
+        sound.then_some(wish)
+    }
+}
+
+/// What a page looks at.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Gaze {
+    /// The rectangle.
+    pub view: View,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// What the colors tell.
+    pub color: ColorBy,
+}
+
+/// What the server has to say.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub(crate) enum Say {
+    /// What is shown, first of all.
+    Hello(Hello),
+    /// How it goes.
+    Figures {
+        /// Whether time goes on.
+        playing: bool,
+        /// Names and values.
+        figures: Vec<(&'static str, String)>,
+        /// Milliseconds of a step in each phase.
+        phases: Vec<(&'static str, f64)>,
+        /// For each rank the part of its time in which it did not wait, 0 to 1.
+        busy: Vec<f64>,
+    },
+    /// The body that was picked, or that there is none.
+    Body {
+        /// It.
+        body: Option<PickedBody>,
+    },
+    /// Which rank holds each tile has changed.
+    Ranks {
+        /// Of which of the worlds.
+        source: u32,
+        /// For each tile its rank.
+        rank_of_tile: Vec<u32>,
+    },
+    /// A sentence.
+    Note {
+        /// It.
+        text: String,
+    },
+}
+
+/// What stays as it is while a page looks.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Hello {
+    /// The worlds, one or two.
+    pub sources: Vec<Source>,
+    /// Whether they are recorded, and not run just now.
+    pub recorded: bool,
+    /// The steps of the records.
+    pub steps: Vec<u64>,
+    /// The last step of the run.
+    pub last_step: u64,
+    /// The first record in which two worlds differ.
+    pub first_difference: Option<u64>,
+    /// What colors can tell.
+    pub colors: Vec<ColorBy>,
+    /// Colors of ranks, 0 to 1, which repeat.
+    pub rank_colors: Vec<[f32; 3]>,
+}
+
+/// A world.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Source {
+    /// What it is called.
+    pub name: String,
+    /// Low x, low y, high x, high y, in m.
+    pub domain: [f64; 4],
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// For each tile its rank.
+    pub rank_of_tile: Vec<u32>,
+    /// Half width, half height and radius of each kind, then of each static's, in m.
+    pub shapes: Vec<[f32; 3]>,
+}
+
+/// What there is to know about a body.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct PickedBody {
+    /// In which of the worlds it is.
+    pub source: u32,
+    /// Its name, as text: not every number of 64 bits is one in a page.
+    pub id: String,
+    /// Names and values.
+    pub figures: Vec<(&'static str, String)>,
+}
+
+/// A body as a page gets it.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Dot {
+    /// Position: 0 is the low and 65,535 the high side of the frame's rectangle.
+    pub place: [u16; 2],
+    /// 65,536 is a whole turn.
+    pub angle: u16,
+    /// Row of [`Source::shapes`].
+    pub shape: u16,
+    /// Red, green, blue.
+    pub color: [u8; 3],
+    /// Bit 0: a static.
+    pub flags: u8,
+}
+
+/// A frame before it becomes bytes.
+#[derive(Clone, Debug)]
+pub(crate) struct Picture<'a> {
+    /// Of which of the worlds.
+    pub source: u32,
+    /// Number of the frame.
+    pub number: u32,
+    /// Steps made.
+    pub step: u64,
+    /// Time, in s.
+    pub time: f64,
+    /// What positions are fractions of.
+    pub rectangle: View,
+    /// Width and height of the density image, and the rectangle it covers.
+    pub density: ([u32; 2], View),
+    /// Position of the body that was picked.
+    pub picked: Option<DVec2>,
+    /// As JSON.
+    pub legend: &'a str,
+    /// Of the density image, four bytes each.
+    pub pixels: &'a [u8],
+    /// The bodies, perhaps in several parts.
+    pub dots: &'a [&'a [Dot]],
+}
+
+impl Picture<'_> {
+    /// As the page reads it.
+    pub(crate) fn encode(&self) -> Vec<u8> {
+        let padding = self.legend.len().next_multiple_of(4) - self.legend.len();
+        let bodies: usize = self.dots.iter().map(|part| part.len()).sum();
+        let mut bytes = Vec::with_capacity(120 + self.legend.len() + padding + self.pixels.len() + 12 * bodies);
+        let words = |bytes: &mut Vec<u8>, words: &[u32]| words.iter().for_each(|word| bytes.extend(word.to_le_bytes()));
+        let doubles = |bytes: &mut Vec<u8>, of: &[f64]| of.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        let corners = |view: &View| [view.low.x, view.low.y, view.high.x, view.high.y];
+        words(&mut bytes, &[MAGIC, self.source, self.number, self.step as u32]);
+        doubles(&mut bytes, &[self.time]);
+        doubles(&mut bytes, &corners(&self.rectangle));
+        words(&mut bytes, &self.density.0);
+        doubles(&mut bytes, &corners(&self.density.1));
+        doubles(&mut bytes, &self.picked.unwrap_or(DVec2::NAN).to_array());
+        words(&mut bytes, &[bodies as u32, (self.legend.len() + padding) as u32]);
+        bytes.extend_from_slice(self.legend.as_bytes());
+        bytes.extend(std::iter::repeat_n(b' ', padding));
+        bytes.extend_from_slice(self.pixels);
+        self.dots.iter().for_each(|part| bytes.extend_from_slice(bytemuck::cast_slice(part)));
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wishes_that_make_no_sense_are_none() {
+        let look = |view: &str, size: &str| format!(r#"{{"do":"look","view":{view},"size":{size},"color":"speed"}}"#);
+        let wish = Wish::parse(&look("[0,-1,2.5,1]", "[640,480]")).unwrap();
+        assert_eq!(wish, Wish::Look { view: [0.0, -1.0, 2.5, 1.0], size: [640, 480], color: ColorBy::Speed });
+        assert_eq!(Wish::parse(r#"{"do":"step","by":-1}"#), Some(Wish::Step { by: -1 }));
+        for text in [
+            &look("[0,0,0,1]", "[640,480]"),
+            &look("[0,0,1e300,1e300]", "[640,480]"),
+            &look("[2,0,1,1]", "[640,480]"),
+            &look("[0,0,1,1]", "[0,480]"),
+            &look("[0,0,1,1]", "[640,100000]"),
+            &look("[0,0,1]", "[640,480]"),
+            r#"{"do":"speed","times":-1}"#,
+            r#"{"do":"pick","source":0,"at":[1e999,0]}"#,
+            r#"{"do":"ack","frame":-1}"#,
+            r#"{"do":"ack","frame":1,"more":2}"#,
+            r#"{"do":"fly"}"#,
+            r#"["do"]"#,
+            "",
+        ] {
+            assert_eq!(Wish::parse(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_frame_lies_as_the_page_reads_it() {
+        let view = |x: f64| View { low: DVec2::splat(x), high: DVec2::splat(x + 1.0) };
+        let dot = Dot { place: [0x0201, 0x0403], angle: 0x0605, shape: 0x0807, color: [9, 10, 11], flags: 12 };
+        let frame = Picture {
+            source: 1,
+            number: 7,
+            step: 60,
+            time: 1.0,
+            rectangle: view(2.0),
+            density: ([1, 2], view(4.0)),
+            picked: None,
+            legend: "{}\n",
+            pixels: &[1, 2, 3, 4, 5, 6, 7, 8],
+            dots: &[&[dot], &[], &[dot]],
+        };
+        let bytes = frame.encode();
+        assert_eq!(bytes.len(), 120 + 4 + 8 + 24);
+        let double = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        assert_eq!(&bytes[..16], b"ATOL\x01\0\0\0\x07\0\0\0\x3c\0\0\0");
+        assert_eq!([16, 24, 48, 64, 88].map(double), [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert!(double(96).is_nan() && double(104).is_nan());
+        assert_eq!(&bytes[112..132], b"\x02\0\0\0\x04\0\0\0{}\n \x01\x02\x03\x04\x05\x06\x07\x08");
+        assert_eq!(&bytes[132..144], &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
+    }
+}

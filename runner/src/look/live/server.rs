@@ -1,0 +1,325 @@
+//! Serves the page and its socket to browsers.
+//!
+//! Listening on loopback is not enough: any page in the user's browser can reach it. So a request must name this server as
+//! its host, exactly; come from this server's own page, if it says where it comes from; and know the token that is in the
+//! address which only the user was told. Everything that is read is bounded in size and time, and each connection has a
+//! thread of its own, so that a slow or broken one holds up nobody.
+
+use super::desk::{Desk, PageId, Ready};
+use super::protocol::Wish;
+use std::fmt::Write as _;
+use std::io::{self, Read, Write};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use tungstenite::handshake::derive_accept_key;
+use tungstenite::protocol::{Message, Role, WebSocket, WebSocketConfig};
+
+/// Connections at a time.
+const MOST_CONNECTIONS: usize = 64;
+
+/// Bytes of a request, and of a message of a page.
+const MOST_BYTES: usize = 8192;
+
+/// In which a request must have come, and in which a browser must take some of what it is sent.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// How often is looked whether all is over.
+const POLL: Duration = Duration::from_millis(50);
+
+/// What there is to get, with its type.
+const FILES: [(&str, &str, &str); 5] = [
+    ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
+    ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
+    ("/app.js", "text/javascript; charset=utf-8", include_str!("page/app.js")),
+    ("/draw.js", "text/javascript; charset=utf-8", include_str!("page/draw.js")),
+    ("/frame.js", "text/javascript; charset=utf-8", include_str!("page/frame.js")),
+];
+
+/// A server, until it is dropped: then its port is free again.
+#[derive(Debug)]
+pub(crate) struct Server {
+    address: SocketAddr,
+    token: String,
+    desk: Arc<Desk>,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What every connection must know.
+#[derive(Clone, Debug)]
+struct Door {
+    /// What a browser may call this server.
+    hosts: Arc<[String]>,
+    token: Arc<str>,
+    desk: Arc<Desk>,
+    over: Arc<AtomicBool>,
+    open: Arc<AtomicUsize>,
+}
+
+impl Server {
+    /// Listens at an address; port 0 is any that is free.
+    ///
+    /// # Errors
+    /// If that cannot be done.
+    pub(crate) fn start(address: IpAddr, port: u16, desk: Arc<Desk>) -> io::Result<Self> {
+        let listener = TcpListener::bind((address, port))?;
+        // So that the thread hears that all is over.
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let token = token()?;
+        let over = Arc::new(AtomicBool::new(false));
+        let mut hosts = vec![address.to_string()];
+        if address.ip().is_loopback() {
+            hosts.push(format!("localhost:{}", address.port()));
+        }
+        let door = Door {
+            hosts: hosts.into(),
+            token: token.as_str().into(),
+            desk: Arc::clone(&desk),
+            over: Arc::clone(&over),
+            open: Arc::default(),
+        };
+        let thread = thread::Builder::new().name("viewer".to_owned()).spawn(move || accept(&listener, &door))?;
+        Ok(Self { address, token, desk, over, thread: Some(thread) })
+    }
+
+    /// What to open in a browser.
+    pub(crate) fn url(&self) -> String {
+        format!("http://{}/?token={}", self.address, self.token)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.desk.end();
+        self.over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// 128 random bits.
+fn token() -> io::Result<String> {
+    let mut bytes = [0_u8; 16];
+    let mut filled = 0;
+    while filled < bytes.len() {
+        filled += rustix::rand::getrandom(&mut bytes[filled..], rustix::rand::GetRandomFlags::empty())?;
+    }
+    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    }))
+}
+
+/// Gives each connection a thread, until all is over; then waits a little for them.
+fn accept(listener: &TcpListener, door: &Door) {
+    while !door.over.load(Ordering::Relaxed) {
+        match listener.accept() {
+            Ok((stream, _)) if door.open.load(Ordering::Relaxed) < MOST_CONNECTIONS => {
+                door.open.fetch_add(1, Ordering::Relaxed);
+                let guest = door.clone();
+                let started = thread::Builder::new().name("viewer, page".to_owned()).spawn(move || {
+                    // Whatever goes wrong with a browser is for nobody to know.
+                    let _ = serve(stream, &guest);
+                    guest.open.fetch_sub(1, Ordering::Relaxed);
+                });
+                if started.is_err() {
+                    door.open.fetch_sub(1, Ordering::Relaxed);
+                }
+            }
+            // One too many is hung up on.
+            Ok(_) => {}
+            Err(_) => thread::sleep(POLL),
+        }
+    }
+    let asked = Instant::now();
+    while door.open.load(Ordering::Relaxed) > 0 && asked.elapsed() < 4 * POLL {
+        thread::sleep(POLL / 10);
+    }
+}
+
+/// A request, as far as it matters.
+#[derive(Debug)]
+struct Request {
+    path: String,
+    token: Option<String>,
+    host: Option<String>,
+    origin: Option<String>,
+    /// The key of a browser that wants a socket.
+    key: Option<String>,
+}
+
+/// One connection: a file, or a socket for as long as it lasts.
+fn serve(mut stream: TcpStream, door: &Door) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let Some(request) = read_request(&mut stream)? else {
+        return refuse(&mut stream, "400 Bad Request", "This is no request that Atoll understands.");
+    };
+    if !request.host.as_ref().is_some_and(|host| door.hosts.contains(host)) {
+        return refuse(&mut stream, "403 Forbidden", "This server has another name.");
+    }
+    let own = |origin: &String| door.hosts.iter().any(|host| origin.strip_prefix("http://") == Some(host));
+    if !request.origin.as_ref().is_none_or(own) {
+        return refuse(&mut stream, "403 Forbidden", "Only its own page may ask.");
+    }
+    let known = request.token.as_ref().is_some_and(|token| same(token.as_bytes(), door.token.as_bytes()));
+    let secret = request.path == "/" || request.path == "/socket";
+    if secret && !known {
+        return refuse(&mut stream, "403 Forbidden", "Open the whole address that atoll has printed, with its token.");
+    }
+    if request.path == "/socket" {
+        let Some(key) = request.key else {
+            return refuse(&mut stream, "426 Upgrade Required", "Here is a socket.");
+        };
+        return match door.desk.open() {
+            Some(page) => {
+                let served = serve_page(stream, door, page, &key);
+                door.desk.close(page);
+                served
+            }
+            None => refuse(&mut stream, "503 Service Unavailable", "Too many pages look already: close one."),
+        };
+    }
+    match FILES.iter().find(|(path, ..)| *path == request.path) {
+        Some((_, kind, content)) => answer(&mut stream, "200 OK", kind, content),
+        None => refuse(&mut stream, "404 Not Found", "There is no such page."),
+    }
+}
+
+/// Reads the head of a request. None if it is none, or too long.
+fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
+    let begun = Instant::now();
+    let mut bytes = Vec::with_capacity(1024);
+    let mut buffer = [0; 1024];
+    loop {
+        let left = PATIENCE.saturating_sub(begun.elapsed());
+        if left.is_zero() || bytes.len() > MOST_BYTES {
+            return Ok(None);
+        }
+        stream.set_read_timeout(Some(left))?;
+        match stream.read(&mut buffer)? {
+            0 => return Ok(None),
+            read => bytes.extend_from_slice(&buffer[..read]),
+        }
+        let mut headers = [httparse::EMPTY_HEADER; 64];
+        let mut request = httparse::Request::new(&mut headers);
+        match request.parse(&bytes) {
+            Ok(httparse::Status::Complete(_)) => return Ok(understand(&request)),
+            Ok(httparse::Status::Partial) => {}
+            Err(_) => return Ok(None),
+        }
+    }
+}
+
+/// None if it is not for a file or a socket, or says one thing twice.
+fn understand(request: &httparse::Request<'_, '_>) -> Option<Request> {
+    let header = |name: &str| -> Option<Option<String>> {
+        let mut found = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
+        let first = found.next().map(|header| std::str::from_utf8(header.value).map(str::to_owned));
+        if found.next().is_some() { None } else { first.transpose().ok() }
+    };
+    if request.method != Some("GET") {
+        return None;
+    }
+    let (path, query) = request.path?.split_once('?').unwrap_or((request.path?, ""));
+    let token = query.split('&').find_map(|part| part.strip_prefix("token=")).map(str::to_owned);
+    let socket = header("upgrade")?.is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket"));
+    let key = header("sec-websocket-key")?.filter(|_| socket);
+    Some(Request { path: path.to_owned(), token, host: header("host")?, origin: header("origin")?, key })
+}
+
+/// Whether two texts are the same, in a time that does not tell where they differ.
+fn same(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
+}
+
+fn refuse(stream: &mut TcpStream, status: &str, why: &str) -> io::Result<()> {
+    answer(stream, status, "text/plain; charset=utf-8", &format!("{why}\n"))
+}
+
+fn answer(stream: &mut TcpStream, status: &str, kind: &str, content: &str) -> io::Result<()> {
+    // Nothing from elsewhere, in no other page, and nothing kept.
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\nCache-Control: no-store\r\n\
+         Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; \
+         img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\nX-Content-Type-Options: nosniff\r\n\
+         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n",
+        content.len()
+    );
+    stream.write_all(head.as_bytes())?;
+    stream.write_all(content.as_bytes())
+}
+
+/// A socket: one thread reads what the page wants, this one writes what is ready.
+fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io::Result<()> {
+    let accept = derive_accept_key(key.as_bytes());
+    let head = "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: ";
+    stream.write_all(format!("{head}{accept}\r\n\r\n").as_bytes())?;
+    stream.set_read_timeout(None)?;
+    let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
+    let gone = Arc::new(AtomicBool::new(false));
+    let reader = {
+        let input = WebSocket::from_raw_socket(Deaf(stream.try_clone()?), Role::Server, Some(config));
+        let (desk, gone) = (Arc::clone(&door.desk), Arc::clone(&gone));
+        thread::Builder::new().name("viewer, wishes".to_owned()).spawn(move || {
+            listen(input, &desk, page);
+            gone.store(true, Ordering::Relaxed);
+        })?
+    };
+    let mut output = WebSocket::from_raw_socket(stream.try_clone()?, Role::Server, Some(config));
+    while !gone.load(Ordering::Relaxed) {
+        let sent = match door.desk.next(page, POLL) {
+            Ready::Texts(texts) => texts.into_iter().try_for_each(|text| output.send(Message::text(text))),
+            Ready::Frame(frame) => output.send(Message::binary(frame)),
+            Ready::Nothing => Ok(()),
+            Ready::Closed => break,
+        };
+        if sent.is_err() {
+            break;
+        }
+    }
+    let _ = output.close(None).and_then(|()| output.flush());
+    // Also wakes the reader.
+    let _ = stream.shutdown(std::net::Shutdown::Both);
+    let _ = reader.join();
+    Ok(())
+}
+
+/// Hears what a page wants until it goes, or says what makes no sense.
+fn listen(mut input: WebSocket<Deaf>, desk: &Desk, page: PageId) {
+    loop {
+        match input.read() {
+            Ok(Message::Text(text)) => match Wish::parse(&text) {
+                Some(wish) => desk.hear(page, wish),
+                None => return,
+            },
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Ok(_) | Err(_) => return,
+        }
+    }
+}
+
+/// The half of a stream that is read. What the library would answer by itself is not sent: another thread writes, and two
+/// at a time would mix up their words.
+#[derive(Debug)]
+struct Deaf(TcpStream);
+
+impl Read for Deaf {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+impl Write for Deaf {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
