@@ -69,6 +69,8 @@ struct Inner {
     pages: BTreeMap<PageId, Page>,
     next: PageId,
     pace: Pace,
+    /// How it is when nobody looks.
+    usual: Pace,
     picked: Option<Pick>,
     /// What each new page is told first.
     greeting: Option<Say>,
@@ -107,7 +109,7 @@ impl Desk {
     pub(crate) fn new(playing: bool, times: f64) -> Self {
         let pace = Pace { playing, times, by: 0, seek: None };
         let inner =
-            Inner { pages: BTreeMap::new(), next: 0, pace, picked: None, greeting: None, closed: false };
+            Inner { pages: BTreeMap::new(), next: 0, pace, usual: pace, picked: None, greeting: None, closed: false };
         Self { wanted: AtomicBool::new(false), inner: Mutex::new(inner), wish: Condvar::new(), ready: Condvar::new() }
     }
 
@@ -136,7 +138,7 @@ impl Desk {
         inner.pages.remove(&page);
         // Nobody is there who could let time go on again.
         if inner.pages.is_empty() {
-            inner.picked = None;
+            (inner.pace, inner.picked) = (inner.usual, None);
         }
         drop(inner);
         self.wish.notify_all();
@@ -286,4 +288,76 @@ impl Desk {
 
 fn text(say: &Say) -> String {
     serde_json::to_string(say).expect("names, texts and numbers")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::picture::ColorBy;
+    use super::*;
+
+    const NOW: Duration = Duration::ZERO;
+
+    fn look(x: f64) -> Wish {
+        Wish::Look { view: [x, 0.0, x + 1.0, 1.0], size: [4, 4], color: ColorBy::Kind }
+    }
+
+    /// Long enough for the next frame.
+    fn rest() {
+        std::thread::sleep(FRAME + Duration::from_millis(5));
+    }
+
+    #[test]
+    fn a_page_gets_a_frame_once_it_has_drawn_the_last_or_looks_elsewhere() {
+        let desk = Desk::new(true, 0.0);
+        assert!(!desk.is_wanted() && desk.due(true).is_empty());
+        let page = desk.open().unwrap();
+        assert!(desk.due(true).is_empty(), "it looks at nothing yet");
+        desk.hear(page, look(0.0));
+        assert!(desk.is_wanted());
+        let [due] = desk.due(false)[..] else { panic!("one page looks") };
+        desk.give(&due, vec![1]);
+        assert!(desk.due(true).is_empty(), "the first is not drawn");
+        assert_eq!(desk.next(page, NOW), Ready::Frame(vec![1]));
+        rest();
+        assert!(desk.due(true).is_empty(), "nor is it now");
+        desk.hear(page, Wish::Ack { frame: due.number });
+        assert!(desk.due(false).is_empty(), "nothing has changed");
+        desk.hear(page, look(1.0));
+        assert_eq!(desk.due(false).len(), 1);
+        assert_eq!(desk.due(true).len(), 1);
+        desk.close(page);
+        assert!(desk.due(true).is_empty() && !desk.is_wanted());
+        assert_eq!(desk.next(page, NOW), Ready::Closed);
+    }
+
+    #[test]
+    fn who_leaves_a_world_that_stands_still_lets_it_go_on() {
+        let desk = Desk::new(true, 0.0);
+        let (one, other) = (desk.open().unwrap(), desk.open().unwrap());
+        desk.hear(one, Wish::Step { by: 2 });
+        desk.hear(one, Wish::Speed { times: 0.5 });
+        desk.hear(one, Wish::Pick { source: 0, at: [1.0, 2.0] });
+        assert_eq!(desk.take_pace(), Pace { playing: false, times: 0.5, by: 2, seek: None });
+        desk.close(one);
+        assert_eq!(desk.take_pace(), Pace { playing: false, times: 0.5, by: 0, seek: None });
+        assert_eq!(desk.picked(), Some(Pick::At(0, [1.0, 2.0])));
+        desk.close(other);
+        assert_eq!(desk.take_pace(), Pace { playing: true, times: 0.0, by: 0, seek: None });
+        assert_eq!(desk.picked(), None);
+    }
+
+    #[test]
+    fn there_is_room_for_so_many_pages_and_so_many_words() {
+        let desk = Desk::new(true, 0.0);
+        let pages: Vec<_> = std::iter::from_fn(|| desk.open()).collect();
+        assert_eq!(pages.len(), MOST_PAGES);
+        (0..1000).for_each(|i| desk.tell(&Say::Note { text: i.to_string() }));
+        let Ready::Texts(texts) = desk.next(pages[0], NOW) else { panic!("much was said") };
+        assert_eq!((texts.len(), texts.last().unwrap().as_str()), (MOST_TEXTS, r#"{"type":"note","text":"999"}"#));
+        desk.end();
+        assert_eq!(desk.next(pages[0], NOW), Ready::Closed);
+        assert!(matches!(desk.next(pages[1], NOW), Ready::Texts(_)), "what was said before is");
+        desk.close(pages[1]);
+        assert_eq!(desk.open(), None);
+    }
 }

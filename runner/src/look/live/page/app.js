@@ -209,10 +209,22 @@ function draw() {
   boxes().forEach((box, i) => {
     const source = hello.sources[i];
     drawing.draw(state.sources[i], box, state.camera, source.domain, at("tiles").checked);
-    if (state.marked && state.body?.source === i) drawing.mark?.(box, state.camera, state.marked);
   });
+  mark();
   scale();
   look();
+}
+
+/// A ring around the body that was picked.
+function mark() {
+  const { marked, body, camera } = state;
+  at("mark").hidden = !(marked && body);
+  if (marked && body) {
+    const [, , width, height] = boxes()[0];
+    const x = width * (body.source + 0.5) + (marked[0] - camera.x) * camera.zoom, y = height / 2 - (marked[1] - camera.y) * camera.zoom;
+    at("mark").hidden = x < width * body.source || x > width * (body.source + 1);
+    Object.assign(at("mark").style, { left: `${x / devicePixelRatio}px`, top: `${y / devicePixelRatio}px` });
+  }
 }
 
 /// Tells the server what is looked at, if that has changed.
