@@ -1,5 +1,6 @@
 //! What the integration tests share. The tests themselves are in `tests/`, one file per subject.
 
+pub mod browser;
 pub mod fuzz;
 #[cfg(feature = "mpi")]
 pub mod mpi;
