@@ -7,6 +7,7 @@ mod info;
 mod interrupt;
 mod output;
 mod progress;
+mod render;
 mod run;
 
 use crate::error::{Exit, RunError};
@@ -27,6 +28,7 @@ pub fn main() -> ExitCode {
     let result = begun.and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
     });
     let exit = result.unwrap_or_else(|error| {

@@ -13,7 +13,7 @@ pub(crate) mod trouble;
 
 pub(crate) use facts::{Gathered, PHASES, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
-pub use observer::{Listener, Observer, PanicAt, StopFlag};
+pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 use trouble::Refusal;
 
 use crate::error::Exit;
@@ -142,6 +142,7 @@ fn run<T: Transport>(
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);
     }
+    observer.show(rank, &world);
     while world.step_count() < steps && !last.stopped {
         if observer.stop.is_requested() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some()) {
             world.request_stop();
@@ -159,6 +160,7 @@ fn run<T: Transport>(
         if let Some(recorder) = &mut recorder {
             recorder.write_due(&world, last.stopped);
         }
+        observer.show(rank, &world);
         told.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
