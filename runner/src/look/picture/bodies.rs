@@ -126,14 +126,14 @@ fn narrowest(form: &Form) -> f64 {
     }
 }
 
-/// Draws what never moves, wide enough to be seen.
-pub(super) fn draw_static(canvas: &mut Canvas, fit: &Fit, fixed: &StaticBody) {
+/// Adds what never moves to the densities, wide enough to be seen: so there is no seam between what adjoins.
+pub(super) fn draw_static(canvas: &Canvas, field: &mut Field, fit: &Fit, fixed: &StaticBody) {
     let form = match form(&fixed.kind.shape, fit.place(fixed.position), fixed.rotation, fit.scale).0 {
         Form::Disc { center, radius } => Form::Disc { center, radius: radius.max(THINNEST) },
         Form::Box { center, axis, half } => Form::Box { center, axis, half: half.map(|half| half.max(0.5 * THINNEST)) },
         plate @ Form::Plate { .. } => plate,
     };
-    canvas.draw(&form, colors::STATIC, 1.0);
+    field.cover(canvas, &form, colors::STATIC);
 }
 
 /// Draws where contacts are: dots whose area grows with the impulse; where bodies are too small, how many there are.
@@ -142,7 +142,7 @@ pub(super) fn draw_contacts(canvas: &mut Canvas, field: &mut Field, fit: &Fit, b
         live.points.iter().map(|(_, impulse)| f64::from(*impulse)).sum::<f64>() / live.points.len().max(1) as f64;
     for &(point, impulse) in &live.points {
         let strength = (f64::from(impulse) / mean.max(f64::MIN_POSITIVE)).clamp(0.1, 6.0).sqrt();
-        let radius = 0.09 * body * strength;
+        let radius = 0.075 * body * strength;
         let center = fit.place(point);
         let color = contact_color(strength);
         if radius < 0.8 {

@@ -24,7 +24,7 @@ pub(super) const UNKNOWN: Rgb = Rgb::hex(0x9AA3AD);
 /// For things with numbers, of which one must not be taken for another: kinds, ranks.
 const DISTINCT: [Rgb; 10] = [
     Rgb::hex(0x2F74B5),
-    Rgb::hex(0xE2604F),
+    Rgb::hex(0xD94B36),
     Rgb::hex(0x1B9E77),
     Rgb::hex(0xE6A117),
     Rgb::hex(0x7D56A8),

@@ -114,10 +114,12 @@ impl<'a> Labels<'a> {
                 let strip = Form::rectangle([column as f64, top], [column as f64 + 1.0, bottom]);
                 canvas.draw(&strip, scale.at(part), 1.0);
             }
-            for (label, place) in labels.iter().zip([0.0, 0.5, 1.0]) {
-                let width = self.letters.width(label, size);
-                let center = x + BAR * size * place - width * place;
-                write(canvas, label, [center, y + 2.7 * size], colors::INK);
+            let widths = labels.each_ref().map(|label| self.letters.width(label, size));
+            // Where numbers are long, that in the middle is left out.
+            let has_room = 0.5 * widths[1] + widths[0].max(widths[2]) + 0.5 * size < 0.5 * BAR * size;
+            for (i, place) in [0.0, 0.5, 1.0].into_iter().enumerate().filter(|(i, _)| *i != 1 || has_room) {
+                let from = x + (BAR * size - widths[i]) * place;
+                write(canvas, &labels[i], [from, y + 2.7 * size], colors::INK);
             }
             y += SCALE_LINES * LINE * size;
         }

@@ -48,7 +48,8 @@ impl Legend {
                 ("rank", None, (0..ranks).map(|rank| square(colors::distinct(rank), &rank.to_string())).collect())
             }
             ColorBy::Contacts => {
-                let text = |count: u16| if count == MOST_CONTACTS { format!("{count} and more") } else { count.to_string() };
+                let text =
+                    |count: u16| if count == MOST_CONTACTS { format!("{count} and more") } else { count.to_string() };
                 let row = |count| square(paint::contacts(count), &text(count));
                 ("contacts of a body", None, (0..=MOST_CONTACTS).map(row).collect())
             }

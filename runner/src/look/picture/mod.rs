@@ -91,7 +91,7 @@ impl Painter {
         let ([left, bottom], [right, top]) = (fit.place(view.low), fit.place(view.high));
         self.canvas.clip([left, top], [right, bottom]);
         self.canvas.fill(colors::PAPER);
-        self.setting.statics.iter().for_each(|fixed| bodies::draw_static(&mut self.canvas, &fit, fixed));
+        self.draw_statics(&fit);
         self.draw_bodies(frame, fit);
         if self.look.layers.tiles {
             self.draw_tiles(frame, &fit);
@@ -101,6 +101,13 @@ impl Painter {
         let legend = Legend::new(self.look.color, &self.look.layers, &self.setting, ranks, self.range.most);
         Labels::new(&self.letters, legend, frame, self.setting.hertz, fit.scale).draw(&mut self.canvas);
         &self.canvas.image
+    }
+
+    fn draw_statics(&mut self, fit: &Fit) {
+        let Self { setting, canvas, field, .. } = self;
+        field.reset(canvas.image.size);
+        setting.statics.iter().for_each(|fixed| bodies::draw_static(canvas, field, fit, fixed));
+        field.draw(canvas, &Tone::new(1.0));
     }
 
     /// Draws bodies, then ghosts, then contacts.

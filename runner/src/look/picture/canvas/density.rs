@@ -1,6 +1,6 @@
 //! What is too small to be drawn: how much of each pixel it covers, and in which color on the average.
 
-use super::{Canvas, Rgb};
+use super::{Canvas, Form, Rgb};
 
 /// For each pixel the area that is covered, in pixels, and the colors of it, each times its area.
 #[derive(Default, Debug)]
@@ -50,10 +50,31 @@ impl Field {
         }
     }
 
+    /// Adds a form, as far as it is in what a canvas draws on.
+    pub(crate) fn cover(&mut self, canvas: &Canvas, form: &Form, color: Rgb) {
+        let [low, high] = form.bounds();
+        let rows = canvas.span(1, low[1], high[1]);
+        self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
+        for row in rows {
+            for column in canvas.span(0, low[0], high[0]) {
+                let covered = form.coverage(column as f64 + 0.5, row as f64 + 0.5) as f32;
+                let [r, g, b] = color.0.map(|value| f32::from(value) * covered);
+                let cell = &mut self.cells[row * self.size[0] + column];
+                *cell = [cell[0] + r, cell[1] + g, cell[2] + b, cell[3] + covered];
+            }
+        }
+    }
+
     /// The area that is covered, in pixels.
     #[cfg(test)]
     pub(crate) fn area(&self) -> f64 {
         self.cells.iter().map(|cell| f64::from(cell[3])).sum()
+    }
+
+    /// How much of a pixel is covered, at most.
+    #[cfg(test)]
+    pub(crate) fn most(&self) -> f32 {
+        self.cells.iter().map(|cell| cell[3]).fold(0.0, f32::max)
     }
 
     /// Draws what there is, each pixel in the mean of its colors.
