@@ -36,10 +36,7 @@ impl Kept<'_> {
     ///
     /// # Errors
     /// Naming the first such path, and what is there.
-    pub(super) fn check<const N: usize>(
-        &self,
-        options: [(&'static str, Option<&Path>); N],
-    ) -> Result<(), RunError> {
+    pub(super) fn check(&self, options: [(&'static str, Option<&Path>); 2]) -> Result<(), RunError> {
         for (option, path) in options {
             if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
                 return Err(RunError::TakenOutput { option, path: path.to_owned(), what });

@@ -18,12 +18,7 @@ impl Config {
     /// Reads the configuration of a run that was begun somewhere, perhaps on a transport that this program lacks.
     pub fn load_begun(path: &Path) -> Result<Self, ConfigError> {
         let (file, text) = read_file(path)?;
-        Self::of_begun(&file, &text)
-    }
-
-    /// As [`load_begun`](Self::load_begun), of its text. `name` stands for it in errors.
-    pub(crate) fn of_begun(name: &str, text: &str) -> Result<Self, ConfigError> {
-        Self::read(name, text, &[], |_| true)
+        Self::read(&file, &text, &[], |_| true)
     }
 
     /// Reads a configuration from text. `name` stands for it in errors; `overrides` are keys and values as after
