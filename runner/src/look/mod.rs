@@ -2,3 +2,5 @@
 
 pub mod compare;
 pub(crate) mod frame;
+pub(crate) mod recorded;
+pub(crate) mod vtk;
