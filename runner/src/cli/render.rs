@@ -10,7 +10,8 @@ use crate::error::{Exit, RunError};
 use crate::look::film::{Film, FilmKind};
 use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
-use crate::look::source::{End, Live, Recorded, Shown};
+use crate::look::recorded::Recorded;
+use crate::look::source::{End, Live, Shown, show_recorded};
 use crate::plan::Plan;
 use crate::rank::{Listener, Observer};
 use atoll_core::GlobalId;
@@ -27,7 +28,7 @@ const AROUND: f64 = 20.0;
 /// # Errors
 /// Whatever kept it from being made. Nothing is left behind then.
 pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
-    Kept { runs: vec![&args.source], configuration: Some(&args.source) }.check([("--out", Some(&args.out))])?;
+    Kept { runs: vec![&args.source], configuration: Some(&args.source) }.check([("--out", Some(args.out.as_path()))])?;
     let kind = FilmKind::of(&args.out)?;
     check_out(args, kind)?;
     let mut source = if args.source.is_dir() { open(args)? } else { plan(args)? };
@@ -54,7 +55,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
         }
         Source::Recorded(recorded) => {
             console.begins(shown.first, shown.last);
-            let shown = recorded.show(shown, &stop, &mut |frame| {
+            let shown = show_recorded(recorded, shown, &stop, &mut |frame| {
                 draw(frame)?;
                 console.made(frame.step);
                 Ok(())
@@ -151,7 +152,10 @@ impl Source {
     /// The steps to show.
     fn shown(&self, args: &RenderArgs, kind: FilmKind) -> Result<Shown, RunError> {
         let (last, between, every) = match self {
-            Self::Recorded(recorded) => (recorded.last(), recorded.every(), recorded.every()),
+            Self::Recorded(recorded) => {
+                let (recording, every) = (recorded.recording(), recorded.recording().facts().record_every);
+                (recording.steps().last().copied().unwrap_or_default(), every, every)
+            }
             Self::Live(live) => {
                 let real_time = live.setting().hertz / f64::from(args.fps.unwrap_or(FPS));
                 (live.plan().config.run.steps, 1, real_time.round().max(1.0) as u64)
@@ -184,7 +188,11 @@ impl Source {
             return refused("that one never moves; name a dynamic body, or use --view");
         }
         let known = match self {
-            Self::Recorded(recorded) => recorded.has(id)?,
+            Self::Recorded(recorded) => {
+                let mut rows = Vec::new();
+                recorded.recording().read(0, &mut rows)?;
+                rows.iter().any(|row| row.id == id.0)
+            }
             Self::Live(live) => live.has(id),
         };
         if known { Ok(()) } else { refused("there is no body of that name; give the id of another") }

@@ -6,7 +6,7 @@ mod render;
 mod run;
 mod values;
 
-pub(crate) use recordings::{DiffArgs, InfoArgs};
+pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs};
 pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
 
@@ -35,6 +35,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
+    /// Write what a run has recorded as files for other programs.
+    Export(ExportArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

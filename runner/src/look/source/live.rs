@@ -1,9 +1,10 @@
 //! A configuration that is run only to be looked at: its ranks are threads, and nothing of it is kept.
 
 use super::parts::Parts;
-use super::{End, Show, Shown, hertz};
+use super::{End, Show, Shown};
 use crate::config::{Config, TransportKind};
 use crate::error::RunError;
+use crate::folder::recording::RunFacts;
 use crate::launch;
 use crate::look::frame::{Frame, Setting};
 use crate::plan::Plan;
@@ -40,7 +41,9 @@ impl Live {
     /// That of a plan whose ranks are threads.
     pub(crate) fn new(plan: Plan) -> Self {
         let Blueprint { grid, kinds, statics, .. } = plan.blueprint.clone();
-        let hertz = hertz(&plan.config.to_toml(plan.tiles)).expect("every configuration has a frequency");
+        // As a recording of it would tell.
+        let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
+        let hertz = facts.hertz().expect("every configuration has a frequency");
         Self { setting: Setting { grid, kinds, statics, hertz }, plan }
     }
 
@@ -87,12 +90,13 @@ impl Live {
             let run = run.map_err(|error| RunError::Threads { rank: Rank(0), threads: 1, reason: error.to_string() })?;
             let shown = {
                 let _closes = AtEnd(|| parts.close());
-                self.take_all(&parts, live, show)
+                self.take_all(&parts, show)
             };
             if shown.is_err() {
                 stop.request();
             }
-            Ok((shown, run.join().unwrap_or_else(|payload| panic::resume_unwind(payload))))
+            let ran = run.join().unwrap_or_else(|payload| panic::resume_unwind(payload));
+            Ok::<_, RunError>((shown, ran))
         })?;
         shown?;
         let summary = ran?;
@@ -101,7 +105,7 @@ impl Live {
         Ok((end, summary))
     }
 
-    fn take_all(&self, parts: &Parts, live: bool, show: &mut Show<'_>) -> Result<(), RunError> {
+    fn take_all(&self, parts: &Parts, show: &mut Show<'_>) -> Result<(), RunError> {
         let mut frame = Frame::default();
         while parts.take(&mut frame) {
             if let Some(live) = frame.live.as_mut().filter(|live| live.rank_of_tile.is_empty()) {

@@ -7,7 +7,7 @@ mod recorded;
 mod tests;
 
 pub(crate) use live::Live;
-pub(crate) use recorded::Recorded;
+pub(crate) use recorded::show_recorded;
 
 use super::frame::Frame;
 use crate::error::RunError;
@@ -54,10 +54,4 @@ pub(crate) enum End {
     Complete,
     /// Somebody asked to stop.
     Interrupted,
-}
-
-/// Steps in a second, by a configuration with every value that is used; the same for a run and for what it has recorded.
-fn hertz(resolved: &str) -> Option<f64> {
-    let hertz = resolved.parse::<toml::Table>().ok()?.get("physics")?.get("hertz")?.as_float();
-    hertz.filter(|hertz| hertz.is_finite() && *hertz > 0.0)
 }
