@@ -28,7 +28,8 @@ const AROUND: f64 = 20.0;
 /// # Errors
 /// Whatever kept it from being made. Nothing is left behind then.
 pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
-    Kept { runs: vec![&args.source], configuration: Some(&args.source) }.check([("--out", Some(args.out.as_path()))])?;
+    Kept { runs: vec![&args.source], configuration: Some(&args.source) }
+        .check([("--out", Some(args.out.as_path()))])?;
     let kind = FilmKind::of(&args.out)?;
     check_out(args, kind)?;
     let mut source = if args.source.is_dir() { open(args)? } else { plan(args)? };
@@ -94,9 +95,10 @@ fn unsuitable(option: impl ToString, reason: impl ToString) -> RunError {
 fn check_out(args: &RenderArgs, kind: FilmKind) -> Result<(), RunError> {
     let film = [args.every.map(|every| ("--every", every)), args.fps.map(|fps| ("--fps", fps.into()))];
     match (kind.is_film(), args.step, film.into_iter().flatten().next()) {
-        (false, _, Some((option, value))) => {
-            Err(unsuitable(format!("{option} {value}"), "a .png is one picture; leave it out, or name a film such as .gif"))
-        }
+        (false, _, Some((option, value))) => Err(unsuitable(
+            format!("{option} {value}"),
+            "a .png is one picture; leave it out, or name a film such as .gif",
+        )),
         (true, Some(step), _) => {
             Err(unsuitable(format!("--step {step}"), "a film shows many steps; leave it out, or name a .png"))
         }

@@ -36,7 +36,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["every", "fps"])]
     pub step: Option<u64>,
     /// Width and height of a picture, in pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
     pub(crate) size: [u32; 2],
     /// The part of the world to show: its low and its high corner, in m [default: all of it].
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = view, allow_hyphen_values = true, conflicts_with = "follow")]

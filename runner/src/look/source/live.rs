@@ -87,7 +87,8 @@ impl Live {
                 launch::run(plan, &observer)
             };
             let run = thread::Builder::new().name("run".to_owned()).spawn_scoped(scope, run);
-            let run = run.map_err(|error| RunError::Threads { rank: Rank(0), threads: 1, reason: error.to_string() })?;
+            let run =
+                run.map_err(|error| RunError::Threads { rank: Rank(0), threads: 1, reason: error.to_string() })?;
             let shown = {
                 let _closes = AtEnd(|| parts.close());
                 self.take_all(&parts, show)
