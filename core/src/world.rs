@@ -245,6 +245,7 @@ impl World {
 
     /// One sync point. What all ranks together have to say comes back.
     pub(crate) fn exchange<H: Halo>(&mut self, halo: &mut H) -> Result<Verdict, StepError<H::Error>> {
+        let _span = tracing::trace_span!("exchange", sync = self.sync).entered();
         let mut watch = Stopwatch::start();
         self.outbox.verdict = self.verdict;
         (self.outbox.step, self.outbox.sync) = (self.step, self.sync);

@@ -50,6 +50,7 @@ pub struct StepReport {
 /// # Errors
 /// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
+    let _span = tracing::trace_span!("step", step = world.step).entered();
     world.begin_step();
     let stopped = migrate(world, halo)?;
     world.measures |= stopped;

@@ -22,7 +22,7 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    let begun = console::init();
+    let begun = console::init(matches!(&cli.command, Command::Run(args) if args.trace.is_some()));
     interrupt::outlive_file_limits();
     let result = begun.and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),

@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::rank::Observer;
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
-use crate::summary::{Summary, timings};
+use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
@@ -141,7 +141,8 @@ fn observer(args: &RunArgs, goes_on: bool) -> Observer {
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
     // What has been tried once is not tried again.
     let panic_at = args.panic_at.filter(|_| !goes_on);
-    Observer { listener: Some(Arc::new(Console::new(show))), panic_at, ..Observer::default() }
+    let trace = args.trace.is_some().then(|| args.trace_steps.clone().unwrap_or_default());
+    Observer { listener: Some(Arc::new(Console::new(show))), panic_at, trace, ..Observer::default() }
 }
 
 /// What the user may want to know before the run starts.
@@ -152,14 +153,14 @@ fn tell(plan: &Plan) {
 }
 
 /// What is written to files of their own when the run is over, with the options that say where.
-fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 2] {
-    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())]
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 3] {
+    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref()), ("--trace", args.trace.as_deref())]
 }
 
 /// Refuses to write them over what this run reads or keeps, or what another has left.
 fn check_kept(args: &RunArgs) -> Result<(), RunError> {
     let runs = args.out.iter().chain(&args.resume).map(PathBuf::as_path).collect();
-    Kept { runs, configuration: args.config.as_deref() }.check(files(args))
+    Kept { runs, configuration: args.config.as_deref() }.check(&files(args))
 }
 
 /// Keeps other runs from the folder of this one, if it has one that is there.
@@ -245,7 +246,8 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     let timings =
         outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
     let shown = output::show(summary);
-    folder.and(json).and(timings).and(shown)?;
+    let trace = outputs.trace.as_ref().map_or(Ok(()), |file| write_trace(summary, file));
+    folder.and(json).and(timings).and(trace).and(shown)?;
     if summary.escaped > 0 {
         let (escaped, bodies) = (summary.escaped, summary.bodies);
         complain(&format!(
@@ -258,11 +260,26 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
+/// Writes what the threads did, and says where that is not all that was asked for.
+fn write_trace(summary: &Summary, file: &WholeFile) -> Result<(), RunError> {
+    let ranks = summary.trace.as_deref().unwrap_or_default();
+    file.write(&trace::to_json(summary, ranks))?;
+    if ranks.iter().all(|rank| rank.slices.is_empty()) {
+        complain(&"--trace: none of the steps that were to be traced was made; choose others with --trace-steps");
+    }
+    match trace::left_out(ranks) {
+        0 => {}
+        some => complain(&format!("--trace: the file has no room for {some} slices more; choose fewer --trace-steps")),
+    }
+    Ok(())
+}
+
 /// The files to write when the run is over.
 #[derive(Default)]
 struct Outputs {
     json: Option<WholeFile>,
     timings: Option<WholeFile>,
+    trace: Option<WholeFile>,
     /// The summary in the folder of the run.
     folder: Option<WholeFile>,
 }
@@ -289,7 +306,7 @@ impl Outputs {
             return Err(error.into());
         }
         let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        let [json, timings] = WholeFile::check_two(files(args))?;
-        Ok(Self { json, timings, folder })
+        let [json, timings, trace] = WholeFile::check_all(files(args))?;
+        Ok(Self { json, timings, trace, folder })
     }
 }

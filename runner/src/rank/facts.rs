@@ -1,5 +1,6 @@
 //! What each rank brings to the summary.
 
+use super::trace::RankTrace;
 use crate::scene::Scene;
 use atoll_core::{Hashes, Phase, StepReport, TileFacts, World};
 use bytemuck::{Pod, Zeroable};
@@ -58,6 +59,8 @@ pub(crate) struct Gathered {
     pub ranks: Vec<RankFacts>,
     /// Of all tiles, in no order in particular.
     pub tiles: Vec<TileFacts>,
+    /// What their threads did in some steps, by rank, if anybody wants to see that.
+    pub trace: Option<Vec<RankTrace>>,
 }
 
 impl RankFacts {

@@ -9,11 +9,13 @@ mod halo;
 pub(crate) mod handshake;
 mod observer;
 mod recorder;
+pub(crate) mod trace;
 pub(crate) mod trouble;
 
 pub(crate) use facts::{Gathered, PHASES, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub use observer::{Listener, Observer, PanicAt, StopFlag};
+pub use trace::TraceSteps;
 use trouble::Refusal;
 
 use crate::error::Exit;
@@ -25,6 +27,7 @@ use bytemuck::Pod;
 use rayon::ThreadPoolBuilder;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use trace::{RankTrace, Tracer};
 use tracing::{debug, info_span};
 
 /// Why a rank ended early.
@@ -139,6 +142,8 @@ fn run<T: Transport>(
     let before = halo.transport().stats();
     let mut last = StepReport::default();
     let mut migrations = 0;
+    let threads = plan.config.run.threads * plan.config.run.ranks;
+    let mut tracer = Tracer::new(observer.trace.as_ref(), world.step_count(), threads);
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);
     }
@@ -152,6 +157,7 @@ fn run<T: Transport>(
         if world.step_count() + 1 == steps {
             world.measure_next_step();
         }
+        tracer.before(Some(world.step_count()));
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
         *complete = world.step_count();
@@ -162,6 +168,7 @@ fn run<T: Transport>(
         told.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
+    tracer.before(None);
     // Whoever asks while the last step is made gets all of them.
     let interrupted = last.stopped && *complete < steps;
     let output_time = match recorder {
@@ -185,7 +192,7 @@ fn run<T: Transport>(
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();
     }
-    gather(halo.transport(), &facts, &tiles).map_err(RankError::Transport)
+    gather(halo.transport(), &facts, &tiles, &tracer).map_err(RankError::Transport)
 }
 
 /// Brings everything to rank 0.
@@ -193,11 +200,13 @@ fn gather(
     transport: &mut impl Transport,
     facts: &RankFacts,
     tiles: &[TileFacts],
+    tracer: &Tracer,
 ) -> Result<Option<Gathered>, TransportError> {
     let ranks = transport.gather(Rank(0), bytemuck::bytes_of(facts))?;
     let tiles = transport.gather(Rank(0), bytemuck::cast_slice(tiles))?;
+    let trace: Option<Vec<RankTrace>> = tracer.gather(transport)?;
     let Some((ranks, tiles)) = ranks.zip(tiles) else { return Ok(None) };
-    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)? };
+    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)?, trace };
     if gathered.ranks.len() == ranks.len() { Ok(Some(gathered)) } else { Err(unreadable(Rank(0))) }
 }
 

@@ -1,7 +1,7 @@
 //! Options of `atoll run`.
 
 use crate::config::{ConfigError, Override};
-use crate::rank::PanicAt;
+use crate::rank::{PanicAt, TraceSteps};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -45,6 +45,13 @@ pub struct RunArgs {
     /// Write where the time of each rank went to this file, as CSV.
     #[arg(long, value_name = "FILE")]
     pub timings: Option<PathBuf>,
+    /// Write what each thread of each rank did, and when, to this file, for ui.perfetto.dev or chrome://tracing, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// Trace the steps A to B - 1, counted from 0 [default: the first ten, as viewers open no more than some hundred
+    /// megabytes].
+    #[arg(long, value_name = "A..B", requires = "trace")]
+    pub trace_steps: Option<TraceSteps>,
     /// Write configuration and summary to this folder, which must be new or empty, and records and snapshots as asked for.
     #[arg(long, value_name = "DIR", group = "folder")]
     pub out: Option<PathBuf>,

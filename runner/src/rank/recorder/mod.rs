@@ -22,6 +22,7 @@ use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+use tracing::trace_span;
 use writer::{Job, Saved, Writer};
 
 /// Between two looks at whether everything is written.
@@ -87,6 +88,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn write_due(&mut self, world: &World, stopped: bool) {
         let start = Instant::now();
         let step = world.step_count();
+        let _span = trace_span!("output", step).entered();
         let due = |every: Option<u64>| every.is_some_and(|every| step.is_multiple_of(every));
         if !stopped
             && self.last_snapshot.is_some_and(|last| last < step)
