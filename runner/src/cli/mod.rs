@@ -7,6 +7,7 @@ mod info;
 mod interrupt;
 mod output;
 mod progress;
+mod report;
 mod run;
 
 use crate::error::{Exit, RunError};
@@ -28,6 +29,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::run(args),
         Command::Info(args) => info::run(args),
+        Command::Report(args) => report::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

@@ -2,3 +2,4 @@
 
 pub mod compare;
 pub(crate) mod frame;
+pub(crate) mod report;

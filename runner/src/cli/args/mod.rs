@@ -4,7 +4,7 @@
 mod recordings;
 mod run;
 
-pub(crate) use recordings::{DiffArgs, InfoArgs};
+pub(crate) use recordings::{DiffArgs, InfoArgs, ReportArgs};
 pub(crate) use run::RunArgs;
 
 use crate::config::OneLine;
@@ -30,6 +30,8 @@ pub enum Command {
     Diff(DiffArgs),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
+    /// Write a page about a run, or two side by side: what was run, pictures, figures over time, where the time went.
+    Report(ReportArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.
