@@ -12,9 +12,9 @@ use crate::error::{Exit, RunError};
 use crate::folder::{Claim, RunFolder};
 use crate::launch;
 use crate::plan::Plan;
-use crate::rank::Observer;
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
+use crate::rank::{Observer, check_logs};
 use crate::summary::{Summary, timings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -130,11 +130,12 @@ fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
+    .map(|plan| Plan { log: args.log.clone(), ..plan })
 }
 
-/// A plan whose run can go on with what is recorded.
+/// A plan whose run can go on with what is recorded, and with its log.
 fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
-    plan.and_then(|plan| plan.check_recording().map(|()| plan))
+    plan.and_then(|plan| plan.check_recording().and_then(|()| check_logs(&plan)).map(|()| plan))
 }
 
 fn observer(args: &RunArgs, goes_on: bool) -> Observer {
@@ -151,9 +152,9 @@ fn tell(plan: &Plan) {
     }
 }
 
-/// What is written to files of their own when the run is over, with the options that say where.
-fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 2] {
-    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())]
+/// What is written to files of their own, with the options that say where.
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 3] {
+    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref()), ("--log", args.log.as_deref())]
 }
 
 /// Refuses to write them over what this run reads or keeps, or what another has left.
@@ -240,10 +241,11 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
 /// Shows and writes what became of a run, and says with which exit code to end.
 fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // All are tried before any is complained about: the one may save what another lost.
-    let json = |file: &Option<WholeFile>| file.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
-    let (folder, json) = (json(&outputs.folder), json(&outputs.json));
-    let timings =
-        outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
+    let write = |file: &Option<WholeFile>, bytes: &[u8]| file.as_ref().map_or(Ok(()), |file| file.write(bytes));
+    let (json, timings) = (summary.to_json(), timings::to_csv(&summary.timings));
+    // In a folder the summary comes last, and says that all is there.
+    let folder = write(&outputs.folder_timings, timings.as_bytes()).and(write(&outputs.folder, &json));
+    let (json, timings) = (write(&outputs.json, &json), write(&outputs.timings, timings.as_bytes()));
     let shown = output::show(summary);
     folder.and(json).and(timings).and(shown)?;
     if summary.escaped > 0 {
@@ -263,8 +265,9 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
 struct Outputs {
     json: Option<WholeFile>,
     timings: Option<WholeFile>,
-    /// The summary in the folder of the run.
+    /// The summary and the timings in the folder of the run.
     folder: Option<WholeFile>,
+    folder_timings: Option<WholeFile>,
 }
 
 impl Outputs {
@@ -279,7 +282,7 @@ impl Outputs {
         error
     }
 
-    /// Where the summary and the timings are to go, checked.
+    /// Where everything is to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
         if let Some(folder) = folder(args)
             && let Err(error) = folder.check_free(args.overwrite)
@@ -288,8 +291,10 @@ impl Outputs {
         {
             return Err(error.into());
         }
-        let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        let [json, timings] = WholeFile::check_two(files(args))?;
-        Ok(Self { json, timings, folder })
+        let unchecked = |file: fn(&RunFolder) -> PathBuf| folder(args).map(|run| WholeFile::unchecked(&file(&run)));
+        // The log is written by the run itself.
+        let [json, timings, _] = WholeFile::check_all(files(args))?;
+        let (folder, folder_timings) = (unchecked(RunFolder::summary), unchecked(RunFolder::timings));
+        Ok(Self { json, timings, folder, folder_timings })
     }
 }
