@@ -54,6 +54,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
     world.begin_step();
     let stopped = migrate(world, halo)?;
     world.measures |= stopped;
+    world.takes_figures |= stopped;
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
@@ -202,6 +203,10 @@ fn finalize(bench: &mut Bench<'_>) {
         b.tile.contacts.copy_from(&contacts.cache);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
         b.tile.count_rest(b.setup);
+        if let Some(figures) = &mut b.figures {
+            figures.add_bodies(b.tile, b.setup, b.team);
+            figures.add_contacts(b.tile, contacts, b.setup, b.team);
+        }
     });
 }
 

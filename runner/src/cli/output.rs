@@ -36,8 +36,8 @@ impl Kept<'_> {
     ///
     /// # Errors
     /// Naming the first such path, and what is there.
-    pub(super) fn check(&self, options: &[(&'static str, Option<&Path>)]) -> Result<(), RunError> {
-        for &(option, path) in options {
+    pub(super) fn check<const N: usize>(&self, options: [(&'static str, Option<&Path>); N]) -> Result<(), RunError> {
+        for (option, path) in options {
             if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
                 return Err(RunError::TakenOutput { option, path: path.to_owned(), what });
             }
@@ -87,18 +87,18 @@ impl WholeFile {
         }
     }
 
-    /// As [`check`](Self::check), for several options, if given, no two of which may name one file.
+    /// As [`check`](Self::check), for some options, if given, which must name files of their own.
     ///
     /// # Errors
     /// If a path cannot be written, or two are the same.
     pub(super) fn check_all<const N: usize>(
         options: [(&'static str, Option<&Path>); N],
     ) -> Result<[Option<Self>; N], RunError> {
-        for (i, &(option, path)) in options.iter().enumerate() {
-            let same = options[..i].iter().find(|(_, other)| path.is_some() && *other == path);
-            if let (Some(path), Some((first, _))) = (path, same) {
+        for (i, (option, path)) in options.iter().enumerate() {
+            let before = options[..i].iter().find(|(_, other)| path.is_some() && other == path);
+            if let (Some((first, _)), Some(path)) = (before, path) {
                 let reason = format!("{first} writes to the same file");
-                return Err(RunError::BadOutput { option, path: path.to_owned(), reason });
+                return Err(RunError::BadOutput { option, path: path.to_path_buf(), reason });
             }
         }
         let mut files = [const { None }; N];

@@ -12,9 +12,9 @@ use crate::error::{Exit, RunError};
 use crate::folder::{Claim, RunFolder};
 use crate::launch;
 use crate::plan::Plan;
-use crate::rank::Observer;
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
+use crate::rank::{Observer, check_logs};
 use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -130,11 +130,12 @@ fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
+    .map(|plan| Plan { log: args.log.clone(), ..plan })
 }
 
-/// A plan whose run can go on with what is recorded.
+/// A plan whose run can go on with what is recorded, and with its log.
 fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
-    plan.and_then(|plan| plan.check_recording().map(|()| plan))
+    plan.and_then(|plan| plan.check_recording().and_then(|()| check_logs(&plan)).map(|()| plan))
 }
 
 fn observer(args: &RunArgs, goes_on: bool) -> Observer {
@@ -152,15 +153,16 @@ fn tell(plan: &Plan) {
     }
 }
 
-/// What is written to files of their own when the run is over, with the options that say where.
-fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 3] {
-    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref()), ("--trace", args.trace.as_deref())]
+/// What is written to files of their own, with the options that say where.
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 4] {
+    let files = [("--json", &args.json), ("--timings", &args.timings), ("--trace", &args.trace), ("--log", &args.log)];
+    files.map(|(option, path)| (option, path.as_deref()))
 }
 
 /// Refuses to write them over what this run reads or keeps, or what another has left.
 fn check_kept(args: &RunArgs) -> Result<(), RunError> {
     let runs = args.out.iter().chain(&args.resume).map(PathBuf::as_path).collect();
-    Kept { runs, configuration: args.config.as_deref() }.check(&files(args))
+    Kept { runs, configuration: args.config.as_deref() }.check(files(args))
 }
 
 /// Keeps other runs from the folder of this one, if it has one that is there.
@@ -241,10 +243,11 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
 /// Shows and writes what became of a run, and says with which exit code to end.
 fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // All are tried before any is complained about: the one may save what another lost.
-    let json = |file: &Option<WholeFile>| file.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
-    let (folder, json) = (json(&outputs.folder), json(&outputs.json));
-    let timings =
-        outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
+    let write = |file: &Option<WholeFile>, bytes: &[u8]| file.as_ref().map_or(Ok(()), |file| file.write(bytes));
+    let (json, timings) = (summary.to_json(), timings::to_csv(&summary.timings));
+    // In a folder the summary comes last, and says that all is there.
+    let folder = write(&outputs.folder_timings, timings.as_bytes()).and(write(&outputs.folder, &json));
+    let (json, timings) = (write(&outputs.json, &json), write(&outputs.timings, timings.as_bytes()));
     let shown = output::show(summary);
     let trace = outputs.trace.as_ref().map_or(Ok(()), |file| write_trace(summary, file));
     folder.and(json).and(timings).and(trace).and(shown)?;
@@ -280,8 +283,9 @@ struct Outputs {
     json: Option<WholeFile>,
     timings: Option<WholeFile>,
     trace: Option<WholeFile>,
-    /// The summary in the folder of the run.
+    /// The summary and the timings in the folder of the run.
     folder: Option<WholeFile>,
+    folder_timings: Option<WholeFile>,
 }
 
 impl Outputs {
@@ -296,7 +300,7 @@ impl Outputs {
         error
     }
 
-    /// Where the summary and the timings are to go, checked.
+    /// Where everything is to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
         if let Some(folder) = folder(args)
             && let Err(error) = folder.check_free(args.overwrite)
@@ -305,8 +309,10 @@ impl Outputs {
         {
             return Err(error.into());
         }
-        let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        let [json, timings, trace] = WholeFile::check_all(files(args))?;
-        Ok(Self { json, timings, trace, folder })
+        let unchecked = |file: fn(&RunFolder) -> PathBuf| folder(args).map(|run| WholeFile::unchecked(&file(&run)));
+        // The log is written by the run itself.
+        let [json, timings, trace, _] = WholeFile::check_all(files(args))?;
+        let (folder, folder_timings) = (unchecked(RunFolder::summary), unchecked(RunFolder::timings));
+        Ok(Self { json, timings, trace, folder, folder_timings })
     }
 }
