@@ -96,6 +96,14 @@ pub enum RunError {
         /// What is there.
         what: String,
     },
+    /// A path at which pictures cannot be written, as its ending is unknown or what it takes is not there.
+    #[error("--out {}: {reason}", .path.display())]
+    BadFilm {
+        /// The path.
+        path: PathBuf,
+        /// Why, and what would help.
+        reason: String,
+    },
     /// A folder for the run's output that cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -295,6 +303,7 @@ impl RunError {
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
             | Self::TakenOutput { .. }
+            | Self::BadFilm { .. }
             | Self::Folder(_)
             | Self::Snapshot(_)
             | Self::Recording(_)

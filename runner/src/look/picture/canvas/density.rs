@@ -1,0 +1,116 @@
+//! What is too small to be drawn: how much of each pixel it covers, and in which color on the average.
+
+use super::{Canvas, Form, Rgb};
+
+/// For each pixel the area that is covered, in pixels, and the colors of it, each times its area.
+#[derive(Default, Debug)]
+pub(crate) struct Field {
+    size: [usize; 2],
+    cells: Vec<[f32; 4]>,
+    /// Rows that may hold anything.
+    rows: std::ops::Range<usize>,
+}
+
+impl Field {
+    /// Makes it empty, and of that size.
+    pub(crate) fn reset(&mut self, size: [u32; 2]) {
+        let size = size.map(|length| length as usize);
+        if self.size != size {
+            *self = Self { size, cells: vec![[0.0; 4]; size[0] * size[1]], rows: size[1]..0 };
+        } else if self.rows.start < self.rows.end {
+            self.cells[self.rows.start * size[0]..self.rows.end * size[0]].fill([0.0; 4]);
+            self.rows = size[1]..0;
+        }
+    }
+
+    /// Adds a body: its area, in pixels, spread over a square of that area around its center, or one of a pixel if it is
+    /// smaller. So it covers no pixel more than once, and all of it is somewhere.
+    #[inline]
+    pub(crate) fn splat(&mut self, [x, y]: [f64; 2], area: f64, color: Rgb) {
+        let half = 0.5 * area.sqrt().max(1.0);
+        let (left, right, top, bottom) = (x - half, x + half, y - half, y + half);
+        if !(right > 0.0 && bottom > 0.0 && left < self.size[0] as f64 && top < self.size[1] as f64) {
+            return;
+        }
+        let density = (area / (4.0 * half * half)) as f32;
+        let [r, g, b] = color.0.map(f32::from);
+        let columns = left.max(0.0) as usize..((right.ceil()) as usize).min(self.size[0]);
+        let rows = top.max(0.0) as usize..((bottom.ceil()) as usize).min(self.size[1]);
+        self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
+        for row in rows {
+            let high = (bottom.min(row as f64 + 1.0) - top.max(row as f64)) as f32 * density;
+            for column in columns.clone() {
+                let covered = (right.min(column as f64 + 1.0) - left.max(column as f64)) as f32 * high;
+                let cell = &mut self.cells[row * self.size[0] + column];
+                cell[0] += r * covered;
+                cell[1] += g * covered;
+                cell[2] += b * covered;
+                cell[3] += covered;
+            }
+        }
+    }
+
+    /// Adds a form, as far as it is in what a canvas draws on.
+    pub(crate) fn cover(&mut self, canvas: &Canvas, form: &Form, color: Rgb) {
+        let [low, high] = form.bounds();
+        let rows = canvas.span(1, low[1], high[1]);
+        self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
+        for row in rows {
+            for column in canvas.span(0, low[0], high[0]) {
+                let covered = form.coverage(column as f64 + 0.5, row as f64 + 0.5) as f32;
+                let [r, g, b] = color.0.map(|value| f32::from(value) * covered);
+                let cell = &mut self.cells[row * self.size[0] + column];
+                *cell = [cell[0] + r, cell[1] + g, cell[2] + b, cell[3] + covered];
+            }
+        }
+    }
+
+    /// The area that is covered, in pixels.
+    #[cfg(test)]
+    pub(crate) fn area(&self) -> f64 {
+        self.cells.iter().map(|cell| f64::from(cell[3])).sum()
+    }
+
+    /// How much of a pixel is covered, at most.
+    #[cfg(test)]
+    pub(crate) fn most(&self) -> f32 {
+        self.cells.iter().map(|cell| cell[3]).fold(0.0, f32::max)
+    }
+
+    /// Draws what there is, each pixel in the mean of its colors.
+    pub(crate) fn draw(&self, canvas: &mut Canvas, tone: &Tone) {
+        for row in canvas.span(1, self.rows.start as f64, self.rows.end as f64) {
+            for column in canvas.span(0, 0.0, self.size[0] as f64) {
+                let [r, g, b, area] = self.cells[row * self.size[0] + column];
+                if area > 0.0 {
+                    let mean = [r, g, b].map(|sum| (sum / area + 0.5) as u8);
+                    canvas.blend(column, row, Rgb(mean), tone.of(area));
+                }
+            }
+        }
+    }
+}
+
+/// How strongly a covered part of a pixel is drawn: a power of it, so that a few small bodies are seen, and a pixel that is
+/// covered has the full color.
+#[derive(Debug)]
+pub(crate) struct Tone {
+    table: Vec<f32>,
+}
+
+impl Tone {
+    const STEPS: usize = 4096;
+
+    /// The given power: 1 for what is covered and no more.
+    pub(crate) fn new(power: f64) -> Self {
+        let of = |i| libm::pow(i as f64 / Self::STEPS as f64, power) as f32;
+        Self { table: (0..=Self::STEPS).map(of).collect() }
+    }
+
+    /// For so much of a pixel.
+    #[inline]
+    pub(crate) fn of(&self, area: f32) -> f32 {
+        let at = (area * Self::STEPS as f32).clamp(1.0, Self::STEPS as f32);
+        self.table[at as usize]
+    }
+}
