@@ -5,7 +5,7 @@ use super::console::complain;
 use super::output;
 use crate::config::{Config, OneLine};
 use crate::error::{Exit, RunError};
-use crate::folder::recording::{Recording, RecordingError, Segment};
+use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::folder::{Ended, LogError, Rows, RunFolder};
 use std::ffi::OsStr;
@@ -103,7 +103,13 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
     steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
-    Ok(format!("{count} records, steps 0 to {last}, every {every}; {size} in {} files", files.len()))
+    let shapes = recording.stage().map_or("no shapes".to_owned(), shapes);
+    Ok(format!("{count} records, steps 0 to {last}, every {every}; {shapes}; {size} in {} files", files.len()))
+}
+
+fn shapes(stage: &Stage) -> String {
+    let plural = |count: usize, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
+    format!("{}, {}", plural(stage.kinds.len(), "kind"), plural(stage.statics.len(), "static"))
 }
 
 /// What there is of figures over time, or what is wrong with them.
@@ -156,6 +162,7 @@ fn of_segment(path: &Path) -> Result<String, RecordingError> {
     let steps: Vec<String> = records.iter().map(|record| record.step.to_string()).collect();
     row(&mut text, "steps", &steps.join(" "));
     row(&mut text, "rows", &records.iter().map(|record| record.rows).sum::<u64>().to_string());
+    row(&mut text, "shapes", &segment.stage()?.as_ref().map_or("none: format 1".to_owned(), shapes));
     row(&mut text, "size", &megabytes(iter::once(path)));
     Ok(text)
 }

@@ -3,6 +3,7 @@
 pub(crate) mod args;
 mod console;
 mod diff;
+mod export;
 mod info;
 mod interrupt;
 mod output;
@@ -30,6 +31,7 @@ pub fn main() -> ExitCode {
         Command::Diff(args) => diff::run(args),
         Command::Info(args) => info::run(args),
         Command::Report(args) => report::run(args),
+        Command::Export(args) => export::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

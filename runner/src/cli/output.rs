@@ -36,7 +36,10 @@ impl Kept<'_> {
     ///
     /// # Errors
     /// Naming the first such path, and what is there.
-    pub(super) fn check<const N: usize>(&self, options: [(&'static str, Option<&Path>); N]) -> Result<(), RunError> {
+    pub(super) fn check<'a>(
+        &self,
+        options: impl IntoIterator<Item = (&'static str, Option<&'a Path>)>,
+    ) -> Result<(), RunError> {
         for (option, path) in options {
             if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
                 return Err(RunError::TakenOutput { option, path: path.to_owned(), what });

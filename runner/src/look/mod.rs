@@ -5,3 +5,5 @@ pub(crate) mod film;
 pub(crate) mod frame;
 pub(crate) mod picture;
 pub(crate) mod report;
+pub(crate) mod recorded;
+pub(crate) mod vtk;

@@ -9,7 +9,7 @@ pub(crate) use assignment::Assignment;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
-use crate::folder::recording::{Recording, RunFacts};
+use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
@@ -143,7 +143,8 @@ impl Plan {
         let Some((output, newest)) = self.output.as_ref().zip(newest) else { return Ok(()) };
         let Some(every) = output.every.record_every else { return Ok(()) };
         let facts = RunFacts::new(&self.config, self.scene.domain(), self.tiles, every);
-        let run = (output.folder.configuration(), facts);
+        let stage = Some(StageText::new(&self.blueprint.kinds, &self.blueprint.statics));
+        let run = OfRun { path: output.folder.configuration(), facts, stage };
         Recording::check_until(output.folder.path(), run, newest)
             .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())
     }

@@ -4,7 +4,7 @@
 mod recordings;
 mod run;
 
-pub(crate) use recordings::{DiffArgs, InfoArgs, ReportArgs};
+pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
 pub(crate) use run::RunArgs;
 
 use crate::config::OneLine;
@@ -32,6 +32,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Write a page about a run, or two side by side: what was run, pictures, figures over time, where the time went.
     Report(ReportArgs),
+    /// Write what a run has recorded as files for other programs.
+    Export(ExportArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

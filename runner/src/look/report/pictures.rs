@@ -4,7 +4,15 @@ use super::html::{Text, Whole, figure};
 use super::letter;
 use super::source::Source;
 use crate::error::RunError;
+use crate::look::film::to_png;
+use crate::look::frame::Frame;
+use crate::look::picture::{ColorBy, Layers, Look, Painter, whole_view};
+use crate::look::recorded::Recorded;
+use glam::DVec2;
 use std::fmt::Write as _;
+
+/// Of a picture, in pixels.
+const WIDTH: u32 = 1060;
 
 /// Pictures of one run, as PNG.
 #[derive(Debug)]
@@ -18,19 +26,29 @@ pub(super) struct Pictures {
 /// # Errors
 /// If a record cannot be read.
 pub(super) fn draw(source: &Source) -> Result<Option<Pictures>, RunError> {
-    let Some(recording) = &source.recording else { return Ok(None) };
+    if source.recording.is_none() {
+        return Ok(None);
+    }
+    let recorded = Recorded::open(&source.folder)?;
+    let recording = recorded.recording();
     let mut steps = vec![recording.steps()[0]];
     steps.extend(recording.steps().last().filter(|last| **last != steps[0]));
-    let mut all = Vec::new();
+    let (setting, view) = (recorded.setting(), whole_view(recorded.setting()));
+    let look = Look { size: size(view.high - view.low), color: ColorBy::Kind, layers: Layers::default() };
+    let mut painter = Painter::new(setting, look);
+    let (mut frame, mut all) = (Frame::default(), Vec::with_capacity(steps.len()));
     for step in steps {
-        all.extend(png(recording, step)?.map(|png| (step, png)));
+        recorded.read(step, &mut frame)?;
+        all.push((step, to_png(painter.draw(&frame, &view))));
     }
-    Ok((!all.is_empty()).then_some(Pictures { all }))
+    Ok(Some(Pictures { all }))
 }
 
-/// All of the world at a step.
-fn png(_recording: &crate::folder::recording::Recording, _step: u64) -> Result<Option<Vec<u8>>, RunError> {
-    Ok(None)
+/// Of a picture that shows so much: as wide as a page has room for two, on a screen with fine pixels, and as high as that
+/// needs.
+fn size(extent: DVec2) -> [u32; 2] {
+    let height = (f64::from(WIDTH) * extent.y / extent.x).clamp(240.0, 1.2 * f64::from(WIDTH));
+    [WIDTH, height.round() as u32 / 2 * 2]
 }
 
 /// The figures: beside each other those of a run.

@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::folder::durable::is_gone;
-use crate::folder::recording::{Record, RecordingWriter, RunFacts};
+use crate::folder::recording::{Record, RecordingWriter, RunFacts, StageText};
 use crate::folder::snapshot::{self, SnapshotWriter};
 use crate::plan::{Output, Plan};
 use atoll_core::{SavedTile, World};
@@ -63,7 +63,8 @@ impl Writer {
         let (ranks, identity) = (plan.config.run.ranks as u32, plan.config.identity(plan.tiles));
         let recording = |every| {
             let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, every);
-            RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
+            let stage = StageText::new(&plan.blueprint.kinds, &plan.blueprint.statics);
+            RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts, &stage)
         };
         let recording = output.every.record_every.map(recording).transpose()?;
         let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, identity);
