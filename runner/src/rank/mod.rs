@@ -17,7 +17,7 @@ pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
 pub use observer::{Listener, Observer, PanicAt, StopFlag};
-pub use trace::TraceSteps;
+pub(crate) use trace::TraceSteps;
 use trouble::Refusal;
 
 use crate::error::Exit;
