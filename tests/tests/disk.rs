@@ -129,3 +129,18 @@ fn a_folder_that_cannot_be_written_is_refused_at_once() {
         assert!(!ended.stdout.contains("state hash"), "{ended}");
     }
 }
+
+#[test]
+fn an_export_that_does_not_fit_leaves_nothing() {
+    let folder = tempdir().unwrap();
+    let script = "mount -t tmpfs -o size=2m none $DISK || exit 99
+         $ATOLL run configs/quickstart.toml --quiet --steps 4 --bodies 4000 --ranks 2 --record-every 2 --out $KEPT/run || exit 98
+         $ATOLL export $KEPT/run --vtk $DISK/out
+         echo \"export: $?\"
+         find $DISK -mindepth 1";
+    let Some(ended) = with_disk(folder.path(), script) else { return };
+    assert_eq!((ended.code, ended.complaints().len()), (Some(0), 1), "{ended}");
+    assert!(ended.stdout.ends_with("export: 5\n"), "something is left: {ended}");
+    let complaint = ended.complaints()[0];
+    assert!(complaint.contains("cannot write ") && complaint.contains(".vtu: No space left on device"), "{ended}");
+}

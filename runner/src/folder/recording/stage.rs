@@ -276,7 +276,7 @@ mod tests {
         for (from, to, expected) in [
             ("0.2", "0.0", "kind 0 of atoll.kinds has a number that cannot be"),
             ("0.2", "-0.2", "kind 0 of atoll.kinds has a number that cannot be"),
-            ("0.2", "1e39", "cannot be"),
+            ("0.2", "1e39", "atoll.kinds is unreadable: number out of range"),
             ("0.2", "NaN", "atoll.kinds is unreadable: expected value at line 1"),
             ("0.2", "null", "kind 0 of atoll.kinds is neither a box nor a circle"),
             ("[0.5,0.5]", "[0.5,0.0]", "kind 1 of atoll.kinds has a number that cannot be"),

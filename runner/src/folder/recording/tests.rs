@@ -474,7 +474,7 @@ fn bodies_of_kinds_that_are_not_there_are_refused() {
 fn kinds_take_next_to_nothing() {
     let size = |kind: fn(u64) -> u32| {
         let folder = folder();
-        let of_kinds = |step| (0..100_000).map(|id| Body { kind: atoll_core::KindId(kind(id)), ..body(id, step) });
+        let of_kinds = |step| (0..100_000).map(move |id| Body { kind: atoll_core::KindId(kind(id)), ..body(id, step) });
         record(folder.path(), &facts(1), 1, 0..1, |step| of_kinds(step).collect());
         fs::metadata(rank_folder(folder.path(), 0).join(segment_name(0, 0))).unwrap().len()
     };
