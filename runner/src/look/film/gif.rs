@@ -6,7 +6,7 @@ use crate::look::picture::Image;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 /// Programs show what lasts shorter, in hundredths of a second, much longer.
@@ -45,11 +45,8 @@ impl Gif {
     pub(super) fn add(&mut self, image: &Image) -> io::Result<()> {
         let [left, top, width, height] = self.changed(image);
         let stride = 3 * image.size[0] as usize;
-        let rows = |pixels: &'_ [u8]| -> Vec<std::ops::Range<usize>> {
-            debug_assert_eq!(pixels.len(), stride * image.size[1] as usize);
-            (top..top + height).map(|row| row * stride + 3 * left..row * stride + 3 * (left + width)).collect()
-        };
-        let rows = rows(&image.pixels);
+        let row = |row: usize| row * stride + 3 * left..row * stride + 3 * (left + width);
+        let rows: Vec<std::ops::Range<usize>> = (top..top + height).map(row).collect();
         self.palette.choose(rows.iter().map(|row| &image.pixels[row.clone()]));
         self.indices.clear();
         for row in rows {
@@ -124,6 +121,6 @@ impl Gif {
 fn plain(error: EncodingError) -> io::Error {
     match error {
         EncodingError::Io(error) => error,
-        other => io::Error::new(ErrorKind::Other, other.to_string()),
+        other => io::Error::other(other.to_string()),
     }
 }

@@ -18,8 +18,8 @@ const FILTER: &str = "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0,\
                       format=yuv420p";
 const BOTH: &str = "-an -colorspace bt709 -color_primaries bt709 -color_trc bt709 -color_range tv -threads 4 \
                     -fflags +bitexact -flags:v +bitexact -map_metadata -1";
-const MP4: &str = "-c:v libx264 -preset medium -crf 18 -movflags +faststart -f mp4";
-const WEBM: &str = "-c:v libvpx-vp9 -crf 24 -b:v 0 -deadline good -cpu-used 5 -row-mt 1 -f webm";
+const MP4: &str = "-c:v libx264 -preset veryfast -crf 18 -movflags +faststart -f mp4";
+const WEBM: &str = "-c:v libvpx-vp9 -crf 24 -b:v 0 -deadline realtime -cpu-used 7 -row-mt 1 -f webm";
 
 /// A film that ffmpeg is writing.
 #[derive(Debug)]

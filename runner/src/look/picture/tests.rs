@@ -284,7 +284,7 @@ fn numbers_are_rounded_for_people() {
         ["0.5 m", "1 m", "2 m", "50 m", "2 mm", "500 m"]
     );
     assert_eq!((length(2000.0), grouped(700_000), grouped(12)), ("2 km".into(), "700,000".into(), "12".into()));
-    for (scale, expected) in [(1.0, 100.0), (0.9, 200.0), (1000.0, 0.2), (3.3e-4, 500_000.0)] {
+    for (scale, expected) in [(1.0, 100.0), (0.9, 200.0), (1000.0, 0.1), (3.3e-4, 500_000.0)] {
         let (meters, pixels) = scale_bar(scale, 199.9);
         assert!((meters / expected - 1.0).abs() < 1e-9 && pixels <= 199.9 && pixels > 79.0, "{meters} {pixels}");
     }

@@ -34,18 +34,16 @@ impl Field {
         }
         let density = (area / (4.0 * half * half)) as f32;
         let [r, g, b] = color.0.map(f32::from);
-        let columns = left.max(0.0) as usize..((right.ceil()) as usize).min(self.size[0]);
-        let rows = top.max(0.0) as usize..((bottom.ceil()) as usize).min(self.size[1]);
+        let columns = left.max(0.0) as usize..(right as usize + 1).min(self.size[0]);
+        let rows = top.max(0.0) as usize..(bottom as usize + 1).min(self.size[1]);
         self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
         for row in rows {
             let high = (bottom.min(row as f64 + 1.0) - top.max(row as f64)) as f32 * density;
-            for column in columns.clone() {
+            let from = row * self.size[0];
+            let cells = &mut self.cells[from + columns.start..from + columns.end];
+            for (column, cell) in columns.clone().zip(cells) {
                 let covered = (right.min(column as f64 + 1.0) - left.max(column as f64)) as f32 * high;
-                let cell = &mut self.cells[row * self.size[0] + column];
-                cell[0] += r * covered;
-                cell[1] += g * covered;
-                cell[2] += b * covered;
-                cell[3] += covered;
+                cell.iter_mut().zip([r, g, b, 1.0]).for_each(|(sum, value)| *sum += value * covered);
             }
         }
     }
