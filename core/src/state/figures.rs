@@ -11,6 +11,7 @@ use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, Vec2};
 use std::ops::Range;
 
 #[cfg(test)]
@@ -215,10 +216,22 @@ struct WideSums {
 }
 
 impl WideSums {
-    /// Adds four bodies: masses, moments of inertia, places about the world's origin and about the low corner, velocities
-    /// and spins.
+    /// Adds four bodies: masses and moments of inertia, places, velocities and spins.
     #[inline(always)]
-    fn add(&mut self, [mass, inertia]: [Wide; 2], [x, y]: [Wide; 2], [dx, dy]: [Wide; 2], [vx, vy, w]: [Wide; 3]) {
+    fn add(
+        &mut self,
+        masses: [[f32; 2]; WIDTH],
+        positions: &[DVec2; WIDTH],
+        velocities: &[Vec2; WIDTH],
+        spins: &[f32; WIDTH],
+        setup: &Setup,
+    ) {
+        let low = setup.grid.min();
+        let (mass, inertia) = (each(|k| f64::from(masses[k][0])), each(|k| f64::from(masses[k][1])));
+        let (x, y) = (each(|k| positions[k].x), each(|k| positions[k].y));
+        let (dx, dy) = (sub(x, [low.x; WIDTH]), sub(y, [low.y; WIDTH]));
+        let (vx, vy) = (each(|k| f64::from(velocities[k].x)), each(|k| f64::from(velocities[k].y)));
+        let w = each(|k| f64::from(spins[k]));
         let (px, py, spin) = (mul(mass, vx), mul(mass, vy), mul(inertia, w));
         self.momentum = [add(self.momentum[0], px), add(self.momentum[1], py)];
         self.moment = [add(self.moment[0], mul(mass, dx)), add(self.moment[1], mul(mass, dy))];
@@ -244,24 +257,24 @@ impl Kernel for SumBodies<'_> {
         let Self { bodies, range, setup } = self;
         let (positions, velocities) = (&bodies.position[range.clone()], &bodies.velocity[range.clone()]);
         let (spins, kinds) = (&bodies.angular_velocity[range.clone()], &bodies.kind[range]);
-        let low = setup.grid.min();
         let mut sums = WideSums::default();
-        let mut add = |first: usize, present: usize| {
-            // Where there are fewer than four, the others weigh nothing.
-            let at = |k: usize| first + if k < present { k } else { 0 };
-            let weight = |k: usize, weight: f32| if k < present { f64::from(weight) } else { 0.0 };
-            let mass = each(|k| weight(k, setup.kind(kinds[at(k)]).mass));
-            let inertia = each(|k| weight(k, setup.kind(kinds[at(k)]).inertia));
-            let place = [each(|k| positions[at(k)].x), each(|k| positions[at(k)].y)];
-            let from_low = [sub(place[0], [low.x; WIDTH]), sub(place[1], [low.y; WIDTH])];
-            let velocity = [each(|k| f64::from(velocities[at(k)].x)), each(|k| f64::from(velocities[at(k)].y))];
-            let spin = each(|k| f64::from(spins[at(k)]));
-            sums.add([mass, inertia], place, from_low, [velocity[0], velocity[1], spin]);
-        };
-        let whole = positions.len() / WIDTH * WIDTH;
-        (0..whole).step_by(WIDTH).for_each(|first| add(first, WIDTH));
-        if whole < positions.len() {
-            add(whole, positions.len() - whole);
+        let (positions, last_positions) = positions.as_chunks();
+        let (velocities, last_velocities) = velocities.as_chunks();
+        let (spins, last_spins) = spins.as_chunks();
+        let (kinds, last_kinds) = kinds.as_chunks();
+        for (((positions, velocities), spins), kinds) in positions.iter().zip(velocities).zip(spins).zip(kinds) {
+            let masses = kinds.map(|kind| setup.kind(kind).masses());
+            sums.add(masses, positions, velocities, spins, setup);
+        }
+        // Where there are fewer than four, the others weigh nothing.
+        let few = last_positions.len();
+        if few > 0 {
+            let (mut positions, mut velocities, mut spins) = ([DVec2::ZERO; WIDTH], [Vec2::ZERO; WIDTH], [0.0; WIDTH]);
+            positions[..few].copy_from_slice(last_positions);
+            velocities[..few].copy_from_slice(last_velocities);
+            spins[..few].copy_from_slice(last_spins);
+            let masses = std::array::from_fn(|k| last_kinds.get(k).map_or([0.0; 2], |&kind| setup.kind(kind).masses()));
+            sums.add(masses, &positions, &velocities, &spins, setup);
         }
         sums.total()
     }

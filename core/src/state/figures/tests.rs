@@ -77,8 +77,11 @@ fn manifolds_that_are_kept_tell_nearly_the_same() {
     let before = Facts::total(measure(&world, &mut Loopback).unwrap());
     let figures = figures_of_step(&mut world);
     assert!(figures.contacts.abs_diff(before.contacts) <= 3, "{} and {}", figures.contacts, before.contacts);
-    assert!((figures.mean_overlap() - before.mean_penetration).abs() < 0.1 * before.mean_penetration);
-    assert!((figures.max_overlap() - before.max_penetration).abs() < 0.1 * before.max_penetration);
+    // A manifold is kept while its bodies have moved less than this against each other, so no point is further off.
+    let off = Params::default().recycle_distance.into();
+    let told = [figures.mean_overlap(), figures.max_overlap(), before.mean_penetration, before.max_penetration];
+    assert!((told[0] - told[2]).abs() < off && (told[1] - told[3]).abs() < off, "{told:?}");
+    assert!(told[2] > 0.0 && figures.overlaps > 0, "{told:?}");
 }
 
 #[test]
@@ -103,7 +106,7 @@ fn ranks_and_threads_change_no_bit() {
         statics: Vec::new(),
     };
     let bodies = |i: u32| {
-        let position = DVec2::new(f64::from(i % 100) + 0.1, f64::from(i / 100) * 0.83);
+        let position = DVec2::new(f64::from(i % 100) + 0.1, f64::from(i / 100) * 0.5);
         let velocity = Vec2::new((i % 17) as f32 / 7.0 - 1.0, (i % 13) as f32 / 3.0 - 2.0);
         let body = Body::at_rest(GlobalId(u64::from(i)), KindId(i % 2), position);
         Body { velocity, angular_velocity: (i % 11) as f32 - 5.0, ..body }
