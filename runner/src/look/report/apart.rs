@@ -25,9 +25,13 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
     let verdict = match (&comparison.first_difference, comparison.steps.last()) {
         (_, None) => "They have recorded no step in common.".to_owned(),
         (None, _) if comparison.identical => "They are identical, bit for bit.".to_owned(),
-        (None, _) => "All that both have recorded is identical, bit for bit; not so how far they went, or how they ended.".to_owned(),
+        (None, _) => {
+            "All that both have recorded is identical, bit for bit; not so how far they went, or how they ended."
+                .to_owned()
+        }
         (Some(first), _) => {
-            let columns = if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
+            let columns =
+                if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
             format!("They first differ at step {}, in body {}{columns}.", first.step, first.id)
         }
     };

@@ -1,7 +1,10 @@
 //! Charts as SVG whose colors are the page's: lines over time, areas on top of each other, bars.
 
-use super::html::{Short, Text};
+use super::html::{Short, Text, Unit};
 use std::fmt::Write as _;
+
+/// Units that are written with each value, as they go with a prefix.
+const PREFIXED: [&str; 3] = ["J", "m", "B"];
 
 /// Of the drawing, in its own units.
 const WIDTH: f64 = 560.0;
@@ -72,7 +75,7 @@ pub(super) fn lines(axes: Axes<'_>, all: &[Series]) -> String {
         writeln!(drawing, "<path class=\"line{dash}\" style=\"stroke:var(--{})\" d=\"{path}\"/>", one.color)
             .expect("a string takes any text");
     }
-    let last = |one: &Series| one.points.last().map(|last| Short(last.1).to_string());
+    let last = |one: &Series| one.points.last().map(|last| written(last.1, axes.y));
     legend(&all, false, last) + &drawn(axes.title, HEIGHT, &drawing)
 }
 
@@ -100,8 +103,13 @@ pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
         let up: Vec<String> = at.iter().zip(&edges[1]).map(corner).collect();
         let down: Vec<String> = at.iter().zip(&edges[0]).rev().map(corner).collect();
         let path = [up, down].concat().join("L");
-        writeln!(drawing, "<path style=\"fill:var(--{})\" d=\"M{path}Z\"><title>{}</title></path>", one.color, Text(&one.name))
-            .expect("a string takes any text");
+        writeln!(
+            drawing,
+            "<path style=\"fill:var(--{})\" d=\"M{path}Z\"><title>{}</title></path>",
+            one.color,
+            Text(&one.name)
+        )
+        .expect("a string takes any text");
     }
     let share = |one: &Series| {
         let own = values(one);
@@ -125,16 +133,28 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
     let scale = (width - LEFT - RIGHT) / most;
     let mut drawing = String::new();
     let mut put = |text: String| drawing.push_str(&text);
-    for (value, label) in ticks(0.0, most, 8) {
+    for (value, label) in ticks(0.0, most, 8, axes.x) {
         let x = LEFT + value * scale;
         put(format!("<path class=\"grid-line\" d=\"M{x:.1} {TOP}V{:.1}\"/>", height - BOTTOM));
         put(format!("<text class=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{label}</text>\n", height - BOTTOM + 16.0));
     }
-    put(format!("<text class=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n", (LEFT + width) / 2.0, height - 4.0, Text(axes.x)));
+    if !PREFIXED.contains(&axes.x) {
+        put(format!(
+            "<text class=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n",
+            (LEFT + width) / 2.0,
+            height - 4.0,
+            Text(axes.x)
+        ));
+    }
     for (row, (name, parts)) in rows.iter().enumerate() {
         let y = TOP + row as f64 * pitch;
         if row.is_multiple_of(named) {
-            put(format!("<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, y + pitch / 2.0 + 4.0, Text(name)));
+            put(format!(
+                "<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                LEFT - 8.0,
+                y + pitch / 2.0 + 4.0,
+                Text(name)
+            ));
         }
         let mut x = LEFT;
         for (color, part, value) in parts {
@@ -158,7 +178,13 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
 /// The names of some series, and a value of each.
 pub(super) fn legend(all: &[Series], boxes: bool, value: impl Fn(&Series) -> Option<String>) -> String {
     let entry = |one: &Series| {
-        let class = if boxes { " box" } else if one.dashed { " dash" } else { "" };
+        let class = if boxes {
+            " box"
+        } else if one.dashed {
+            " dash"
+        } else {
+            ""
+        };
         let value = value(one).map(|value| format!(" <b>{value}</b>")).unwrap_or_default();
         format!("<li><i class=\"key{class}\" style=\"--c:var(--{})\"></i>{}{value}</li>", one.color, Text(&one.name))
     };
@@ -227,14 +253,14 @@ impl Plot {
         let mut put = |piece: String| text.push_str(&piece);
         let levels = match self.scale {
             Scale::Decades => decades(self.y.0, self.y.1),
-            _ => ticks(self.y.0, self.y.1, 5),
+            _ => ticks(self.y.0, self.y.1, 5, axes.y),
         };
         for (value, label) in levels {
             let y = if self.scale == Scale::Decades { self.y(10_f64.powf(value)) } else { self.y(value) };
             put(format!("<path class=\"grid-line\" d=\"M{LEFT} {y:.1}H{right}\"/>"));
             put(format!("<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{label}</text>\n", LEFT - 7.0, y + 4.0));
         }
-        for (value, label) in ticks(self.x.0, self.x.1, 6) {
+        for (value, label) in ticks(self.x.0, self.x.1, 6, axes.x) {
             let x = self.x(value);
             put(format!("<path class=\"axis\" d=\"M{x:.1} {bottom}v4\"/>"));
             put(format!("<text class=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{label}</text>\n", bottom + 17.0));
@@ -243,7 +269,12 @@ impl Plot {
         let middle = f64::midpoint(LEFT, right);
         put(format!("<text class=\"middle\" x=\"{middle:.1}\" y=\"{:.1}\">{}</text>\n", HEIGHT - 3.0, Text(axes.x)));
         let across = f64::midpoint(TOP, bottom);
-        put(format!("<text class=\"middle\" transform=\"translate(11 {across:.1}) rotate(-90)\">{}</text>\n", Text(axes.y)));
+        if !PREFIXED.contains(&axes.y) {
+            put(format!(
+                "<text class=\"middle\" transform=\"translate(11 {across:.1}) rotate(-90)\">{}</text>\n",
+                Text(axes.y)
+            ));
+        }
         text
     }
 }
@@ -257,7 +288,7 @@ fn padded(low: f64, high: f64) -> (f64, f64) {
 }
 
 /// Round numbers within bounds, and how they are written.
-fn ticks(low: f64, high: f64, most: usize) -> Vec<(f64, String)> {
+fn ticks(low: f64, high: f64, most: usize, unit: &str) -> Vec<(f64, String)> {
     let raw = (high - low) / most as f64;
     let power = 10_f64.powf(raw.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= raw * 0.999);
@@ -265,13 +296,19 @@ fn ticks(low: f64, high: f64, most: usize) -> Vec<(f64, String)> {
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
     let count = (last - first).clamp(0.0, 2.0 * most as f64) as usize;
     let value = |i: usize| (first + i as f64) * step;
-    (0..=count).map(|i| (value(i), format!("{:.4}", Short(value(i))))).collect()
+    (0..=count).map(|i| (value(i), written(value(i), unit))).collect()
+}
+
+/// A value as it stands beside an axis.
+fn written(value: f64, unit: &str) -> String {
+    if PREFIXED.contains(&unit) { format!("{:.4}", Unit(value, unit)) } else { format!("{:.4}", Short(value)) }
 }
 
 /// Powers of ten within bounds, which are their logarithms; the lowest stands for nothing.
 fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
     let every = ((high - low) / 7.0).ceil().max(1.0);
-    let label = |power: f64| if power == low { "0".to_owned() } else { format!("1e{power:.0}").replace('-', "\u{2212}") };
+    let label =
+        |power: f64| if power == low { "0".to_owned() } else { format!("1e{power:.0}").replace('-', "\u{2212}") };
     let count = ((high - low) / every) as usize;
     (0..=count).map(|i| low + i as f64 * every).map(|power| (power, label(power))).collect()
 }
