@@ -48,11 +48,11 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
         points: comparison.steps.iter().map(|step| (a.time(step.step as f64), step.differing as f64)).collect(),
     };
     let title = "Greatest deviation of any body";
-    let axes = Axes { title, x: "time, s", y: "deviation", scale: Scale::Decades };
+    let axes = Axes { title, x: "time, s", y: "deviation", scale: Scale::Decades, wide: false };
     let about = "On a scale of powers of ten; the lower edge stands for none at all.";
     let deviation = figure("deviation", false, title, about, &lines(axes, &LINES.map(series)));
     let title = "Bodies that differ";
-    let axes = Axes { title, x: "time, s", y: "bodies", scale: Scale::FromZero };
+    let axes = Axes { title, x: "time, s", y: "bodies", scale: Scale::FromZero, wide: false };
     let differing = figure("differing", false, title, "In any bit of what is recorded.", &lines(axes, &[share]));
     format!("{heading}<p>{}</p>\n<div class=\"grid\">\n{deviation}{differing}</div>\n", Text(&verdict))
 }

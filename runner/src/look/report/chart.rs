@@ -52,6 +52,8 @@ pub(super) struct Axes<'a> {
     pub y: &'a str,
     /// How values are laid out.
     pub scale: Scale,
+    /// Whether it is as wide as two.
+    pub wide: bool,
 }
 
 /// Lines over time, and what they are.
@@ -76,10 +78,10 @@ pub(super) fn lines(axes: Axes<'_>, all: &[Series]) -> String {
             .expect("a string takes any text");
     }
     let last = |one: &Series| one.points.last().map(|last| written(last.1, axes.y));
-    legend(&all, false, last) + &drawn(axes.title, HEIGHT, &drawing)
+    legend(&all, false, last) + &drawn(axes, HEIGHT, &drawing)
 }
 
-/// Areas on top of each other, the first at the bottom. All have values at the same places.
+/// Areas on top of each other, in milliseconds, the first at the bottom. All have values at the same places.
 pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
     let places: Vec<f64> = all.first().map_or_else(Vec::new, |one| one.points.iter().map(|point| point.0).collect());
     let groups = places.len().div_ceil(POINTS / 2).max(1);
@@ -113,9 +115,9 @@ pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
     }
     let share = |one: &Series| {
         let own = values(one);
-        (!own.is_empty()).then(|| Short(mean(&own)).to_string())
+        (!own.is_empty()).then(|| Unit(mean(&own) * 1e-3, "s").to_string())
     };
-    legend(all, true, share) + &drawn(axes.title, HEIGHT, &drawing)
+    legend(all, true, share) + &drawn(axes, HEIGHT, &drawing)
 }
 
 /// A bar for each row, made of parts beside each other; for each part its color, name and length.
@@ -129,7 +131,7 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
     let pitch = (600.0 / rows.len() as f64).clamp(3.0, 30.0);
     let named = (14.0 / pitch).ceil() as usize;
     let height = rows.len() as f64 * pitch + TOP + BOTTOM;
-    let width = 2.0 * WIDTH;
+    let width = width(axes);
     let scale = (width - LEFT - RIGHT) / most;
     let mut drawing = String::new();
     let mut put = |text: String| drawing.push_str(&text);
@@ -169,10 +171,7 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
         }
         put("\n".to_owned());
     }
-    format!(
-        "<svg viewBox=\"0 0 {width} {height:.0}\" role=\"img\" aria-label=\"{0}\"><title>{0}</title>\n{drawing}</svg>",
-        Text(axes.title)
-    )
+    drawn(axes, height, &drawing)
 }
 
 /// The names of some series, and a value of each.
@@ -195,15 +194,21 @@ fn nothing() -> String {
     "<p>no values</p>".to_owned()
 }
 
-fn drawn(title: &str, height: f64, drawing: &str) -> String {
-    let title = Text(title);
+/// Of a drawing.
+fn width(axes: Axes<'_>) -> f64 {
+    if axes.wide { 2.0 * WIDTH } else { WIDTH }
+}
+
+fn drawn(axes: Axes<'_>, height: f64, drawing: &str) -> String {
+    let (title, width) = (Text(axes.title), width(axes));
     format!(
-        "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title>\n{drawing}</svg>"
+        "<svg viewBox=\"0 0 {width} {height:.0}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title>\n{drawing}</svg>"
     )
 }
 
 /// Where values lie on a drawing.
 struct Plot {
+    width: f64,
     x: (f64, f64),
     y: (f64, f64),
     scale: Scale,
@@ -231,11 +236,11 @@ impl Plot {
             }
         };
         let x = if x.0 < x.1 { x } else { (x.0 - 0.5, x.1 + 0.5) };
-        Some(Self { x, y, scale: axes.scale })
+        Some(Self { width: width(axes), x, y, scale: axes.scale })
     }
 
     fn x(&self, x: f64) -> f64 {
-        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (self.width - LEFT - RIGHT)
     }
 
     fn y(&self, y: f64) -> f64 {
@@ -248,7 +253,7 @@ impl Plot {
 
     /// Lines of the grid, and what is written beside them.
     fn frame(&self, axes: Axes<'_>) -> String {
-        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        let (right, bottom) = (self.width - RIGHT, HEIGHT - BOTTOM);
         let mut text = String::new();
         let mut put = |piece: String| text.push_str(&piece);
         let levels = match self.scale {

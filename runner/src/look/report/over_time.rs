@@ -99,7 +99,7 @@ pub(super) fn of(sources: &[Source]) -> String {
             }
         }
         if !all.is_empty() {
-            let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale };
+            let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale, wide: false };
             text.push_str(&figure(name, false, title, about, &lines(axes, &all)));
         }
     }

@@ -81,10 +81,10 @@ fn over_run(sources: &[Source]) -> String {
         }
         let (run, about) = (
             of_run(sources, run),
-            "Mean over ranks, one phase on top of another; in the legend, the mean over the run in ms.",
+            "Mean over ranks, one phase on top of another; in the legend, its mean over the run.",
         );
         let title = title_of("Time per phase over the run", run);
-        let axes = Axes { title: &title, x: "time, s", y: "ms per step", scale: Scale::FromZero };
+        let axes = Axes { title: &title, x: "time, s", y: "ms per step", scale: Scale::FromZero, wide: run.is_none() };
         text += &figure(&name_of("phases", run), run.is_none(), &title, about, &areas(axes, &series));
     }
     text
@@ -111,7 +111,7 @@ fn together(
     if all.is_empty() {
         return String::new();
     }
-    let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale };
+    let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale, wide: false };
     figure(name, false, title, about, &lines(axes, &all))
 }
 
@@ -140,7 +140,7 @@ fn ranks(source: &Source, timings: &Columns, run: Option<&str>) -> String {
         }
     }
     let title = title_of("Time per phase of each rank", run);
-    let axes = Axes { title: &title, x: "ms per step", y: "rank", scale: Scale::FromZero };
+    let axes = Axes { title: &title, x: "ms per step", y: "rank", scale: Scale::FromZero, wide: true };
     let threads = source.number("threads").unwrap_or(source.config.run.threads as f64);
     let about = format!("A bar for each rank, mean over the run, in ms per step; {threads} threads each.");
     let content = super::chart::legend(&all, true, |_| None) + &bars(axes, &rows);
@@ -164,7 +164,7 @@ fn memory(sources: &[Source]) -> String {
     };
     let each: Vec<String> = sources.iter().filter_map(each).collect();
     let about = format!("The most held at once, summed over processes: {}.", each.join(" and "));
-    let axes = Axes { title: "Memory", x: "B", y: "run", scale: Scale::FromZero };
+    let axes = Axes { title: "Memory", x: "B", y: "run", scale: Scale::FromZero, wide: true };
     figure("memory", true, "Memory", &about, &bars(axes, &rows))
 }
 
