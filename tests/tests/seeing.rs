@@ -80,17 +80,23 @@ fn assert_nest(slices: &[Slice]) {
     }
 }
 
-/// A trace of two ranks with two threads each, which made `steps`.
-fn assert_whole(file: &Path, steps: &[u64]) {
+/// A trace of two ranks with two threads each, which made `steps`. Says which threads did anything.
+fn assert_whole(file: &Path, steps: &[u64]) -> Vec<(u64, u64)> {
     let (slices, names) = trace(file);
-    let threads: Vec<_> = slices.keys().copied().collect();
-    assert_eq!(threads, [(1, 1), (1, 2), (2, 1), (2, 2)]);
+    assert!(
+        slices.keys().all(|(rank, thread)| (1..=2).contains(rank) && (1..=2).contains(thread)),
+        "{:?}",
+        slices.keys()
+    );
     let expected = ["rank 0", "rank 1", "thread 0", "thread 1"];
     assert!(expected.iter().all(|name| names.contains(*name)), "{names:?}");
     slices.values().for_each(|slices| assert_nest(slices));
     for rank in [1, 2] {
-        let made: Vec<u64> =
-            slices[&(rank, 1)].iter().filter(|slice| slice.name == "step").filter_map(|one| one.args["step"].as_u64()).collect();
+        let made: Vec<u64> = slices[&(rank, 1)]
+            .iter()
+            .filter(|slice| slice.name == "step")
+            .filter_map(|one| one.args["step"].as_u64())
+            .collect();
         assert_eq!(made, steps, "rank {rank}");
         let of_rank = || slices.iter().filter(|(thread, _)| thread.0 == rank).flat_map(|(_, slices)| slices);
         let done: BTreeSet<&str> = of_rank().map(|slice| slice.name.as_str()).collect();
@@ -100,18 +106,29 @@ fn assert_whole(file: &Path, steps: &[u64]) {
         // Stages are of tiles.
         let stages = of_rank().filter(|slice| slice.name == "narrow_phase");
         assert!(stages.clone().count() > 0 && stages.clone().all(|slice| slice.args["tile"].as_u64() < Some(9)));
-        let in_exchange = slices[&(rank, 1)].windows(2).any(|pair| pair[0].name == "exchange" && pair[1].name == "wait");
+        let in_exchange =
+            slices[&(rank, 1)].windows(2).any(|pair| pair[0].name == "exchange" && pair[1].name == "wait");
         assert!(in_exchange, "waiting is a part of the exchange");
     }
+    slices.into_keys().collect()
 }
 
 #[test]
 fn a_trace_has_every_phase_of_every_thread_and_changes_nothing() {
     let desk = desk(SMALL);
     let options = "--ranks 2 --threads 2 --set exchange=substep --record-every 1 --quiet";
-    let with = atoll(desk.path(), &format!("run world.toml {options} --out a --trace t.json --trace-steps 3..5"));
-    assert_eq!((with.code, with.complaints().len()), (Some(0), 0), "{with}");
-    assert_whole(&desk.path().join("t.json"), &[3, 4]);
+    let mut threads = BTreeSet::new();
+    // A thread that comes too late for the little there is to do does nothing; not so every time.
+    for _ in 0..20 {
+        let line = format!("run world.toml {options} --out a --overwrite --trace t.json --trace-steps 3..5");
+        let with = atoll(desk.path(), &line);
+        assert_eq!((with.code, with.complaints().len()), (Some(0), 0), "{with}");
+        threads.extend(assert_whole(&desk.path().join("t.json"), &[3, 4]));
+        if threads.len() == 4 {
+            break;
+        }
+    }
+    assert_eq!(threads.into_iter().collect::<Vec<_>>(), [(1, 1), (1, 2), (2, 1), (2, 2)]);
     let without = atoll(desk.path(), &format!("run world.toml {options} --out b"));
     assert_eq!(without.code, Some(0), "{without}");
     let same = atoll(desk.path(), "diff a b");
@@ -127,7 +144,8 @@ fn ranks_in_processes_of_their_own_have_one_clock() {
     assert_eq!((ended.code, ended.complaints().len()), (Some(0), 0), "{ended}");
     assert_whole(&desk.path().join("t.json"), &(0..10).collect::<Vec<_>>());
     // Nobody leaves a step's first exchange before all have entered it.
-    let doubt = 2.0 * program::summary(&desk.path().join("t.json"))["otherData"]["clocks_differ_by_at_most_us"].as_f64().unwrap();
+    let doubt = 2.0
+        * program::summary(&desk.path().join("t.json"))["otherData"]["clocks_differ_by_at_most_us"].as_f64().unwrap();
     let (slices, _) = trace(&desk.path().join("t.json"));
     let waits = |rank| slices[&(rank, 1)].iter().filter(|slice| slice.name == "wait");
     for (a, b) in waits(1).zip(waits(2)) {
@@ -141,21 +159,33 @@ fn a_trace_is_of_the_steps_that_were_made() {
     let tell = |line: &str| atoll(desk.path(), &format!("run world.toml --quiet --trace t.json {line}"));
     let none = tell("--trace-steps 90..95");
     assert_eq!(none.code, Some(0), "{none}");
-    let expected = "atoll: --trace: none of the steps that were to be traced was made; choose others with --trace-steps";
+    let expected =
+        "atoll: --trace: none of the steps that were to be traced was made; choose others with --trace-steps";
     assert_eq!(none.complaints(), [expected]);
     assert!(trace(&desk.path().join("t.json")).0.is_empty());
     // Whatever log lines are asked for.
-    let quiet = run(program::command()
-        .current_dir(desk.path())
-        .env("RUST_LOG", "off")
-        .args(["run", "world.toml", "--quiet", "--trace", "t.json"]));
+    let quiet = run(program::command().current_dir(desk.path()).env("RUST_LOG", "off").args([
+        "run",
+        "world.toml",
+        "--quiet",
+        "--trace",
+        "t.json",
+    ]));
     assert_eq!((quiet.code, quiet.complaints().len()), (Some(0), 0), "{quiet}");
     let (slices, _) = trace(&desk.path().join("t.json"));
     assert_eq!(slices[&(1, 1)].iter().filter(|slice| slice.name == "step").count(), 10);
     for (line, code, expected) in [
-        ("--trace-steps 5..5", 2, "atoll: invalid value '5..5' for '--trace-steps <A..B>': write A..B, such as 100..110"),
+        (
+            "--trace-steps 5..5",
+            2,
+            "atoll: invalid value '5..5' for '--trace-steps <A..B>': write A..B, such as 100..110",
+        ),
         ("--json t.json", 2, "atoll: --trace t.json: --json writes to the same file"),
-        ("--trace-steps 1..2 --trace /nowhere/t.json", 2, "atoll: the argument '--trace <FILE>' cannot be used multiple times"),
+        (
+            "--trace-steps 1..2 --trace /nowhere/t.json",
+            2,
+            "atoll: the argument '--trace <FILE>' cannot be used multiple times",
+        ),
     ] {
         let ended = tell(line);
         assert_eq!(ended.code, Some(code), "{ended}");
@@ -167,8 +197,19 @@ fn a_trace_is_of_the_steps_that_were_made() {
 
 /// Figures of a page about one run that has recorded and logged.
 const FIGURES: [&str; 13] = [
-    "first_picture", "last_picture", "energy", "contacts", "overlap", "momentum", "angular_momentum", "islands", "tiles", "phases",
-    "step_time", "balance", "ranks",
+    "first_picture",
+    "last_picture",
+    "energy",
+    "contacts",
+    "overlap",
+    "momentum",
+    "angular_momentum",
+    "islands",
+    "tiles",
+    "phases",
+    "step_time",
+    "balance",
+    "ranks",
 ];
 
 /// A browser without a window. One that was named must be there.
@@ -177,7 +218,12 @@ fn browser() -> Option<OsString> {
     let usual = ["chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"];
     let names = named.clone().map_or_else(|| usual.map(OsString::from).to_vec(), |named| vec![named]);
     let runs = |name: &OsString| {
-        let command = Command::new(name).arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let command = Command::new(name)
+            .arg("--version")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
         command.is_ok_and(|status| status.success())
     };
     let found = names.into_iter().find(runs);
@@ -192,8 +238,20 @@ fn opened(browser: &OsString, page: &Path) -> String {
     listener.set_nonblocking(true).unwrap();
     let profile = tempdir().unwrap();
     let mut command = Command::new(browser);
-    command.args(["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--disable-background-networking"]);
-    command.args(["--disable-component-update", "--no-first-run", "--disable-sync", "--enable-logging=stderr", "--v=0"]);
+    command.args([
+        "--headless",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--disable-background-networking",
+    ]);
+    command.args([
+        "--disable-component-update",
+        "--no-first-run",
+        "--disable-sync",
+        "--enable-logging=stderr",
+        "--v=0",
+    ]);
     command.arg(format!("--user-data-dir={}", profile.path().display()));
     command.arg(format!("--proxy-server=http://{}", listener.local_addr().unwrap()));
     command.arg("--proxy-bypass-list=<-loopback>");

@@ -4,6 +4,6 @@ pub mod compare;
 pub(crate) mod film;
 pub(crate) mod frame;
 pub(crate) mod picture;
-pub(crate) mod report;
 pub(crate) mod recorded;
+pub(crate) mod report;
 pub(crate) mod vtk;

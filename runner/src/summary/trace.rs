@@ -28,7 +28,8 @@ pub(crate) fn to_json(summary: &Summary, ranks: &[RankTrace]) -> Vec<u8> {
         let comma = if std::mem::take(&mut first) { "" } else { "," };
         write!(text, "{comma}\n{event}").expect("memory takes any text");
     };
-    write!(text, "{{\"displayTimeUnit\":\"ms\",\"otherData\":{about},\"traceEvents\":[").expect("memory takes any text");
+    write!(text, "{{\"displayTimeUnit\":\"ms\",\"otherData\":{about},\"traceEvents\":[")
+        .expect("memory takes any text");
     for (rank, trace) in ranks.iter().enumerate() {
         let pid = rank + 1;
         let named = |what: &str, tid: usize, args: Value| json!({"ph": "M", "name": what, "pid": pid, "tid": tid, "args": args});
@@ -48,7 +49,9 @@ pub(crate) fn to_json(summary: &Summary, ranks: &[RankTrace]) -> Vec<u8> {
             let args = slice.of.map(|(key, value)| format!(",\"args\":{{{}:{value}}}", word(key))).unwrap_or_default();
             line(
                 &mut text,
-                format_args!("{{\"ph\":\"X\",\"name\":{name},\"pid\":{pid},\"tid\":{tid},\"ts\":{start},\"dur\":{length}{args}}}"),
+                format_args!(
+                    "{{\"ph\":\"X\",\"name\":{name},\"pid\":{pid},\"tid\":{tid},\"ts\":{start},\"dur\":{length}{args}}}"
+                ),
             );
         }
     }

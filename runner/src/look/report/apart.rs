@@ -25,9 +25,13 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
     let verdict = match (&comparison.first_difference, comparison.steps.last()) {
         (_, None) => "They have recorded no step in common.".to_owned(),
         (None, _) if comparison.identical => "They are identical, bit for bit.".to_owned(),
-        (None, _) => "All that both have recorded is identical, bit for bit; not so how far they went, or how they ended.".to_owned(),
+        (None, _) => {
+            "All that both have recorded is identical, bit for bit; not so how far they went, or how they ended."
+                .to_owned()
+        }
         (Some(first), _) => {
-            let columns = if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
+            let columns =
+                if first.columns.is_empty() { String::new() } else { format!(", in {}", first.columns.join(", ")) };
             format!("They first differ at step {}, in body {}{columns}.", first.step, first.id)
         }
     };
@@ -44,11 +48,11 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
         points: comparison.steps.iter().map(|step| (a.time(step.step as f64), step.differing as f64)).collect(),
     };
     let title = "Greatest deviation of any body";
-    let axes = Axes { title, x: "time, s", y: "deviation", scale: Scale::Decades };
+    let axes = Axes { title, x: "time, s", y: "deviation", scale: Scale::Decades, wide: false };
     let about = "On a scale of powers of ten; the lower edge stands for none at all.";
     let deviation = figure("deviation", false, title, about, &lines(axes, &LINES.map(series)));
     let title = "Bodies that differ";
-    let axes = Axes { title, x: "time, s", y: "bodies", scale: Scale::FromZero };
+    let axes = Axes { title, x: "time, s", y: "bodies", scale: Scale::FromZero, wide: false };
     let differing = figure("differing", false, title, "In any bit of what is recorded.", &lines(axes, &[share]));
     format!("{heading}<p>{}</p>\n<div class=\"grid\">\n{deviation}{differing}</div>\n", Text(&verdict))
 }

@@ -1,7 +1,10 @@
 //! Charts as SVG whose colors are the page's: lines over time, areas on top of each other, bars.
 
-use super::html::{Short, Text};
+use super::html::{Short, Text, Unit};
 use std::fmt::Write as _;
+
+/// Units that are written with each value, as they go with a prefix.
+const PREFIXED: [&str; 3] = ["J", "m", "B"];
 
 /// Of the drawing, in its own units.
 const WIDTH: f64 = 560.0;
@@ -49,6 +52,8 @@ pub(super) struct Axes<'a> {
     pub y: &'a str,
     /// How values are laid out.
     pub scale: Scale,
+    /// Whether it is as wide as two.
+    pub wide: bool,
 }
 
 /// Lines over time, and what they are.
@@ -72,11 +77,11 @@ pub(super) fn lines(axes: Axes<'_>, all: &[Series]) -> String {
         writeln!(drawing, "<path class=\"line{dash}\" style=\"stroke:var(--{})\" d=\"{path}\"/>", one.color)
             .expect("a string takes any text");
     }
-    let last = |one: &Series| one.points.last().map(|last| Short(last.1).to_string());
-    legend(&all, false, last) + &drawn(axes.title, HEIGHT, &drawing)
+    let last = |one: &Series| one.points.last().map(|last| written(last.1, axes.y));
+    legend(&all, false, last) + &drawn(axes, HEIGHT, &drawing)
 }
 
-/// Areas on top of each other, the first at the bottom. All have values at the same places.
+/// Areas on top of each other, in milliseconds, the first at the bottom. All have values at the same places.
 pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
     let places: Vec<f64> = all.first().map_or_else(Vec::new, |one| one.points.iter().map(|point| point.0).collect());
     let groups = places.len().div_ceil(POINTS / 2).max(1);
@@ -100,14 +105,19 @@ pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
         let up: Vec<String> = at.iter().zip(&edges[1]).map(corner).collect();
         let down: Vec<String> = at.iter().zip(&edges[0]).rev().map(corner).collect();
         let path = [up, down].concat().join("L");
-        writeln!(drawing, "<path style=\"fill:var(--{})\" d=\"M{path}Z\"><title>{}</title></path>", one.color, Text(&one.name))
-            .expect("a string takes any text");
+        writeln!(
+            drawing,
+            "<path style=\"fill:var(--{})\" d=\"M{path}Z\"><title>{}</title></path>",
+            one.color,
+            Text(&one.name)
+        )
+        .expect("a string takes any text");
     }
     let share = |one: &Series| {
         let own = values(one);
-        (!own.is_empty()).then(|| Short(mean(&own)).to_string())
+        (!own.is_empty()).then(|| Unit(mean(&own) * 1e-3, "s").to_string())
     };
-    legend(all, true, share) + &drawn(axes.title, HEIGHT, &drawing)
+    legend(all, true, share) + &drawn(axes, HEIGHT, &drawing)
 }
 
 /// A bar for each row, made of parts beside each other; for each part its color, name and length.
@@ -121,20 +131,32 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
     let pitch = (600.0 / rows.len() as f64).clamp(3.0, 30.0);
     let named = (14.0 / pitch).ceil() as usize;
     let height = rows.len() as f64 * pitch + TOP + BOTTOM;
-    let width = 2.0 * WIDTH;
+    let width = width(axes);
     let scale = (width - LEFT - RIGHT) / most;
     let mut drawing = String::new();
     let mut put = |text: String| drawing.push_str(&text);
-    for (value, label) in ticks(0.0, most, 8) {
+    for (value, label) in ticks(0.0, most, 8, axes.x) {
         let x = LEFT + value * scale;
         put(format!("<path class=\"grid-line\" d=\"M{x:.1} {TOP}V{:.1}\"/>", height - BOTTOM));
         put(format!("<text class=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{label}</text>\n", height - BOTTOM + 16.0));
     }
-    put(format!("<text class=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n", (LEFT + width) / 2.0, height - 4.0, Text(axes.x)));
+    if !PREFIXED.contains(&axes.x) {
+        put(format!(
+            "<text class=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n",
+            (LEFT + width) / 2.0,
+            height - 4.0,
+            Text(axes.x)
+        ));
+    }
     for (row, (name, parts)) in rows.iter().enumerate() {
         let y = TOP + row as f64 * pitch;
         if row.is_multiple_of(named) {
-            put(format!("<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, y + pitch / 2.0 + 4.0, Text(name)));
+            put(format!(
+                "<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                LEFT - 8.0,
+                y + pitch / 2.0 + 4.0,
+                Text(name)
+            ));
         }
         let mut x = LEFT;
         for (color, part, value) in parts {
@@ -149,16 +171,19 @@ pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]
         }
         put("\n".to_owned());
     }
-    format!(
-        "<svg viewBox=\"0 0 {width} {height:.0}\" role=\"img\" aria-label=\"{0}\"><title>{0}</title>\n{drawing}</svg>",
-        Text(axes.title)
-    )
+    drawn(axes, height, &drawing)
 }
 
 /// The names of some series, and a value of each.
 pub(super) fn legend(all: &[Series], boxes: bool, value: impl Fn(&Series) -> Option<String>) -> String {
     let entry = |one: &Series| {
-        let class = if boxes { " box" } else if one.dashed { " dash" } else { "" };
+        let class = if boxes {
+            " box"
+        } else if one.dashed {
+            " dash"
+        } else {
+            ""
+        };
         let value = value(one).map(|value| format!(" <b>{value}</b>")).unwrap_or_default();
         format!("<li><i class=\"key{class}\" style=\"--c:var(--{})\"></i>{}{value}</li>", one.color, Text(&one.name))
     };
@@ -169,15 +194,21 @@ fn nothing() -> String {
     "<p>no values</p>".to_owned()
 }
 
-fn drawn(title: &str, height: f64, drawing: &str) -> String {
-    let title = Text(title);
+/// Of a drawing.
+fn width(axes: Axes<'_>) -> f64 {
+    if axes.wide { 2.0 * WIDTH } else { WIDTH }
+}
+
+fn drawn(axes: Axes<'_>, height: f64, drawing: &str) -> String {
+    let (title, width) = (Text(axes.title), width(axes));
     format!(
-        "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title>\n{drawing}</svg>"
+        "<svg viewBox=\"0 0 {width} {height:.0}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title>\n{drawing}</svg>"
     )
 }
 
 /// Where values lie on a drawing.
 struct Plot {
+    width: f64,
     x: (f64, f64),
     y: (f64, f64),
     scale: Scale,
@@ -205,11 +236,11 @@ impl Plot {
             }
         };
         let x = if x.0 < x.1 { x } else { (x.0 - 0.5, x.1 + 0.5) };
-        Some(Self { x, y, scale: axes.scale })
+        Some(Self { width: width(axes), x, y, scale: axes.scale })
     }
 
     fn x(&self, x: f64) -> f64 {
-        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (self.width - LEFT - RIGHT)
     }
 
     fn y(&self, y: f64) -> f64 {
@@ -222,19 +253,19 @@ impl Plot {
 
     /// Lines of the grid, and what is written beside them.
     fn frame(&self, axes: Axes<'_>) -> String {
-        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        let (right, bottom) = (self.width - RIGHT, HEIGHT - BOTTOM);
         let mut text = String::new();
         let mut put = |piece: String| text.push_str(&piece);
         let levels = match self.scale {
             Scale::Decades => decades(self.y.0, self.y.1),
-            _ => ticks(self.y.0, self.y.1, 5),
+            _ => ticks(self.y.0, self.y.1, 5, axes.y),
         };
         for (value, label) in levels {
             let y = if self.scale == Scale::Decades { self.y(10_f64.powf(value)) } else { self.y(value) };
             put(format!("<path class=\"grid-line\" d=\"M{LEFT} {y:.1}H{right}\"/>"));
             put(format!("<text class=\"end\" x=\"{:.1}\" y=\"{:.1}\">{label}</text>\n", LEFT - 7.0, y + 4.0));
         }
-        for (value, label) in ticks(self.x.0, self.x.1, 6) {
+        for (value, label) in ticks(self.x.0, self.x.1, 6, axes.x) {
             let x = self.x(value);
             put(format!("<path class=\"axis\" d=\"M{x:.1} {bottom}v4\"/>"));
             put(format!("<text class=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{label}</text>\n", bottom + 17.0));
@@ -243,7 +274,12 @@ impl Plot {
         let middle = f64::midpoint(LEFT, right);
         put(format!("<text class=\"middle\" x=\"{middle:.1}\" y=\"{:.1}\">{}</text>\n", HEIGHT - 3.0, Text(axes.x)));
         let across = f64::midpoint(TOP, bottom);
-        put(format!("<text class=\"middle\" transform=\"translate(11 {across:.1}) rotate(-90)\">{}</text>\n", Text(axes.y)));
+        if !PREFIXED.contains(&axes.y) {
+            put(format!(
+                "<text class=\"middle\" transform=\"translate(11 {across:.1}) rotate(-90)\">{}</text>\n",
+                Text(axes.y)
+            ));
+        }
         text
     }
 }
@@ -257,7 +293,7 @@ fn padded(low: f64, high: f64) -> (f64, f64) {
 }
 
 /// Round numbers within bounds, and how they are written.
-fn ticks(low: f64, high: f64, most: usize) -> Vec<(f64, String)> {
+fn ticks(low: f64, high: f64, most: usize, unit: &str) -> Vec<(f64, String)> {
     let raw = (high - low) / most as f64;
     let power = 10_f64.powf(raw.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= raw * 0.999);
@@ -265,13 +301,19 @@ fn ticks(low: f64, high: f64, most: usize) -> Vec<(f64, String)> {
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
     let count = (last - first).clamp(0.0, 2.0 * most as f64) as usize;
     let value = |i: usize| (first + i as f64) * step;
-    (0..=count).map(|i| (value(i), format!("{:.4}", Short(value(i))))).collect()
+    (0..=count).map(|i| (value(i), written(value(i), unit))).collect()
+}
+
+/// A value as it stands beside an axis.
+fn written(value: f64, unit: &str) -> String {
+    if PREFIXED.contains(&unit) { format!("{:.4}", Unit(value, unit)) } else { format!("{:.4}", Short(value)) }
 }
 
 /// Powers of ten within bounds, which are their logarithms; the lowest stands for nothing.
 fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
     let every = ((high - low) / 7.0).ceil().max(1.0);
-    let label = |power: f64| if power == low { "0".to_owned() } else { format!("1e{power:.0}").replace('-', "\u{2212}") };
+    let label =
+        |power: f64| if power == low { "0".to_owned() } else { format!("1e{power:.0}").replace('-', "\u{2212}") };
     let count = ((high - low) / every) as usize;
     (0..=count).map(|i| low + i as f64 * every).map(|power| (power, label(power))).collect()
 }

@@ -1,6 +1,6 @@
 //! What was run, and on what; how it ended; its configuration.
 
-use super::html::{Short, Text, Whole, table};
+use super::html::{Short, Text, Unit, Whole, table};
 use super::letter;
 use super::source::Source;
 use crate::config;
@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 
 /// What the page is called.
 pub(super) fn title(sources: &[Source]) -> String {
-    let scene = |source: &Source| format!("{}, {} bodies", source.config.scene.kind.name(), Whole(source.config.scene.bodies));
+    let scene =
+        |source: &Source| format!("{}, {} bodies", source.config.scene.kind.name(), Whole(source.config.scene.bodies));
     match sources {
         [a, b] if scene(a) == scene(b) => format!("Two runs of {}", scene(a)),
         [a, b] => format!("{} and {}", scene(a), scene(b)),
@@ -20,14 +21,19 @@ pub(super) fn title(sources: &[Source]) -> String {
 pub(super) fn of(sources: &[Source]) -> String {
     let mut text = format!("<header><h1>{}</h1>", Text(&title(sources)));
     if let [one] = sources {
-        write!(text, "<p>{}, in <code>{}</code></p>", Text(&ended(one)), Text(&one.name)).expect("a string takes any text");
+        write!(text, "<p>{}, in <code>{}</code></p>", Text(&ended(one)), Text(&one.name))
+            .expect("a string takes any text");
     } else {
         text.push_str("<div class=\"runs\">");
         for (run, one) in sources.iter().enumerate() {
             let dash = if run > 0 { " dash" } else { "" };
             let (letter, name) = (letter(run), Text(&one.name));
-            write!(text, "<p><i class=\"key{dash}\"></i><b>{letter}</b> <code>{name}</code>, {}</p>", Text(&ended(one)))
-                .expect("a string takes any text");
+            write!(
+                text,
+                "<p><i class=\"key{dash}\"></i><b>{letter}</b> <code>{name}</code>, {}</p>",
+                Text(&ended(one))
+            )
+            .expect("a string takes any text");
         }
         text.push_str("</div>");
     }
@@ -60,13 +66,17 @@ fn missing(source: &Source) -> String {
         writeln!(text, "<p class=\"note\"><code>{name}</code>: {what}</p>").expect("a string takes any text");
     };
     match (&source.summary, &source.damaged) {
-        (None, None) => say("the run is under way or was killed, so there is no <code>summary.json</code> and no closing \
-                            figures; <code>atoll run --resume</code> brings it to its end."),
+        (None, None) => {
+            say("the run is under way or was killed, so there is no <code>summary.json</code> and no closing \
+                            figures; <code>atoll run --resume</code> brings it to its end.")
+        }
         (None, Some(_)) => say("<code>summary.json</code> cannot be read, so there are no closing figures."),
         _ => {}
     }
     if source.log.is_none() {
-        say("there is no <code>log.csv</code>, so there are no figures over time; a run writes it with <code>--out</code>.");
+        say(
+            "there is no <code>log.csv</code>, so there are no figures over time; a run writes it with <code>--out</code>.",
+        );
     }
     if source.timings.is_none() && source.summary.is_some() {
         say("there is no <code>timings.csv</code>, so the time of each rank is unknown; a run writes it with \
@@ -86,7 +96,7 @@ fn key_figures(source: &Source) -> String {
     };
     let number = |key| source.number(key);
     if let Some(steps) = source.steps() {
-        tile("Steps", Whole(steps).to_string(), format!("{} s of the world", Short(source.time(steps as f64))));
+        tile("Steps", Whole(steps).to_string(), format!("{} of the world", Unit(source.time(steps as f64), "s")));
     }
     if let Some((ms, wall)) = number("ms_per_step").zip(number("wall_s")) {
         tile("Per step", format!("{} ms", Short3(ms)), format!("{} s in all", Short3(wall)));
@@ -99,11 +109,11 @@ fn key_figures(source: &Source) -> String {
         tile("Contacts", Whole(contacts as u64).to_string(), format!("{:.2} % across tiles", 100.0 * border));
     }
     if let Some((most, mean)) = number("max_penetration").zip(number("mean_penetration")) {
-        tile("Deepest overlap", format!("{}m", Short(most)), format!("{}m on the average", Short(mean)));
+        tile("Deepest overlap", Unit(most, "m").to_string(), format!("mean {}", Unit(mean, "m")));
     }
     if let Some(bytes) = number("peak_rss_bytes") {
         let each = bytes / (source.config.scene.bodies as f64).max(1.0);
-        tile("Memory", format!("{}B", Short(bytes)), format!("{}B per body", Short(each)));
+        tile("Memory", Unit(bytes, "B").to_string(), format!("{} per body", Unit(each, "B")));
     }
     text + "</div>\n"
 }
@@ -131,16 +141,13 @@ fn facts(sources: &[Source]) -> String {
     fn whole(source: &Source, key: &str) -> Option<String> {
         source.number(key).map(|number| Whole(number as u64).to_string())
     }
-    fn plain(source: &Source, key: &str) -> Option<String> {
-        source.number(key).map(|number| format!("{}", Short(number)))
-    }
     let rows: [(&str, Fact); 19] = [
         ("Scene", |source| Some(source.config.scene.kind.name().to_owned())),
         ("Seed", |source| Some(source.config.scene.seed.to_string())),
         ("Bodies", |source| Some(Whole(source.config.scene.bodies).to_string())),
         ("Steps", |source| {
             let (made, all) = (source.steps()?, source.config.run.steps);
-            Some(format!("{} of {}, {} s each", Whole(made), Whole(all), Short(source.time(1.0))))
+            Some(format!("{} of {}, {} each", Whole(made), Whole(all), Unit(source.time(1.0), "s")))
         }),
         ("Tiles", |source| Some(source.tiles().map(|tiles| tiles.to_string()).join(" \u{d7} "))),
         ("Ranks and threads", |source| {
@@ -160,16 +167,16 @@ fn facts(sources: &[Source]) -> String {
             let asleep = asleep.map(|asleep| format!(", {asleep} bodies asleep")).unwrap_or_default();
             Some(format!("{islands}, the largest of {largest} bodies{asleep}"))
         }),
-        ("Mass, kg", |source| plain(source, "mass")),
-        ("Kinetic energy, J", |source| plain(source, "kinetic_energy")),
+        ("Mass", |source| Some(Unit(source.number("mass")? * 1e3, "g").to_string())),
+        ("Kinetic energy", |source| Some(Unit(source.number("kinetic_energy")?, "J").to_string())),
         ("Sent between ranks", |source| {
             let (bytes, messages) = (source.number("bytes_sent")?, whole(source, "messages_sent")?);
-            Some(format!("{}B in {messages} messages", Short(bytes)))
+            Some(format!("{} in {messages} messages", Unit(bytes, "B")))
         }),
         ("Migrations", |source| whole(source, "migrations")),
-        ("Memory at most", |source| Some(format!("{}B", Short(source.number("peak_rss_bytes")?)))),
+        ("Memory at most", |source| Some(Unit(source.number("peak_rss_bytes")?, "B").to_string())),
         ("On disk", |source| {
-            let [recording, snapshots] = source.size.map(|size| format!("{}B", Short(size as f64)));
+            let [recording, snapshots] = source.size.map(|size| Unit(size as f64, "B").to_string());
             let records = source.recording.as_ref().map_or(0, |recording| recording.steps().len());
             Some(format!("{records} records in {recording}, snapshots in {snapshots}"))
         }),

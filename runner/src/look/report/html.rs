@@ -16,7 +16,9 @@ impl Display for Text<'_> {
                 '\'' => f.write_str("&#39;")?,
                 '\n' | '\t' => f.write_char(letter)?,
                 // HTML has no place for these, and some turn the direction of what stands around them.
-                letter if letter.is_control() || ('\u{202a}'..='\u{202e}').contains(&letter) => f.write_char('\u{fffd}')?,
+                letter if letter.is_control() || ('\u{202a}'..='\u{202e}').contains(&letter) => {
+                    f.write_char('\u{fffd}')?
+                }
                 letter if ('\u{2066}'..='\u{2069}').contains(&letter) => f.write_char('\u{fffd}')?,
                 letter => f.write_char(letter)?,
             }
@@ -30,20 +32,38 @@ pub(super) struct Short(pub f64);
 
 impl Display for Short {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (number, suffix) = self.parts(f.precision().unwrap_or(3));
+        write!(f, "{number}{suffix}")
+    }
+}
+
+/// A number with its unit: `12.3 km`.
+pub(super) struct Unit<'a>(pub f64, pub &'a str);
+
+impl Display for Unit<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (number, suffix) = Short(self.0).parts(f.precision().unwrap_or(3));
+        write!(f, "{number}\u{a0}{suffix}{}", self.1)
+    }
+}
+
+impl Short {
+    /// The number, to so many digits, and the suffix.
+    fn parts(&self, digits: usize) -> (String, &'static str) {
         const SUFFIXES: [&str; 9] = ["p", "n", "\u{b5}", "m", "", "k", "M", "G", "T"];
         let size = self.0.abs();
         if size == 0.0 {
-            return f.write_str("0");
+            return ("0".to_owned(), "");
         }
         let thousands = (size.log10() / 3.0 + 1e-12).floor();
         if !size.is_finite() || !(-4.0..=4.0).contains(&thousands) {
-            return write!(f, "{:.2e}", self.0);
+            return (format!("{:.2e}", self.0).replace('-', "\u{2212}"), "");
         }
         let scaled = self.0 / 1000_f64.powf(thousands);
-        let places = f.precision().unwrap_or(3).saturating_sub(1 + scaled.abs().log10().max(0.0) as usize);
+        let places = digits.saturating_sub(1 + scaled.abs().log10().max(0.0) as usize);
         let text = format!("{scaled:.places$}");
         let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        write!(f, "{}{}", text.replace('-', "\u{2212}"), SUFFIXES[(thousands + 4.0) as usize])
+        (text.replace('-', "\u{2212}"), SUFFIXES[(thousands + 4.0) as usize])
     }
 }
 
@@ -114,6 +134,7 @@ mod tests {
         ] {
             assert_eq!(short(value), expected);
         }
+        assert_eq!(Unit(0.0167, "s").to_string(), "16.7\u{a0}ms");
         assert_eq!(Whole(1_234_567).to_string() + &Whole(12).to_string(), "1,234,56712");
     }
 }

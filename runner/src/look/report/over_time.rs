@@ -7,7 +7,14 @@ use super::letter;
 use super::source::Source;
 
 /// A chart: its name, title, unit, what there is to know, how it is laid out, and its lines: column, words, color.
-type Chart = (&'static str, &'static str, &'static str, &'static str, Scale, &'static [(&'static str, &'static str, &'static str)]);
+type Chart = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static str,
+    Scale,
+    &'static [(&'static str, &'static str, &'static str)],
+);
 
 const CHARTS: [Chart; 8] = [
     (
@@ -56,7 +63,11 @@ const CHARTS: [Chart; 8] = [
         "count",
         "Groups of bodies in contact, bodies in the largest, and bodies that sleep.",
         Scale::FromZero,
-        &[("islands", "islands", "s0"), ("largest_island", "bodies in the largest", "s1"), ("asleep", "bodies asleep", "s2")],
+        &[
+            ("islands", "islands", "s0"),
+            ("largest_island", "bodies in the largest", "s1"),
+            ("asleep", "bodies asleep", "s2"),
+        ],
     ),
     (
         "tiles",
@@ -66,14 +77,7 @@ const CHARTS: [Chart; 8] = [
         Scale::FromZero,
         &[("ghosts", "ghosts", "s0"), ("migrations", "migrations", "s4")],
     ),
-    (
-        "bodies",
-        "Bodies",
-        "bodies",
-        "None is ever lost.",
-        Scale::FromZero,
-        &[("bodies", "bodies", "s2")],
-    ),
+    ("bodies", "Bodies", "bodies", "None is ever lost.", Scale::FromZero, &[("bodies", "bodies", "s2")]),
 ];
 
 /// Stands for the sum of both energies.
@@ -95,7 +99,7 @@ pub(super) fn of(sources: &[Source]) -> String {
             }
         }
         if !all.is_empty() {
-            let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale };
+            let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale, wide: false };
             text.push_str(&figure(name, false, title, about, &lines(axes, &all)));
         }
     }

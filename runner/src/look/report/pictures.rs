@@ -68,8 +68,14 @@ pub(super) fn of(sources: &[Source], pictures: &[Option<Pictures>]) -> String {
             let title = format!("{}{of}", if i == 0 { "First record" } else { "Last record" });
             let about = format!("After step {}, {:.2} s.", Whole(*step), source.time(*step as f64));
             let mut image = String::new();
-            write!(image, "<img alt=\"{}, {}\" src=\"data:image/png;base64,{}\">", Text(&title), Text(&about), base64(png))
-                .expect("a string takes any text");
+            write!(
+                image,
+                "<img alt=\"{}, {}\" src=\"data:image/png;base64,{}\">",
+                Text(&title),
+                Text(&about),
+                base64(png)
+            )
+            .expect("a string takes any text");
             text += &figure(&format!("{which}_picture{name}"), false, &title, &about, &image);
         }
     }

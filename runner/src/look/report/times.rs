@@ -2,7 +2,7 @@
 
 use super::chart::{Axes, Scale, Series, areas, bars, lines};
 use super::columns::Columns;
-use super::html::figure;
+use super::html::{Unit, figure};
 use super::letter;
 use super::over_time::{points, times};
 use super::source::Source;
@@ -31,7 +31,8 @@ const PREFIX: &str = "ms_";
 /// All there is to tell of time.
 pub(super) fn of(sources: &[Source]) -> String {
     let mut figures = over_run(sources);
-    figures += &together(sources, "step_time", "Time per step", "ms", "Of the wall clock.", Scale::FromZero, "ms_per_step");
+    figures +=
+        &together(sources, "step_time", "Time per step", "ms", "Of the wall clock.", Scale::FromZero, "ms_per_step");
     let about = "The busy time of the slowest rank to the mean of all: 1 is perfect balance.";
     figures += &together(sources, "balance", "Balance", "slowest to mean", about, Scale::AsFar, "busiest_to_mean");
     for (run, source) in sources.iter().enumerate() {
@@ -40,7 +41,11 @@ pub(super) fn of(sources: &[Source]) -> String {
         }
     }
     figures += &memory(sources);
-    if figures.is_empty() { figures } else { format!("<h2>Where the time went</h2>\n<div class=\"grid\">\n{figures}</div>\n") }
+    if figures.is_empty() {
+        figures
+    } else {
+        format!("<h2>Where the time went</h2>\n<div class=\"grid\">\n{figures}</div>\n")
+    }
 }
 
 /// Which run is meant, where there are two.
@@ -74,16 +79,27 @@ fn over_run(sources: &[Source]) -> String {
         if series.is_empty() {
             continue;
         }
-        let (run, about) = (of_run(sources, run), "Mean over ranks, one phase on top of another; in the legend, the mean over the run in ms.");
+        let (run, about) = (
+            of_run(sources, run),
+            "Mean over ranks, one phase on top of another; in the legend, its mean over the run.",
+        );
         let title = title_of("Time per phase over the run", run);
-        let axes = Axes { title: &title, x: "time, s", y: "ms per step", scale: Scale::FromZero };
+        let axes = Axes { title: &title, x: "time, s", y: "ms per step", scale: Scale::FromZero, wide: run.is_none() };
         text += &figure(&name_of("phases", run), run.is_none(), &title, about, &areas(axes, &series));
     }
     text
 }
 
 /// A column of all runs in one chart.
-fn together(sources: &[Source], name: &str, title: &str, unit: &str, about: &str, scale: Scale, column: &str) -> String {
+fn together(
+    sources: &[Source],
+    name: &str,
+    title: &str,
+    unit: &str,
+    about: &str,
+    scale: Scale,
+    column: &str,
+) -> String {
     let line = |(run, source): (usize, &Source)| {
         // Nothing was measured before the first step.
         let mut points = points(source, source.log.as_ref()?, column)?;
@@ -95,7 +111,7 @@ fn together(sources: &[Source], name: &str, title: &str, unit: &str, about: &str
     if all.is_empty() {
         return String::new();
     }
-    let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale };
+    let axes = Axes { title: &format!("{title} over time"), x: "time, s", y: unit, scale, wide: false };
     figure(name, false, title, about, &lines(axes, &all))
 }
 
@@ -124,7 +140,7 @@ fn ranks(source: &Source, timings: &Columns, run: Option<&str>) -> String {
         }
     }
     let title = title_of("Time per phase of each rank", run);
-    let axes = Axes { title: &title, x: "ms per step", y: "rank", scale: Scale::FromZero };
+    let axes = Axes { title: &title, x: "ms per step", y: "rank", scale: Scale::FromZero, wide: true };
     let threads = source.number("threads").unwrap_or(source.config.run.threads as f64);
     let about = format!("A bar for each rank, mean over the run, in ms per step; {threads} threads each.");
     let content = super::chart::legend(&all, true, |_| None) + &bars(axes, &rows);
@@ -144,11 +160,11 @@ fn memory(sources: &[Source]) -> String {
     }
     let each = |source: &Source| {
         let bytes = source.number("peak_rss_bytes")?;
-        Some(format!("{}B per body", super::html::Short(bytes / source.config.scene.bodies.max(1) as f64)))
+        Some(format!("{} per body", Unit(bytes / source.config.scene.bodies.max(1) as f64, "B")))
     };
     let each: Vec<String> = sources.iter().filter_map(each).collect();
     let about = format!("The most held at once, summed over processes: {}.", each.join(" and "));
-    let axes = Axes { title: "Memory", x: "bytes", y: "run", scale: Scale::FromZero };
+    let axes = Axes { title: "Memory", x: "B", y: "run", scale: Scale::FromZero, wide: true };
     figure("memory", true, "Memory", &about, &bars(axes, &rows))
 }
 
