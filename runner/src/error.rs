@@ -68,6 +68,14 @@ pub enum RunError {
         /// Bytes free.
         available: u64,
     },
+    /// An option, or what stands for one, that does not suit what it is used with.
+    #[error("{option}: {reason}")]
+    Unsuitable {
+        /// What was given.
+        option: String,
+        /// Why not, and what else to give.
+        reason: String,
+    },
     /// `RUST_LOG`.
     #[error("RUST_LOG = {value}: {reason}; write a level or target=level, such as atoll=debug")]
     LogFilter {
@@ -300,6 +308,7 @@ impl RunError {
             | Self::StoppedLogging { .. } => Exit::Output,
             Self::Config(_)
             | Self::Setup(_)
+            | Self::Unsuitable { .. }
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
             | Self::TakenOutput { .. }

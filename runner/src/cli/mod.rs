@@ -8,6 +8,7 @@ mod info;
 mod interrupt;
 mod output;
 mod progress;
+mod render;
 mod report;
 mod run;
 
@@ -29,6 +30,7 @@ pub fn main() -> ExitCode {
     let result = begun.and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
         Command::Report(args) => report::run(args),
         Command::Export(args) => export::run(args),

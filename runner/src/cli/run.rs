@@ -193,7 +193,9 @@ fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
 fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
     match config {
         Ok(config) => config.transport() == TransportKind::Mpi,
-        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched(),
+        Err(_) => {
+            args.values.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched()
+        }
     }
 }
 

@@ -6,4 +6,5 @@ pub(crate) mod frame;
 pub(crate) mod picture;
 pub(crate) mod recorded;
 pub(crate) mod report;
+pub(crate) mod source;
 pub(crate) mod vtk;

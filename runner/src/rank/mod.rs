@@ -16,7 +16,7 @@ pub(crate) mod trouble;
 pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
-pub use observer::{Listener, Observer, PanicAt, StopFlag};
+pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 pub(crate) use trace::TraceSteps;
 use trouble::Refusal;
 
@@ -154,6 +154,7 @@ fn run<T: Transport>(
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);
     }
+    observer.show(rank, &world);
     while world.step_count() < steps && !last.stopped {
         let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
         if observer.stop.is_requested() || unwritten {
@@ -186,6 +187,7 @@ fn run<T: Transport>(
         if let Some(recorder) = &mut recorder {
             recorder.write_due(&world, last.stopped);
         }
+        observer.show(rank, &world);
         told.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }

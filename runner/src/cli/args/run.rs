@@ -1,5 +1,6 @@
 //! Options of `atoll run`.
 
+use super::values::{ValueArgs, given};
 use crate::config::{ConfigError, Override};
 use crate::rank::{PanicAt, TraceSteps};
 use clap::{ArgGroup, Args};
@@ -12,33 +13,12 @@ pub struct RunArgs {
     /// The configuration, a TOML file such as configs/quickstart.toml. May be left out with --resume.
     #[arg(required_unless_present = "resume")]
     pub config: Option<PathBuf>,
-    /// Ranks that share the tiles [default: the configuration's, else 1].
-    #[arg(long, value_name = "N")]
-    pub ranks: Option<String>,
-    /// Threads of each rank [default: the configuration's, else 1].
-    #[arg(long, value_name = "T")]
-    pub threads: Option<String>,
-    /// What carries bytes between ranks: local, channel, iceoryx2 or mpi [default: local for one rank, else channel].
-    #[arg(long, value_name = "NAME")]
-    pub transport: Option<String>,
+    /// What wins over the file's values.
+    #[command(flatten)]
+    pub values: ValueArgs,
     /// Columns and rows of tiles, such as 17x17, or auto.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
-    /// Dynamic bodies.
-    #[arg(long, value_name = "N")]
-    pub bodies: Option<String>,
-    /// Steps to make.
-    #[arg(long, value_name = "S")]
-    pub steps: Option<String>,
-    /// Chooses among the random variants of the scene.
-    #[arg(long, value_name = "N")]
-    pub seed: Option<String>,
-    /// Any key of the configuration, by its full path or an unambiguous last part; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Give up a rank that stays silent for so long.
-    #[arg(long, value_name = "SECONDS")]
-    pub peer_timeout: Option<String>,
     /// Write the summary to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -90,22 +70,13 @@ impl RunArgs {
     /// # Errors
     /// On a `--set` without an equals sign.
     pub fn overrides(&self) -> Result<Vec<Override>, ConfigError> {
-        let mut overrides = self.set.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let options = [
-            ("--ranks", "run.ranks", &self.ranks),
-            ("--threads", "run.threads", &self.threads),
-            ("--transport", "run.transport", &self.transport),
+        let mut overrides = self.values.overrides()?;
+        overrides.extend(given(&[
             ("--tiles", "run.tiles", &self.tiles),
-            ("--bodies", "scene.bodies", &self.bodies),
-            ("--steps", "run.steps", &self.steps),
-            ("--seed", "scene.seed", &self.seed),
-            ("--peer-timeout", "run.peer_timeout", &self.peer_timeout),
             ("--record-every", "output.record_every", &self.record_every),
             ("--checkpoint-every", "output.checkpoint_every", &self.checkpoint_every),
             ("--log-every", "output.log_every", &self.log_every),
-        ];
-        let given = options.iter().filter_map(|(option, key, value)| Some((option, key, value.as_ref()?)));
-        overrides.extend(given.map(|(option, key, value)| Override::option(option, key, value)));
+        ]));
         Ok(overrides)
     }
 }
