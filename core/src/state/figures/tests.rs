@@ -73,7 +73,9 @@ fn a_step_tells_what_is_measured_before_and_after_it() {
 #[test]
 fn manifolds_that_are_kept_tell_nearly_the_same() {
     let mut world = heap((2, 2), Params::default());
-    (0..200).for_each(|_| drop(step(&mut world, &mut Loopback).unwrap()));
+    for _ in 0..200 {
+        step(&mut world, &mut Loopback).unwrap();
+    }
     let before = Facts::total(measure(&world, &mut Loopback).unwrap());
     let figures = figures_of_step(&mut world);
     assert!(figures.contacts.abs_diff(before.contacts) <= 3, "{} and {}", figures.contacts, before.contacts);
@@ -113,7 +115,9 @@ fn ranks_and_threads_change_no_bit() {
     };
     let world = |tiles, own: &[TileId]| {
         let mut world = World::new(&blueprint(tiles), own).unwrap();
-        (0..12_001).for_each(|i| drop(world.add(bodies(i)).unwrap()));
+        for i in 0..12_001 {
+            world.add(bodies(i)).unwrap();
+        }
         world
     };
     // One tile of three pieces.

@@ -120,9 +120,12 @@ pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
     legend(all, true, share) + &drawn(axes, HEIGHT, &drawing)
 }
 
-/// A bar for each row, made of parts beside each other; for each part its color, name and length.
-pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<(String, String, f64)>)]) -> String {
-    let total = |parts: &[(String, String, f64)]| parts.iter().map(|part| part.2).sum::<f64>();
+/// A part of a bar: its color, name and length.
+pub(super) type Part = (String, String, f64);
+
+/// A bar for each row, which has a name and is made of parts beside each other.
+pub(super) fn bars(axes: Axes<'_>, rows: &[(String, Vec<Part>)]) -> String {
+    let total = |parts: &[Part]| parts.iter().map(|part| part.2).sum::<f64>();
     let most = rows.iter().map(|(_, parts)| total(parts)).fold(0.0, f64::max);
     if !(most > 0.0 && most.is_finite()) {
         return nothing();

@@ -1,6 +1,6 @@
 //! Where the time went: over the run, and on each rank.
 
-use super::chart::{Axes, Scale, Series, areas, bars, lines};
+use super::chart::{Axes, Part, Scale, Series, areas, bars, lines};
 use super::columns::Columns;
 use super::html::{Unit, figure};
 use super::letter;
@@ -122,7 +122,7 @@ fn column_words(column: &str) -> &str {
 /// The time of each rank, a bar each.
 fn ranks(source: &Source, timings: &Columns, run: Option<&str>) -> String {
     let Some((of_rank, ms)) = timings.get("rank").zip(timings.get("mean_ms")) else { return String::new() };
-    let mut rows: Vec<(String, Vec<(String, String, f64)>)> = Vec::new();
+    let mut rows: Vec<(String, Vec<Part>)> = Vec::new();
     for line in 0..timings.rows() {
         let (rank, phase) = (of_rank[line].to_string(), timings.word("phase", line));
         if rows.last().is_none_or(|row| row.0 != rank) {
