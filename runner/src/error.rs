@@ -3,7 +3,7 @@
 pub use crate::config::ConfigError;
 pub use crate::folder::recording::RecordingError;
 pub use crate::folder::snapshot::SnapshotError;
-pub use crate::folder::{EndedError, FolderError};
+pub use crate::folder::{EndedError, FolderError, LogError};
 
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
@@ -129,6 +129,9 @@ pub enum RunError {
     /// A snapshot that cannot be used.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
+    /// A log that cannot be gone on with.
+    #[error("{0}; bring back a good copy of it, or move it away, and a new one is begun")]
+    Log(LogError),
     /// A rank whose threads cannot be had.
     #[error(
         "rank {rank} cannot start {}: {reason}; use fewer threads or ranks",
@@ -267,6 +270,16 @@ pub enum RunError {
         /// The folder of the run.
         folder: PathBuf,
     },
+    /// A run without a folder that could not write its log any more, and stopped.
+    #[error("{why}; stopped after {complete} of {steps} steps")]
+    StoppedLogging {
+        /// What could not be written.
+        why: String,
+        /// Steps completed.
+        complete: u64,
+        /// Steps asked for.
+        steps: u64,
+    },
 }
 
 /// Bytes, as people read them.
@@ -291,7 +304,8 @@ impl RunError {
             Self::Recording(RecordingError::Write { .. })
             | Self::Output { .. }
             | Self::Gone { .. }
-            | Self::StoppedWriting { .. } => Exit::Output,
+            | Self::StoppedWriting { .. }
+            | Self::StoppedLogging { .. } => Exit::Output,
             Self::Config(_)
             | Self::Setup(_)
             | Self::Unsuitable { .. }
@@ -302,6 +316,7 @@ impl RunError {
             | Self::Folder(_)
             | Self::Snapshot(_)
             | Self::Recording(_)
+            | Self::Log(_)
             | Self::TooLarge { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }

@@ -1,7 +1,7 @@
 //! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
 
 use atoll::recording::{Recording, Row};
-use atoll_tests::program::{self, diff};
+use atoll_tests::program::{self, diff, log};
 use atoll_tests::ways::Way;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use serde_json::Value;
@@ -33,12 +33,15 @@ fn every_transport_records_the_same_and_another_seed_does_not() {
     let folder = tempdir().unwrap();
     let local = folder.path().join("local");
     record(Way::Local, 1, &local, &[]);
+    let figures = log(&local.join("log.csv"));
+    assert!(figures[7][..2] == ["60", "1.0"] && figures[7][2] == "4000" && figures.len() == 8, "{figures:?}");
     let expected = "identical: 13 records of 4000 bodies, steps 0 to 60\n";
     for (k, way) in Way::all().into_iter().enumerate() {
-        for ranks in [2, 3, 13].into_iter().filter(|&ranks| way.supports(ranks)) {
+        for ranks in [2, 3, 4, 13].into_iter().filter(|&ranks| way.supports(ranks)) {
             // One rank of thirteen has no tile.
             let other = folder.path().join(format!("{k}-{ranks}"));
-            record(way, ranks, &other, &[]);
+            record(way, ranks, &other, if ranks == 3 { &["--threads", "2"] } else { &[] });
+            assert_eq!(log(&other.join("log.csv")), figures, "{way}, {ranks} ranks");
             let ended = diff(&local, &other, &[]);
             assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), expected), "{way}, {ranks} ranks: {ended}");
         }

@@ -160,6 +160,12 @@ impl KindRow {
         })
     }
 
+    /// Mass and moment of inertia.
+    #[inline(always)]
+    pub(crate) fn masses(&self) -> [f32; 2] {
+        [self.mass, self.inertia]
+    }
+
     pub(crate) fn fixed(kind: &Kind) -> Option<Self> {
         Self::checked(kind)
     }

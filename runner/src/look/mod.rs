@@ -5,5 +5,6 @@ pub(crate) mod film;
 pub(crate) mod frame;
 pub(crate) mod picture;
 pub(crate) mod recorded;
+pub(crate) mod report;
 pub(crate) mod source;
 pub(crate) mod vtk;

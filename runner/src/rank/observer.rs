@@ -1,5 +1,6 @@
 //! How a run is watched, and stopped.
 
+use super::trace::TraceSteps;
 use atoll_core::World;
 use atoll_transport::Rank;
 use std::fmt::Debug;
@@ -38,6 +39,8 @@ pub struct Observer {
     pub stop: StopFlag,
     /// Lets a rank panic.
     pub panic_at: Option<PanicAt>,
+    /// Which steps to trace, if any.
+    pub trace: Option<TraceSteps>,
     /// Steps that were completed here, by the rank that said so last; so that they are known even after a panic.
     pub complete: Arc<AtomicU64>,
 }

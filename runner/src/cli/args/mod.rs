@@ -6,7 +6,7 @@ mod render;
 mod run;
 mod values;
 
-pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs};
+pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
 pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
 
@@ -35,6 +35,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
+    /// Write a page about a run, or two side by side: what was run, pictures, figures over time, where the time went.
+    Report(ReportArgs),
     /// Write what a run has recorded as files for other programs.
     Export(ExportArgs),
 }

@@ -30,6 +30,17 @@ pub struct InfoArgs {
     pub path: PathBuf,
 }
 
+/// Options of `atoll report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The folder of a run, or of two runs to compare.
+    #[arg(required = true, num_args = 1..=2, value_name = "DIR")]
+    pub runs: Vec<PathBuf>,
+    /// Write the page to this file, as HTML.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
 /// Options of `atoll export`.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -76,6 +87,11 @@ mod tests {
             assert!(error.contains("'--tolerance <T>': must be a finite number, at least 0"), "{error}");
         }
         assert!(parse::<DiffArgs>("a").unwrap_err().contains("<B>"));
+        let args = parse::<ReportArgs>("runs/a runs/b --out r.html").unwrap();
+        assert_eq!((args.runs.len(), args.out.as_path()), (2, Path::new("r.html")));
+        for line in ["--out r.html", "a", "a b c --out r.html"] {
+            assert!(parse::<ReportArgs>(line).is_err(), "{line}");
+        }
         let args = parse::<ExportArgs>("runs/a --vtk out --every 5").unwrap();
         assert_eq!((args.vtk.as_path(), args.every.get()), (Path::new("out"), 5));
         assert_eq!(parse::<ExportArgs>("runs/a --vtk out").unwrap().every.get(), 1);

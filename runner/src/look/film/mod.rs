@@ -74,6 +74,13 @@ enum Sink {
     Video(video::Video),
 }
 
+/// A picture as the bytes of a PNG.
+pub(crate) fn to_png(image: &Image) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    png::encode(&mut bytes, image).expect("memory takes any picture");
+    bytes
+}
+
 impl Film {
     /// Begins what the path's ending asks for: pictures of that size, so many a second. Nothing is at the path before
     /// [`finish`](Self::finish).

@@ -68,8 +68,9 @@ impl Folder {
 }
 
 /// Writes a picture as PNG.
-fn encode(file: &File, image: &Image) -> io::Result<()> {
-    let mut buffer = BufWriter::with_capacity(1 << 16, file);
+/// Writes a picture.
+pub(super) fn encode(to: impl Write, image: &Image) -> io::Result<()> {
+    let mut buffer = BufWriter::with_capacity(1 << 16, to);
     let mut encoder = Encoder::new(&mut buffer, image.size[0], image.size[1]);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);

@@ -70,15 +70,9 @@ impl Painter {
             canvas: Canvas::new(look.size),
             field: Field::default(),
             letters: Letters::new(),
-            range: Range { most: 1e-3, is_fixed: false },
+            range: Range { most: 1e-3 },
             ranks: Vec::new(),
         }
-    }
-
-    /// From here on the scale of speeds, in m/s, or of spins, in rad/s, ends at this. Otherwise it is chosen from what was drawn
-    /// so far: it grows and never shrinks.
-    pub(crate) fn fix_range(&mut self, most: f32) {
-        self.range = Range { most, is_fixed: true };
     }
 
     /// Draws a frame, as much of it as is in view.

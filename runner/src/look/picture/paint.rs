@@ -35,8 +35,6 @@ const SAMPLE: usize = 4096;
 pub(super) struct Range {
     /// What has the last color of the scale, in m/s or rad/s.
     pub most: f32,
-    /// Whether it stays so.
-    pub is_fixed: bool,
 }
 
 impl Range {
@@ -51,7 +49,7 @@ impl Range {
         let every = (frame.bodies.len() / SAMPLE).max(1);
         let mut values: Vec<f32> =
             frame.bodies.iter().step_by(every).map(of).filter(|value| value.is_finite()).collect();
-        if self.is_fixed || values.is_empty() {
+        if values.is_empty() {
             return;
         }
         let at = (values.len() - 1) * 99 / 100;
