@@ -46,7 +46,8 @@ fn a_picture_is_the_same_of_a_recording_and_of_a_run_on_any_ranks() {
     let folder = tempdir().unwrap();
     let [one, three] = ["1", "3"].map(|ranks| record(&folder, ranks));
     let live = |ranks| [&WORLD[..], &["--ranks", ranks]].concat();
-    for options in [&["--color", "kind"][..], &["--color", "speed", "--step", "8"], &["--follow", "99", "--step", "4"]] {
+    for options in [&["--color", "kind"][..], &["--color", "speed", "--step", "8"], &["--follow", "99", "--step", "4"]]
+    {
         let expected = picture(&[one.to_str().unwrap()], &folder, options);
         assert!(expected.starts_with(b"\x89PNG") && expected.len() > 2000);
         for source in [vec![three.to_str().unwrap()], live("1"), live("3")] {
@@ -132,7 +133,12 @@ fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
         assert_eq!(everything_in(folder.path()), before, "{options:?}");
     };
     let bare = at("bare");
-    refused(&["/nowhere/at/all"], "a.png", &[], "/nowhere/at/all: cannot read this configuration: No such file or directory");
+    refused(
+        &["/nowhere/at/all"],
+        "a.png",
+        &[],
+        "/nowhere/at/all: cannot read this configuration: No such file or directory",
+    );
     refused(&[bare.to_str().unwrap()], "a.png", &[], "bare holds no recording");
     refused(&recorded, "a.pdf", &[], "nothing is known of .pdf; end the name in .png, .gif, .mp4 or .webm");
     refused(&recorded, "none/a.png", &[], "none/a.png: No such file or directory");

@@ -7,7 +7,7 @@ use super::output::{self, Kept};
 use super::progress::Show;
 use crate::config::{Config, OutputConfig};
 use crate::error::{Exit, RunError};
-use crate::look::film::{Film, FilmKind};
+use crate::look::film::{Film, FilmKind, remove_unfinished};
 use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
 use crate::look::recorded::Recorded;
@@ -46,7 +46,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
         let view = view(args, &setting, frame)?;
         film.add(painter.draw(frame, &view))
     };
-    let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
+    let out = args.out.clone();
+    let stop = stop_on_signals(true, move || {
+        remove_unfinished(&out);
+        std::process::exit(Exit::Interrupted as i32)
+    });
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
     let console = Arc::new(Console::new(show));
     let end = match &mut source {

@@ -157,7 +157,10 @@ mod tests {
             ("--every 0", "0 is not in 1..18446744073709551615; see"),
             ("--fps 0", "0 is not in 1..=240; see"),
             ("--step 3 --every 3", "'--step <N>' cannot be used with '--every <K>'; see"),
-            ("--color pink", "[possible values: kind, speed, spin, tile, rank, contacts, asleep]; see"),
+            (
+                "--color pink",
+                "[possible values: kind, speed, spin, tile, rank, contacts, asleep]; a similar value exists: 'spin'; see",
+            ),
         ] {
             let error = parse(&format!("runs/a --out a.png {options}")).unwrap_err();
             assert!(error.contains(expected) && !error.contains('\n'), "{options}: {error}");

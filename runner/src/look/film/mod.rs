@@ -9,6 +9,8 @@ mod tests;
 mod unfinished;
 mod video;
 
+pub(crate) use unfinished::remove_unfinished;
+
 use crate::error::RunError;
 use crate::look::picture::Image;
 use std::path::{Path, PathBuf};

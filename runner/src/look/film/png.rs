@@ -68,7 +68,6 @@ impl Folder {
 }
 
 /// Writes a picture as PNG.
-/// Writes a picture.
 pub(super) fn encode(to: impl Write, image: &Image) -> io::Result<()> {
     let mut buffer = BufWriter::with_capacity(1 << 16, to);
     let mut encoder = Encoder::new(&mut buffer, image.size[0], image.size[1]);

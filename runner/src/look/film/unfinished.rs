@@ -71,12 +71,21 @@ impl Unfinished {
 impl Drop for Unfinished {
     fn drop(&mut self) {
         if !self.is_complete {
-            let _ = match self.temporary.is_dir() {
-                true => fs::remove_dir_all(&self.temporary),
-                false => fs::remove_file(&self.temporary),
-            };
+            remove(&self.temporary);
         }
     }
+}
+
+/// Removes what this process has begun to write that was to become a path, if anything.
+pub(crate) fn remove_unfinished(path: &Path) {
+    remove(&temporary(path));
+}
+
+fn remove(temporary: &Path) {
+    let _ = match temporary.is_dir() {
+        true => fs::remove_dir_all(temporary),
+        false => fs::remove_file(temporary),
+    };
 }
 
 /// That a film was finished before it had begun.

@@ -97,13 +97,24 @@ impl Bodies {
         }
     }
 
+    /// Whether a body is drawn, and not too small or elsewhere.
+    pub(super) fn is_seen(&self, canvas: &Canvas, row: &Row) -> bool {
+        self.seen(canvas, row).is_some()
+    }
+
     /// A body's shape on the image and the direction of its first axis, unless it is too small or elsewhere.
     fn form(&self, canvas: &Canvas, row: &Row) -> Option<(Form, [f64; 2])> {
+        let (shape, center) = self.seen(canvas, row)?;
+        Some(form(shape, center, Rot::from_angle(row.angle), self.fit.scale))
+    }
+
+    /// A body's shape and where it is on the image, unless it is too small or elsewhere.
+    fn seen(&self, canvas: &Canvas, row: &Row) -> Option<(&Shape, [f64; 2])> {
         let shape = self.shape(row).filter(|shape| self.width(shape) > DRAWN)?;
         let center = self.fit.place(DVec2::new(row.x, row.y));
         let reach = f64::from(shape.bounding_radius()) * self.fit.scale + 4.0;
         let is_seen = |axis: usize| !canvas.span(axis, center[axis] - reach, center[axis] + reach).is_empty();
-        (is_seen(0) && is_seen(1)).then(|| form(shape, center, Rot::from_angle(row.angle), self.fit.scale))
+        (is_seen(0) && is_seen(1)).then_some((shape, center))
     }
 }
 

@@ -59,6 +59,8 @@ pub(crate) struct Painter {
     letters: Letters,
     range: Range,
     ranks: Vec<Option<u32>>,
+    /// Names and places of the bodies that are drawn.
+    order: Vec<(u64, usize)>,
 }
 
 impl Painter {
@@ -72,6 +74,7 @@ impl Painter {
             letters: Letters::new(),
             range: Range { most: 1e-3 },
             ranks: Vec::new(),
+            order: Vec::new(),
         }
     }
 
@@ -106,19 +109,26 @@ impl Painter {
 
     /// Draws bodies, then ghosts, then contacts.
     fn draw_bodies(&mut self, frame: &Frame, fit: Fit) {
-        let Self { setting, look, canvas, field, .. } = self;
+        let Self { setting, look, canvas, field, order, .. } = self;
         let bodies = Bodies::new(fit, setting.kinds.iter().map(|kind| kind.shape));
         let [has_small, has_large] = bodies.has();
         let tone = bodies.tone();
         if has_small {
-            let mut paint = Paint::new(look.color, setting, frame, self.range);
+            let paint = Paint::new(look.color, setting, frame, self.range);
             field.reset(look.size);
             frame.bodies.iter().enumerate().for_each(|(i, row)| bodies.splat(field, row, || paint.color(i, row)));
             field.draw(canvas, &tone);
         }
         if has_large {
-            let mut paint = Paint::new(look.color, setting, frame, self.range);
-            frame.bodies.iter().enumerate().for_each(|(i, row)| bodies.draw(canvas, row, || paint.color(i, row)));
+            let paint = Paint::new(look.color, setting, frame, self.range);
+            // Where two meet in a pixel, the one with the higher name is upon the other, on whatever ranks they are.
+            let seen = frame.bodies.iter().enumerate().filter(|(_, row)| bodies.is_seen(canvas, row));
+            order.clear();
+            order.extend(seen.map(|(i, row)| (row.id, i)));
+            order.sort_unstable();
+            order.iter().map(|&(_, i)| (i, &frame.bodies[i])).for_each(|(i, row)| {
+                bodies.draw(canvas, row, || paint.color(i, row));
+            });
         }
         let Some(live) = &frame.live else { return };
         if look.layers.ghosts {

@@ -46,9 +46,10 @@ impl Range {
             ColorBy::Spin => |row| row.omega.abs(),
             _ => return,
         };
-        let every = (frame.bodies.len() / SAMPLE).max(1);
-        let mut values: Vec<f32> =
-            frame.bodies.iter().step_by(every).map(of).filter(|value| value.is_finite()).collect();
+        let every = (frame.bodies.len() / SAMPLE).max(1) as u64;
+        // By their names, as they come in another order on other ranks.
+        let sample = frame.bodies.iter().filter(|row| row.id.is_multiple_of(every));
+        let mut values: Vec<f32> = sample.map(of).filter(|value| value.is_finite()).collect();
         if values.is_empty() {
             return;
         }
@@ -82,8 +83,6 @@ pub(super) struct Paint<'a> {
     frame: &'a Frame,
     table: Vec<Rgb>,
     per_unit: f32,
-    /// Where the bodies of the present rank end, and which it is.
-    rank: (usize, u32),
 }
 
 impl<'a> Paint<'a> {
@@ -92,12 +91,12 @@ impl<'a> Paint<'a> {
             ColorBy::Spin => Scale::Ways.table(),
             _ => Scale::Amount.table(),
         };
-        Self { by, setting, frame, table, per_unit: 255.0 / range.most, rank: (0, 0) }
+        Self { by, setting, frame, table, per_unit: 255.0 / range.most }
     }
 
-    /// The color of the body with that index, which must not be less than the one before.
+    /// The color of the body with that index.
     #[inline]
-    pub(super) fn color(&mut self, index: usize, row: &Row) -> Rgb {
+    pub(super) fn color(&self, index: usize, row: &Row) -> Rgb {
         let live = self.frame.live.as_ref();
         match self.by {
             ColorBy::Kind => colors::distinct(row.kind),
@@ -109,11 +108,9 @@ impl<'a> Paint<'a> {
                 colors::tile(tile % columns, tile / columns)
             }
             ColorBy::Rank => {
-                if index >= self.rank.0 {
-                    let next = self.frame.ranks.iter().find(|(_, end)| index < *end);
-                    self.rank = next.map_or((usize::MAX, 0), |&(rank, end)| (end, rank));
-                }
-                colors::distinct(self.rank.1)
+                let ranks = &self.frame.ranks;
+                let at = ranks.partition_point(|(_, end)| *end <= index);
+                colors::distinct(ranks.get(at).map_or(0, |(rank, _)| *rank))
             }
             ColorBy::Contacts => {
                 live.and_then(|live| live.contacts.get(index)).map_or(colors::UNKNOWN, |&count| contacts(count))

@@ -7,6 +7,7 @@ use crate::look::frame::{Frame, Live};
 use crate::rank::Watcher;
 use atoll_core::{Body, TileView, World};
 use atoll_transport::Rank;
+use glam::DVec2;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// A part of a frame from each rank. Together with the frame they are put into, this is memory for two.
@@ -61,6 +62,15 @@ impl Parts {
             if let Some((to, from)) = frame.live.as_mut().zip(part.live.as_ref()) {
                 append(to, from);
             }
+        }
+        if let Some(live) = &mut frame.live {
+            // In an order that tells nothing of ranks.
+            live.ghosts.sort_unstable_by_key(|(row, tile)| (*tile, row.id));
+            let place = |(point, impulse): &(DVec2, f32)| (point.x, point.y, *impulse);
+            live.points.sort_unstable_by(|a, b| {
+                let (a, b) = (place(a), place(b));
+                a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+            });
         }
         self.state().full.fill(false);
         self.changed.notify_all();
