@@ -28,7 +28,7 @@ const AROUND: f64 = 20.0;
 /// # Errors
 /// Whatever kept it from being made. Nothing is left behind then.
 pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
-    Kept { runs: vec![&args.source], configuration: Some(&args.source) }
+    Kept { runs: vec![&args.source], configuration: Some(args.source.as_path()).filter(|source| source.is_file()) }
         .check([("--out", Some(args.out.as_path()))])?;
     let kind = FilmKind::of(&args.out)?;
     check_out(args, kind)?;

@@ -79,7 +79,7 @@ enum Sink {
 /// A picture as the bytes of a PNG.
 pub(crate) fn to_png(image: &Image) -> Vec<u8> {
     let mut bytes = Vec::new();
-    png::encode(&mut bytes, image).expect("memory takes any picture");
+    png::encode(&mut bytes, image, ::png::Compression::Balanced).expect("memory takes any picture");
     bytes
 }
 

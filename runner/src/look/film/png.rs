@@ -27,7 +27,7 @@ impl Single {
         self.file.rewind()?;
         self.file.set_len(0)?;
         self.is_empty = false;
-        encode(&self.file, image)
+        encode(&self.file, image, Compression::Balanced)
     }
 
     pub(super) fn finish(self) -> io::Result<()> {
@@ -54,7 +54,8 @@ impl Folder {
     pub(super) fn add(&mut self, image: &Image) -> io::Result<()> {
         self.is_empty = false;
         let file = File::create(self.unfinished.at().join(format!("frame-{:010}.png", image.step)))?;
-        encode(&file, image)?;
+        // Of many it takes most of the time.
+        encode(&file, image, Compression::Fast)?;
         file.sync_all()
     }
 
@@ -68,12 +69,12 @@ impl Folder {
 }
 
 /// Writes a picture as PNG.
-pub(super) fn encode(to: impl Write, image: &Image) -> io::Result<()> {
+pub(super) fn encode(to: impl Write, image: &Image, compression: Compression) -> io::Result<()> {
     let mut buffer = BufWriter::with_capacity(1 << 16, to);
     let mut encoder = Encoder::new(&mut buffer, image.size[0], image.size[1]);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
-    encoder.set_compression(Compression::Balanced);
+    encoder.set_compression(compression);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&image.pixels)?;
     writer.finish()?;
