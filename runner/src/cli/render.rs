@@ -87,8 +87,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
 
 /// What frames come from.
 enum Source {
-    Recorded(Recorded),
-    Live(Live),
+    Recorded(Box<Recorded>),
+    Live(Box<Live>),
 }
 
 fn unsuitable(option: impl ToString, reason: impl ToString) -> RunError {
@@ -131,7 +131,7 @@ fn open(args: &RenderArgs) -> Result<Source, RunError> {
         let reason = format!("a recording does not tell; {} runs it again, and shows it", again.display());
         return Err(unsuitable(option, reason));
     }
-    Ok(Source::Recorded(Recorded::open(&args.source)?))
+    Ok(Source::Recorded(Box::new(Recorded::open(&args.source)?)))
 }
 
 /// What a configuration is about to do.
@@ -144,7 +144,7 @@ fn plan(args: &RenderArgs) -> Result<Source, RunError> {
     for note in plan.notes() {
         complain(&note);
     }
-    Ok(Source::Live(Live::new(plan)))
+    Ok(Source::Live(Box::new(Live::new(plan))))
 }
 
 impl Source {
