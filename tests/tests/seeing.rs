@@ -241,7 +241,11 @@ fn opened(browser: &OsString, page: &Path) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (proxy, asked) = (listener.local_addr().unwrap(), Arc::new(AtomicUsize::new(0)));
     let count = Arc::clone(&asked);
-    thread::spawn(move || listener.incoming().for_each(|_| drop(count.fetch_add(1, Ordering::SeqCst))));
+    thread::spawn(move || {
+        for _ in listener.incoming() {
+            count.fetch_add(1, Ordering::SeqCst);
+        }
+    });
     let profile = tempdir().unwrap();
     let mut command = Command::new(browser);
     command.args([

@@ -229,7 +229,7 @@ mod tests {
         let material = |a: f32, b: f32| Material { density: a, friction: b, restitution: -0.0 };
         let any = |i: u64| {
             let half = Vec2::new(size(), size());
-            let shape = if i % 2 == 0 { Shape::Box { half } } else { Shape::circle(size()) };
+            let shape = if i.is_multiple_of(2) { Shape::Box { half } } else { Shape::circle(size()) };
             Kind { shape, material: material(size(), size()) }
         };
         let kinds: Vec<Kind> = (0..2000).map(any).collect();

@@ -51,6 +51,9 @@ impl Form {
     }
 }
 
+/// Writes the numbers of a column, in little-endian order.
+pub(super) type Values<'a> = Box<dyn Fn(&mut Output<'_>) -> io::Result<()> + 'a>;
+
 /// So many numbers for each polygon.
 pub(super) struct Column<'a> {
     /// Its name.
@@ -59,8 +62,8 @@ pub(super) struct Column<'a> {
     pub(super) form: Form,
     /// How many each polygon has.
     pub(super) components: usize,
-    /// Writes all of them, in little-endian order.
-    pub(super) values: Box<dyn Fn(&mut Output<'_>) -> io::Result<()> + 'a>,
+    /// Writes all of them.
+    pub(super) values: Values<'a>,
 }
 
 /// How a file of some type begins.
