@@ -57,6 +57,19 @@ has_libclang() {
         ldconfig -p 2>/dev/null | grep -E 'libclang(-[0-9.]+)?\.so' >/dev/null
 }
 
+# A browser without a window, to open pages in. A test looks for the same ones.
+has_browser() {
+    local name
+    for name in ${ATOLL_BROWSER:-chromium-headless-shell chromium chromium-browser google-chrome}; do
+        if has "$name"; then
+            ATOLL_BROWSER=$name
+            export ATOLL_BROWSER
+            return
+        fi
+    done
+    return 1
+}
+
 # The packages of what is missing, installed if that can be done.
 provide() {
     local missing=()
@@ -64,6 +77,7 @@ provide() {
     has mpicc.openmpi || missing+=(libopenmpi-dev openmpi-bin)
     has mpicc.mpich || missing+=(libmpich-dev mpich)
     has ip || missing+=(iproute2)
+    has_browser || missing+=(chromium-headless-shell)
     python3 -c 'import ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
     ((${#missing[@]})) && [[ $(id -u) == 0 ]] && has apt-get || return 0
     export DEBIAN_FRONTEND=noninteractive
@@ -90,6 +104,7 @@ if [[ -n ${CI:-} ]]; then
 fi
 
 provide
+has_browser || leave_out 'the page of atoll report in a browser: no chromium-headless-shell'
 [[ -n ${ATOLL_PYTHON:-} ]] || step provide_python || leave_out 'the examples in Python: their packages cannot be had'
 features=()
 if has_libclang; then

@@ -86,6 +86,7 @@ pub use model::math::Rot;
 pub use model::params::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Params, Solver};
 pub use model::shape::{Kind, Material, Shape};
 pub use state::facts::{Facts, TileFacts};
+pub use state::figures::Figures;
 pub use state::hash::Hashes;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use state::view::{ContactView, TileView};

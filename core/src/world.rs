@@ -9,6 +9,7 @@ use crate::model::id::{GlobalId, TileId};
 use crate::model::math::float_mode_is_default;
 use crate::model::names::Names;
 use crate::parallel::team::Team;
+use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
 use crate::state::view::TileView;
 use crate::step::phase::{Phase, Stopwatch, Timings};
@@ -44,6 +45,9 @@ pub struct World {
     timings: Timings,
     /// Whether the next step measures how well its contacts are solved.
     pub(crate) measures: bool,
+    /// Whether the next step takes figures, and what the last one took.
+    pub(crate) takes_figures: bool,
+    figures: Option<Box<Figures>>,
     /// Whether it was said that bodies outrun their tiles.
     warned_of_leaps: bool,
 }
@@ -103,6 +107,8 @@ impl World {
             verdict: Verdict::default(),
             timings: Timings::default(),
             measures: false,
+            takes_figures: false,
+            figures: None,
             warned_of_leaps: false,
         }
     }
@@ -181,6 +187,30 @@ impl World {
         self.measures = true;
     }
 
+    /// Asks that the next step, and the last one of a run that was asked to stop, take [`figures`](Self::figures).
+    pub fn take_figures_of_next_step(&mut self) {
+        self.takes_figures = true;
+    }
+
+    /// The figures of this rank's tiles in the last step, if it took them; [`Figures::merge`] those of all ranks.
+    pub fn figures(&self) -> Option<&Figures> {
+        self.figures.as_deref()
+    }
+
+    /// The figures of this rank's bodies between two steps, and no contacts.
+    pub fn figures_of_bodies(&self) -> Figures {
+        let of_tile = |tile: &Tile| {
+            let mut figures = Box::<Figures>::default();
+            figures.add_bodies(tile, &self.setup, Team::ALONE);
+            figures
+        };
+        let both = |mut all: Box<Figures>, other: Box<Figures>| {
+            all.merge(&other);
+            all
+        };
+        *self.tiles.par_iter().filter(|tile| !tile.is_idle()).map(of_tile).reduce(Box::default, both)
+    }
+
     /// Time spent in each phase so far, as shares of the wall clock.
     pub fn timings(&self) -> &Timings {
         &self.timings
@@ -226,8 +256,12 @@ impl World {
     /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
     pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
         let threads = if apart(self.busy.len()) { rayon::current_num_threads() as u32 } else { 1 };
+        self.figures = std::mem::take(&mut self.takes_figures).then(Box::default);
         for hand in &mut self.hands {
             let hand = hand.get_mut().expect("no stage panicked");
+            if let Some(figures) = &mut self.figures {
+                figures.merge(&std::mem::take(&mut hand.figures));
+            }
             self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
         }
         if leaps > 0 && !self.warned_of_leaps {
@@ -252,6 +286,7 @@ impl World {
 
     /// One sync point. What all ranks together have to say comes back.
     pub(crate) fn exchange<H: Halo>(&mut self, halo: &mut H) -> Result<Verdict, StepError<H::Error>> {
+        let _span = tracing::trace_span!("exchange", sync = self.sync).entered();
         let mut watch = Stopwatch::start();
         self.outbox.verdict = self.verdict;
         (self.outbox.step, self.outbox.sync) = (self.step, self.sync);
@@ -311,9 +346,9 @@ impl World {
 
     fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
         let apart = apart(self.busy.len());
-        let Self { setup, hands, works, tiles, busy, inbox, step, measures, .. } = self;
+        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, .. } = self;
         let team = if apart { Team::ALONE } else { Team::of_pool() };
-        let shop = Shop { setup, step: *step, team, measures: *measures };
+        let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
         let (hands, inbox) = (&*hands, &*inbox);
         let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
             let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");

@@ -3,7 +3,7 @@
 pub use crate::config::ConfigError;
 pub use crate::folder::recording::RecordingError;
 pub use crate::folder::snapshot::SnapshotError;
-pub use crate::folder::{EndedError, FolderError};
+pub use crate::folder::{EndedError, FolderError, LogError};
 
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
@@ -68,6 +68,14 @@ pub enum RunError {
         /// Bytes free.
         available: u64,
     },
+    /// An option, or what stands for one, that does not suit what it is used with.
+    #[error("{option}: {reason}")]
+    Unsuitable {
+        /// What was given.
+        option: String,
+        /// Why not, and what else to give.
+        reason: String,
+    },
     /// `RUST_LOG`.
     #[error("RUST_LOG = {value}: {reason}; write a level or target=level, such as atoll=debug")]
     LogFilter {
@@ -96,6 +104,14 @@ pub enum RunError {
         /// What is there.
         what: String,
     },
+    /// A path at which pictures cannot be written, as its ending is unknown or what it takes is not there.
+    #[error("--out {}: {reason}", .path.display())]
+    BadFilm {
+        /// The path.
+        path: PathBuf,
+        /// Why, and what would help.
+        reason: String,
+    },
     /// A folder for the run's output that cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -113,6 +129,9 @@ pub enum RunError {
     /// A snapshot that cannot be used.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
+    /// A log that cannot be gone on with.
+    #[error("{0}; bring back a good copy of it, or move it away, and a new one is begun")]
+    Log(LogError),
     /// A rank whose threads cannot be had.
     #[error(
         "rank {rank} cannot start {}: {reason}; use fewer threads or ranks",
@@ -251,6 +270,16 @@ pub enum RunError {
         /// The folder of the run.
         folder: PathBuf,
     },
+    /// A run without a folder that could not write its log any more, and stopped.
+    #[error("{why}; stopped after {complete} of {steps} steps")]
+    StoppedLogging {
+        /// What could not be written.
+        why: String,
+        /// Steps completed.
+        complete: u64,
+        /// Steps asked for.
+        steps: u64,
+    },
 }
 
 /// Bytes, as people read them.
@@ -275,15 +304,19 @@ impl RunError {
             Self::Recording(RecordingError::Write { .. })
             | Self::Output { .. }
             | Self::Gone { .. }
-            | Self::StoppedWriting { .. } => Exit::Output,
+            | Self::StoppedWriting { .. }
+            | Self::StoppedLogging { .. } => Exit::Output,
             Self::Config(_)
             | Self::Setup(_)
+            | Self::Unsuitable { .. }
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
             | Self::TakenOutput { .. }
+            | Self::BadFilm { .. }
             | Self::Folder(_)
             | Self::Snapshot(_)
             | Self::Recording(_)
+            | Self::Log(_)
             | Self::TooLarge { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }

@@ -85,7 +85,7 @@ pub fn run_with(config: &Config, observer: &Observer) -> Result<Summary, RunErro
 /// Reading what a run has recorded: `atoll run --out DIR --record-every K`.
 pub mod recording {
     pub use crate::folder::Ended;
-    pub use crate::folder::recording::{Recording, RecordingError, Row, RunFacts};
+    pub use crate::folder::recording::{Recording, RecordingError, Row, RunFacts, Stage};
 }
 
 /// What the tests, benchmarks and fuzz targets of this workspace need beside the face of the crate. It may change at any time.
@@ -93,8 +93,8 @@ pub mod recording {
 pub mod internals {
     pub use crate::cli::args::{Cli, Command, one_line};
     pub use crate::folder::RunFolder;
-    pub use crate::folder::recording::{Record, RecordingWriter, rank_folder};
+    pub use crate::folder::recording::{Record, RecordingWriter, StageText, rank_folder};
     pub use crate::launch::run as run_plan;
     pub use crate::plan::Plan;
-    pub use crate::rank::PanicAt;
+    pub use crate::rank::{PanicAt, Watcher};
 }

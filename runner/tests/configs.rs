@@ -41,6 +41,7 @@ fn what_the_full_example_comments_out_are_the_defaults() {
     // By default there are none, and that no number can say.
     assert!(explicit.output.record_every.is_some() && explicit.output.checkpoint_every.is_some());
     assert_eq!(implicit.output, OutputConfig::default());
+    assert_eq!(explicit.output.log_every, implicit.output.log_every);
     implicit.output = explicit.output;
     assert_eq!(explicit, implicit);
 }

@@ -172,6 +172,19 @@ pub fn summary(json: &Path) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}\n{text}", json.display()))
 }
 
+/// The log of a run, row by row and column by column, but for the columns that tell of time.
+///
+/// # Panics
+/// If there is none.
+pub fn log(path: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let fields = |line: &str| -> Vec<String> { line.split(',').map(str::to_owned).collect() };
+    let mut rows: Vec<_> = text.lines().map(fields).collect();
+    let times = rows[0].iter().position(|name| name == "ms_per_step").expect("a column of that name");
+    rows.iter_mut().for_each(|row| row.truncate(times));
+    rows
+}
+
 /// A program under way. It is killed where a test lets go of it, as it does when it fails.
 #[derive(Debug)]
 pub struct Running {

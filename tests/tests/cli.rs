@@ -217,10 +217,13 @@ fn options_for_a_folder_need_one() {
     for option in ["--record-every 5", "--checkpoint-every 5", "--restarts 1"] {
         refused(option, folder);
     }
+    let logged = "the following required arguments were not provided: <--log <FILE>|--out <DIR>|--resume <DIR>>";
+    refused("--log-every 5", logged);
     refused("--overwrite", "the following required arguments were not provided: --out <DIR>");
     refused("--out a --resume a", "the argument '--out <DIR>' cannot be used with '--resume <DIR>'");
     let must = "must be a whole number within 1 to 4294967295";
-    for (key, option) in [("record_every", "--record-every"), ("checkpoint_every", "--checkpoint-every")] {
+    for key in ["record_every", "checkpoint_every", "log_every"] {
+        let option = format!("--{}", key.replace('_', "-"));
         refused(&format!("--out a {option} 0"), &format!("{option} 0: {must}"));
         refused(&format!("--set {key}=1.5"), &format!("--set output.{key}=1.5: {must}"));
     }
@@ -233,6 +236,10 @@ fn a_path_that_cannot_be_written_is_refused_before_anything_heavy() {
     refused("--json world.toml/summary.json", "--json world.toml/summary.json: ");
     refused("--timings no/such/folder/times.csv", "--timings no/such/folder/times.csv: ");
     refused("--timings .", "--timings .: it is a directory");
+    refused("--log no/such/folder/log.csv", "--log no/such/folder/log.csv: ");
+    refused("--log .", "--log .: it is a directory");
+    refused("--log world.toml", "--log world.toml: that is the configuration of this run and must not be written over");
+    refused("--json out --log out", "--log out: --json writes to the same file");
     refused("--json out --timings out", "--timings out: --json writes to the same file");
 }
 

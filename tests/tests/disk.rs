@@ -95,6 +95,24 @@ fn a_full_disk_ends_the_run_cleanly() {
     }
 }
 
+/// Rows are whole or not there, and a run that nobody could see to the end of stops.
+#[test]
+fn a_full_disk_ends_a_run_that_is_only_logged() {
+    let folder = tempdir().unwrap();
+    let script = "mount -t tmpfs -o size=12k none $DISK || exit 99
+                  $ATOLL run configs/quickstart.toml --quiet --bodies 500 --steps 4000 --ranks 2 --log $DISK/log.csv --log-every 1
+                  echo \"ended: $?\"
+                  cp $DISK/log.csv $KEPT/log.csv";
+    let Some(ended) = with_disk(folder.path(), script) else { return };
+    assert!(ended.stdout.contains("ended: 5") && ended.complaints().len() == 1, "{ended}");
+    let complaint = ended.complaints()[0];
+    assert!(complaint.contains("log.csv: No space left on device") && complaint.contains("of 4000 steps"), "{ended}");
+    let text = fs::read_to_string(folder.path().join("kept/log.csv")).unwrap();
+    let fields = |line: &str| line.split(',').count();
+    let whole = text.ends_with('\n') && text.lines().all(|line| fields(line) == fields(text.lines().next().unwrap()));
+    assert!(whole && text.lines().count() > 5, "{text}");
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_is_refused_at_once() {
     let folder = tempdir().unwrap();
@@ -110,4 +128,19 @@ fn a_folder_that_cannot_be_written_is_refused_at_once() {
         assert!(ended.stderr.contains(expected) && ended.stderr.contains("--out "), "{ended}");
         assert!(!ended.stdout.contains("state hash"), "{ended}");
     }
+}
+
+#[test]
+fn an_export_that_does_not_fit_leaves_nothing() {
+    let folder = tempdir().unwrap();
+    let script = "mount -t tmpfs -o size=2m none $DISK || exit 99
+         $ATOLL run configs/quickstart.toml --quiet --steps 4 --bodies 4000 --ranks 2 --record-every 2 --out $KEPT/run || exit 98
+         $ATOLL export $KEPT/run --vtk $DISK/out
+         echo \"export: $?\"
+         find $DISK -mindepth 1";
+    let Some(ended) = with_disk(folder.path(), script) else { return };
+    assert_eq!((ended.code, ended.complaints().len()), (Some(0), 1), "{ended}");
+    assert!(ended.stdout.ends_with("export: 5\n"), "something is left: {ended}");
+    let complaint = ended.complaints()[0];
+    assert!(complaint.contains("cannot write ") && complaint.contains(".vtu: No space left on device"), "{ended}");
 }

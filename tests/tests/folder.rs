@@ -81,8 +81,22 @@ fn what_a_run_keeps_is_not_written_over() {
     let snapshot = "snapshots/step-0000000020/rank-00000-of-00002.atoll";
     let config = folder.path().join("world.toml");
     fs::copy(program::root().join("configs/quickstart.toml"), &config).unwrap();
-    for name in ["run.toml", "summary.json", "lock", segment, snapshot, "rank-00007/x", ".run.toml.7.tmp"] {
-        let options = if name == segment { ["--timings", "--plot"] } else { ["--json", "--json"] };
+    for name in [
+        "run.toml",
+        "summary.json",
+        "log.csv",
+        "timings.csv",
+        "lock",
+        segment,
+        snapshot,
+        "rank-00007/x",
+        ".run.toml.7.tmp",
+    ] {
+        let options = match name {
+            name if name == segment => ["--timings", "--plot"],
+            "timings.csv" | "run.toml" => ["--log", "--json"],
+            _ => ["--json", "--json"],
+        };
         // Of the run itself, and of any other; however the way there is written.
         for file in [run.join(name), other.join("../other").join(name)] {
             let expected = format!("that is a file of the run in {}/", folder.path().canonicalize().unwrap().display());
@@ -152,6 +166,65 @@ fn a_run_goes_on_only_with_the_whole_of_its_recording() {
     }
     fs::remove_dir_all(run.join("rank-00000")).unwrap();
     assert_refused(&program::run(resume(&run).args(["--steps", "40"])), 2, "the segment that holds step 0 is missing");
+}
+
+#[test]
+fn a_log_is_gone_on_with_and_what_is_no_row_is_refused() {
+    let (folder, run) = recorded("run");
+    let log = run.join("log.csv");
+    let whole = fs::read_to_string(&log).unwrap();
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    let mine = folder.path().join("mine.csv");
+    let on = |options: &[&str]| program::run(resume(&run).args(["--steps", "40"]).args(options));
+    let steps = |file: &Path| -> Vec<String> { program::log(file)[1..].iter().map(|row| row[0].clone()).collect() };
+    assert_eq!(steps(&log), ["0", "10", "20", "30"]);
+    for (harmed, expected) in [
+        (
+            whole.replacen("10,0.1", "10,O.1", 1),
+            "log.csv is damaged: line 3 is no row of this log; bring back a good copy",
+        ),
+        (lines[1..].concat(), "log.csv is no log, or one of another version: it begins with 0,0.0,1000"),
+        (whole.replacen("step,time,", "step,hours,", 1), "it begins with step,hours,bodies"),
+    ] {
+        fs::write(&log, harmed).unwrap();
+        let before = contents(&run);
+        for way in Way::all() {
+            assert_refused(&program::run(way.resume(1, &run).args(["--quiet", "--steps", "40"])), 2, expected);
+        }
+        if !expected.contains("hours") {
+            assert_refused(&program::run(program::command().arg("info").arg(&run)), 2, "log.csv is ");
+        }
+        assert_eq!(contents(&run), before);
+    }
+    // The user's own as well.
+    fs::write(&log, &whole).unwrap();
+    fs::write(&mine, "thesis").unwrap();
+    assert_refused(&on(&["--log", mine.to_str().unwrap()]), 2, "mine.csv is no log");
+    assert_eq!(
+        (fs::read_to_string(&mine).unwrap().as_str(), fs::read_to_string(&log).unwrap()),
+        ("thesis", whole.clone())
+    );
+    fs::remove_file(&mine).unwrap();
+    // What a killed run left after its last snapshot goes, whatever it is; what is torn, too.
+    fs::write(&log, format!("{whole}35,0.5\n\0\0\n")).unwrap();
+    let ended = on(&["--log", mine.to_str().unwrap(), "--log-every", "4"]);
+    assert_eq!((ended.code, ended.complaints().len()), (Some(0), 0), "{ended}");
+    let text = fs::read_to_string(&log).unwrap();
+    assert!(text.starts_with(&whole), "{text}");
+    assert_eq!(steps(&log), ["0", "10", "20", "30", "32", "36", "40"]);
+    // One that is new begins with the state from which the run goes on.
+    assert_eq!(steps(&mine), ["30", "32", "36", "40"]);
+    let info = program::run(program::command().arg("info").arg(&run));
+    assert!(info.stdout.contains("log           7 rows, steps 0 to 40\n"), "{info}");
+    // Where it was not written for a while, it says so and goes on.
+    fs::write(&log, lines[..3].concat()).unwrap();
+    let ended = program::run(resume(&run).args(["--steps", "50"]));
+    assert!(ended.code == Some(0) && ended.stderr.contains("log.csv: no rows from step 10 to 40"), "{ended}");
+    assert_eq!(steps(&log), ["0", "10", "44", "48", "50"]);
+    // An older version left none.
+    fs::remove_file(&log).unwrap();
+    assert_eq!(program::run(resume(&run).args(["--steps", "60"])).code, Some(0));
+    assert_eq!(steps(&log), ["50", "52", "56", "60"]);
 }
 
 /// Of several that are started at once, one begins the run, and all others wait for its end.

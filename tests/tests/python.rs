@@ -1,7 +1,7 @@
 //! The examples in Python of `docs/recordings.md`, run as they stand on a recording of three ranks: what they print is what
-//! the program itself tells of that run.
+//! the program itself tells of that run; and the files of `atoll export`, read by VTK itself.
 //!
-//! Needs an interpreter with polars, pandas, pyarrow and DuckDB: the one that `ATOLL_PYTHON` names, else `python3`.
+//! Needs an interpreter with polars, pandas, pyarrow, DuckDB and VTK: the one that `ATOLL_PYTHON` names, else `python3`.
 
 use atoll::recording::{Recording, Row};
 use atoll_tests::program::{self, root};
@@ -15,7 +15,7 @@ use tempfile::tempdir;
 /// Fails where one of the packages is missing.
 const PROBE: &str = "
 from importlib.util import find_spec
-assert all(map(find_spec, ['tomllib', 'polars', 'pandas', 'pyarrow', 'duckdb']))";
+assert all(map(find_spec, ['tomllib', 'polars', 'pandas', 'pyarrow', 'duckdb', 'vtk']))";
 
 const BODIES: usize = 2000;
 
@@ -69,12 +69,12 @@ fn check_polars(text: &str, records: &[(u64, Vec<Row>)], summary: &Value) {
 
 /// All records of one body.
 fn check_pandas(text: &str, records: &[(u64, Vec<Row>)]) {
-    let rows = rows::<8>(text);
+    let rows = rows::<9>(text);
     assert_eq!(rows.len(), records.len(), "{text}");
     for ([step, id, state @ ..], (expected_step, record)) in rows.into_iter().zip(records) {
         assert_eq!((step, id), (*expected_step as f64, 1000.0), "{text}");
         let body = record.iter().find(|row| row.id == 1000).unwrap();
-        let rest = [body.angle, body.vx, body.vy, body.omega].map(f64::from);
+        let rest = [body.angle, body.vx, body.vy, body.omega, body.kind as f32].map(f64::from);
         for (found, expected) in state.into_iter().zip([body.x, body.y].into_iter().chain(rest)) {
             assert_close(found, expected, text);
         }
@@ -107,7 +107,7 @@ fn check_metadata(text: &str, records: &[(u64, Vec<Row>)]) {
 #[test]
 fn examples_print_what_the_program_tells() {
     let Some(python) = python() else {
-        eprintln!("not checked: python3 lacks polars, pandas, pyarrow or duckdb, and ATOLL_PYTHON names no other");
+        eprintln!("not checked: python3 lacks polars, pandas, pyarrow, duckdb or vtk, and ATOLL_PYTHON names no other");
         return;
     };
     let folder = tempdir().unwrap();
@@ -133,4 +133,26 @@ fn examples_print_what_the_program_tells() {
     check_duckdb(&printed("import duckdb"), &records);
     check_metadata(&printed("import pyarrow.parquet"), &records);
     assert_eq!(page.matches("```python").count(), 4, "another example is not checked");
+}
+
+#[test]
+fn vtk_reads_what_was_recorded() {
+    let Some(python) = python() else { return };
+    let folder = tempdir().unwrap();
+    let (run, out) = (folder.path().join("run"), folder.path().join("out"));
+    let mut command = program::command();
+    command.args(["run", "configs/quickstart.toml", "--quiet", "--steps", "20", "--bodies", "1000"]);
+    command.args(["--ranks", "3", "--record-every", "5", "--out"]).arg(&run);
+    assert_eq!(program::run(&mut command).code, Some(0));
+    let mut command = program::command();
+    let ended = program::run(command.arg("export").arg(&run).args(["--every", "2", "--vtk"]).arg(&out));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(0), 0), "{ended}");
+    assert!(ended.stdout.starts_with("3 records of 1000 bodies, steps 0 to 20, and 16 statics, "), "{ended}");
+
+    let mut command = Command::new(&python);
+    command.arg(root().join("tests/read_vtk.py")).args([&run, &out]).args(["0", "10", "20"]);
+    let ended = program::run(&mut command);
+    let step = |step| format!("step {step} bodies 1000 ranks 3\n");
+    let expected = [0, 10, 20].map(step).concat() + "statics 16\n";
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), expected.as_str()), "{ended}");
 }

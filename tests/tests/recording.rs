@@ -1,7 +1,7 @@
 //! What runs record: the same whatever carries the bytes, and nothing that is missing, torn or changed goes unnoticed.
 
 use atoll::recording::{Recording, Row};
-use atoll_tests::program::{self, diff};
+use atoll_tests::program::{self, diff, log};
 use atoll_tests::ways::Way;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use serde_json::Value;
@@ -33,12 +33,15 @@ fn every_transport_records_the_same_and_another_seed_does_not() {
     let folder = tempdir().unwrap();
     let local = folder.path().join("local");
     record(Way::Local, 1, &local, &[]);
+    let figures = log(&local.join("log.csv"));
+    assert!(figures[7][..2] == ["60", "1.0"] && figures[7][2] == "4000" && figures.len() == 8, "{figures:?}");
     let expected = "identical: 13 records of 4000 bodies, steps 0 to 60\n";
     for (k, way) in Way::all().into_iter().enumerate() {
-        for ranks in [2, 3, 13].into_iter().filter(|&ranks| way.supports(ranks)) {
+        for ranks in [2, 3, 4, 13].into_iter().filter(|&ranks| way.supports(ranks)) {
             // One rank of thirteen has no tile.
             let other = folder.path().join(format!("{k}-{ranks}"));
-            record(way, ranks, &other, &[]);
+            record(way, ranks, &other, if ranks == 3 { &["--threads", "2"] } else { &[] });
+            assert_eq!(log(&other.join("log.csv")), figures, "{way}, {ranks} ranks");
             let ended = diff(&local, &other, &[]);
             assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), expected), "{way}, {ranks} ranks: {ended}");
         }
@@ -95,7 +98,10 @@ fn missing_and_torn_files_are_named() {
     {
         let harmed = copy(&whole, what);
         harm(&harmed.join(name), length);
-        for ended in [diff(&whole, &harmed, &[]), diff(&harmed, &whole, &["--tolerance", "1e6"])] {
+        let out = folder.path().join("out");
+        let export = program::run(program::command().arg("export").arg(&harmed).arg("--vtk").arg(&out));
+        assert!(!out.exists(), "{what}: {export}");
+        for ended in [diff(&whole, &harmed, &[]), diff(&harmed, &whole, &["--tolerance", "1e6"]), export] {
             assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{what}: {ended}");
             let complaint = ended.complaints()[0];
             assert!(complaint.contains(expected) && complaint.contains(&*harmed.to_string_lossy()), "{what}: {ended}");
@@ -154,4 +160,28 @@ fn the_last_bit_of_one_number_in_a_file_is_found() {
     assert!(ended.stdout.contains(&format!("first difference: step 30, body {id}, in x\n")), "{ended}");
     assert!(ended.stdout.contains(&format!(": x {was},")) && ended.stdout.contains(&format!(": x {is},")), "{ended}");
     assert_eq!(diff(&whole, &edited, &["--tolerance", "1e-9"]).code, Some(0));
+}
+
+/// The files in `tests/data` were written before recordings had kinds and statics.
+#[test]
+fn a_recording_of_format_1_is_read_compared_and_exported() {
+    let folder = tempdir().unwrap();
+    let (old, new) = (program::root().join("tests/data/recording-format-1"), folder.path().join("new"));
+    let mut command = program::command();
+    let ended = program::run(command.arg("run").arg(old.join("run.toml")).args(["--quiet", "--out"]).arg(&new));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    for [a, b] in [[&old, &new], [&new, &old], [&old, &old]] {
+        let ended = diff(a, b, &[]);
+        let expected = "identical: 3 records of 12 bodies, steps 0 to 20\n";
+        assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), expected), "{ended}");
+    }
+    // What the one leaves to its configuration, and the other says, is the same.
+    let files = [&old, &new].map(|run| {
+        let out = folder.path().join(if *run == old { "old-out" } else { "new-out" });
+        let ended = program::run(program::command().arg("export").arg(run).arg("--vtk").arg(&out));
+        assert_eq!(ended.code, Some(0), "{ended}");
+        let names = ["statics.vtu", "run.pvd", "bodies-0000000020/rank-00000.vtu", "bodies-0000000020/rank-00001.vtu"];
+        names.map(|name| fs::read(out.join(name)).unwrap())
+    });
+    assert!(files[0] == files[1], "the files are not the same");
 }

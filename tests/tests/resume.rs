@@ -44,6 +44,12 @@ fn assert_same_end(found: &Path, expected: &Path, what: &str) {
     assert!(ended.code == Some(0) && ended.stdout.starts_with("identical"), "{what}: {ended}");
 }
 
+/// Without a gap, and nothing told twice.
+fn assert_same_log(found: &Path, expected: &Path, what: &str) {
+    let log = |folder: &Path| program::log(&folder.join("log.csv"));
+    assert_eq!(log(found), log(expected), "{what}");
+}
+
 /// Snapshots that are there, by step.
 fn snapshots(folder: &Path) -> Vec<u64> {
     let entries = fs::read_dir(folder.join("snapshots")).into_iter().flatten().flatten();
@@ -103,6 +109,7 @@ fn killed_runs_go_on_elsewhere() {
             };
             run(&mut command);
             assert_same_end(&killed, &whole, &what);
+            assert_same_log(&killed, &whole, &what);
             fs::remove_dir_all(&killed).unwrap();
         }
     }
@@ -114,6 +121,19 @@ fn whole(folder: &Path) -> PathBuf {
     run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "120", "--out"]).arg(&whole));
     assert_eq!(snapshots(&whole), [100, 120]);
     whole
+}
+
+/// Where a run was stopped there is one more row, which has its part of the migrations that the next would have told.
+fn assert_same_log_but_for(stopped: u64, found: &Path, expected: &Path) {
+    let [mut found, expected] = [found, expected].map(|folder| program::log(&folder.join("log.csv")));
+    let migrations = found[0].iter().position(|name| name == "migrations").unwrap();
+    let count = |row: &[String]| row[migrations].parse::<u64>().unwrap();
+    if found.len() > expected.len() {
+        let at = found.iter().position(|row| row[0] == stopped.to_string()).unwrap();
+        let more = found.remove(at);
+        found[at][migrations] = (count(&more) + count(&found[at])).to_string();
+    }
+    assert_eq!(found, expected, "stopped after {stopped} steps");
 }
 
 #[test]
@@ -150,6 +170,7 @@ fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
         let expected = folder.path().join("expected");
         run(Way::Channel.command(1, CONFIG).args(OPTIONS).args(["--steps", &more, "--out"]).arg(&expected));
         assert_same_end(&run_folder, &expected, &format!("{way} stopped after {steps} steps"));
+        assert_same_log_but_for(steps, &run_folder, &expected);
         fs::remove_dir_all(&run_folder).unwrap();
         fs::remove_dir_all(&expected).unwrap();
     }
@@ -182,6 +203,7 @@ fn a_lost_rank_is_made_good_by_restarts() {
             let ended = run(command.args(["--restarts", "1"]));
             assert!(ended.stderr.contains("starting again (1 of 1 times)"), "{way}: {ended}");
             assert_same_end(&run_folder, &whole, &format!("{way}, a panic at {panic_at}"));
+            assert_same_log(&run_folder, &whole, &format!("{way}, a panic at {panic_at}"));
             fs::remove_dir_all(&run_folder).unwrap();
         }
     }
@@ -215,6 +237,7 @@ fn a_killed_rank_is_made_good_by_restarts() {
     assert_eq!(ended.code, Some(0), "{ended}");
     assert!(ended.stderr.contains("starting again (2 of 5 times)"), "{ended}");
     assert_same_end(&run_folder, &whole, "two ranks killed");
+    assert_same_log(&run_folder, &whole, "two ranks killed");
 }
 
 #[test]
@@ -256,9 +279,10 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
 fn a_run_that_was_killed_at_its_very_end_tells_all_there_is_to_tell() {
     let folder = tempdir().unwrap();
     let whole = whole(folder.path());
-    let expected = summary(&whole);
+    let (expected, figures) = (summary(&whole), program::log(&whole.join("log.csv")));
     fs::remove_file(whole.join("summary.json")).unwrap();
     run(Way::Channel.resume(3, &whole).arg("--quiet"));
+    assert_eq!(program::log(&whole.join("log.csv")), figures);
     let found = summary(&whole);
     for key in ["state_hash", "contact_hash", "ghosts", "islands", "colors", "constraint_violation", "contacts"] {
         assert_eq!(found[key], expected[key], "{key}");

@@ -109,6 +109,13 @@ pub struct Kind {
     pub material: Material,
 }
 
+impl Kind {
+    /// Whether there can be bodies of it: its shape has a size, and all of its numbers are finite and in their ranges.
+    pub fn is_valid(&self) -> bool {
+        self.shape.is_valid() && self.material.is_valid()
+    }
+}
+
 /// A kind with everything the step derives from it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KindRow {
@@ -153,12 +160,18 @@ impl KindRow {
         })
     }
 
+    /// Mass and moment of inertia.
+    #[inline(always)]
+    pub(crate) fn masses(&self) -> [f32; 2] {
+        [self.mass, self.inertia]
+    }
+
     pub(crate) fn fixed(kind: &Kind) -> Option<Self> {
         Self::checked(kind)
     }
 
     fn checked(kind: &Kind) -> Option<Self> {
-        if !(kind.shape.is_valid() && kind.material.is_valid()) {
+        if !kind.is_valid() {
             return None;
         }
         let (extent, radius) = match kind.shape {

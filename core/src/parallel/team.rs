@@ -67,13 +67,21 @@ impl Team {
         if self.is_alone() || things.len() == 1 {
             things.into_iter().map(work).collect()
         } else {
-            things.into_par_iter().with_max_len(1).map(&work).collect()
+            let piece = |thing| {
+                let _span = tracing::trace_span!("piece").entered();
+                work(thing)
+            };
+            things.into_par_iter().with_max_len(1).map(piece).collect()
         }
     }
 
     /// Runs `work` once for every thread: on this thread, and on those that come to help. Some may run one after the
     /// other, if nobody comes.
     pub(crate) fn together(self, work: impl Fn() + Sync) {
+        let work = || {
+            let _span = tracing::trace_span!("crew").entered();
+            work();
+        };
         rayon::in_place_scope(|scope| {
             for _ in 1..self.threads {
                 scope.spawn(|_| work());

@@ -1,5 +1,6 @@
 //! What a world looks like at its end: counted per tile in f64, added up in tile order.
 
+use super::figures::Overlaps;
 use crate::collide::narrow_phase::Contacts;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -60,23 +61,9 @@ impl TileFacts {
         }
         let violation = tile.violation;
         (facts.solved_points, facts.violation, facts.max_violation) = (violation.points, violation.sum, violation.max);
-        for (i, (key, contact)) in contacts.cache.iter().enumerate() {
-            // Both owners of a border contact see it; the one with body A counts it.
-            let border = key.is_border();
-            if border && contacts.bodies[i][0] as usize >= tile.owned {
-                continue;
-            }
-            let separations = &contacts.separation[i][..contact.point_count()];
-            let touching = separations.iter().any(|&s| s < setup.params.speculative_distance);
-            facts.contacts += u64::from(touching);
-            facts.border_contacts += u64::from(touching && border);
-            for &separation in separations.iter().filter(|&&s| s < 0.0) {
-                let depth = -f64::from(separation);
-                facts.overlaps += 1;
-                facts.penetration += depth;
-                facts.max_penetration = if depth > facts.max_penetration { depth } else { facts.max_penetration };
-            }
-        }
+        let found = Overlaps::among(contacts, 0..contacts.cache.len(), tile.owned, setup);
+        (facts.contacts, facts.border_contacts) = (found.contacts, found.border_contacts);
+        (facts.overlaps, facts.penetration, facts.max_penetration) = (found.points, found.depth, found.most);
         facts
     }
 }

@@ -53,9 +53,11 @@ pub struct StepReport {
 /// # Errors
 /// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
+    let _span = tracing::trace_span!("step", step = world.step).entered();
     world.begin_step();
     let Verdict { stop: stopped, meet: meeting, .. } = migrate(world, halo)?;
     world.measures |= stopped;
+    world.takes_figures |= stopped;
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
@@ -204,6 +206,10 @@ fn finalize(bench: &mut Bench<'_>) {
         b.tile.contacts.copy_from(&contacts.cache);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
         b.tile.count_rest(b.setup);
+        if let Some(figures) = &mut b.figures {
+            figures.add_bodies(b.tile, b.setup, b.team);
+            figures.add_contacts(b.tile, contacts, b.setup, b.team);
+        }
     });
 }
 

@@ -11,6 +11,7 @@ use crate::exchange::migrate::MigrateWork;
 use crate::islands::Islands;
 use crate::parallel::team::Team;
 use crate::solver::Solver;
+use crate::state::figures::Figures;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -36,6 +37,8 @@ pub(crate) struct Hand {
     pub(crate) timings: Timings,
     /// What its tiles have to tell at the next sync point.
     pub(crate) outgoing: Mailbag,
+    /// Of its tiles, in a step that takes them.
+    pub(crate) figures: Figures,
     /// For tiles that are stepped in one go.
     work: Work,
 }
@@ -53,6 +56,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) team: Team,
     /// Whether this step measures how well its contacts are solved.
     pub(crate) measures: bool,
+    /// Where this step adds its figures, if it takes them.
+    pub(crate) figures: Option<&'a mut Figures>,
     timings: &'a mut Timings,
     watch: Stopwatch,
 }
@@ -64,20 +69,25 @@ pub(crate) struct Shop<'a> {
     pub(crate) step: u64,
     pub(crate) team: Team,
     pub(crate) measures: bool,
+    /// Whether this step takes figures.
+    pub(crate) takes_figures: bool,
 }
 
 impl<'a> Bench<'a> {
     pub(crate) fn new(shop: Shop<'a>, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
-        let Hand { migrate, timings, outgoing, work } = hand;
-        let Shop { setup, step, team, measures } = shop;
-        Self { tile, work, migrate, outgoing, mail, setup, step, team, measures, timings, watch: Stopwatch::start() }
+        let Hand { migrate, timings, outgoing, figures, work } = hand;
+        let Shop { setup, step, team, measures, takes_figures } = shop;
+        let figures = takes_figures.then_some(figures);
+        let watch = Stopwatch::start();
+        Self { tile, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
     }
 
     /// The same with work of the tile's own.
     pub(crate) fn with_work<'b>(&'b mut self, work: &'b mut Work) -> Bench<'b> {
-        let Self { tile, migrate, outgoing, timings, .. } = self;
-        let Self { mail, setup, step, team, measures, watch, .. } = *self;
-        Bench { tile, work, migrate, outgoing, mail, setup, step, team, measures, timings, watch }
+        let &mut Self { mail, setup, step, team, measures, watch, .. } = self;
+        let Self { tile, migrate, outgoing, figures, timings, .. } = self;
+        let figures = figures.as_deref_mut();
+        Bench { tile, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
     }
 
     /// Runs one stage and books the time since the one before.

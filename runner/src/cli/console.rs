@@ -4,6 +4,7 @@ use super::progress::{Progress, Show};
 use crate::config::OneLine;
 use crate::error::RunError;
 use crate::rank::Listener;
+use crate::rank::trace::Spans;
 use std::env::{self, VarError};
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
@@ -14,11 +15,11 @@ use tracing_subscriber::prelude::*;
 /// What says which log lines are written: `warn`, `atoll=debug`, `off,atoll::rank=trace`.
 const FILTER: &str = "RUST_LOG";
 
-/// Starts logging: warnings and errors, or what `RUST_LOG` says.
+/// Starts logging: warnings and errors, or what `RUST_LOG` says. With `traces`, spans can be traced as well, whatever it says.
 ///
 /// # Errors
 /// If `RUST_LOG` cannot be understood.
-pub(super) fn init() -> Result<(), RunError> {
+pub(super) fn init(traces: bool) -> Result<(), RunError> {
     let filter = match env::var(FILTER) {
         Ok(value) => {
             value.parse().map_err(|error: ParseError| RunError::LogFilter { value, reason: format!("{error}") })?
@@ -32,7 +33,11 @@ pub(super) fn init() -> Result<(), RunError> {
     let stderr = std::io::stderr;
     let lines = tracing_subscriber::fmt::layer().with_ansi(stderr().is_terminal()).with_writer(stderr);
     // Fails only where a subscriber is already in place, which then serves as well.
-    let _ = tracing_subscriber::registry().with(lines).with(filter).try_init();
+    let _ = if traces {
+        tracing_subscriber::registry().with(lines.with_filter(filter)).with(Spans::layer()).try_init()
+    } else {
+        tracing_subscriber::registry().with(lines).with(filter).try_init()
+    };
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use std::io::{self, IsTerminal};
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, RunError> {
     let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
     Kept { runs: vec![&args.a, &args.b], configuration: None }.check(options)?;
-    let [json, plot] = WholeFile::check_two(options)?;
+    let [json, plot] = WholeFile::check_all(options)?;
 
     for run in [&args.a, &args.b] {
         if let Err(error) = Ended::read(run) {

@@ -5,9 +5,9 @@ use super::console::complain;
 use super::output;
 use crate::config::{Config, OneLine};
 use crate::error::{Exit, RunError};
-use crate::folder::recording::{Recording, RecordingError, Segment};
+use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
-use crate::folder::{Ended, RunFolder};
+use crate::folder::{Ended, LogError, Rows, RunFolder};
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -38,12 +38,12 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         }
     };
     output::show(&text)?;
-    let refusal = |error| folder.refusal(format!("{error}; remove it, or bring back a good copy of it")).into();
+    let refusal = |error: String| folder.refusal(format!("{error}; remove it, or bring back a good copy of it")).into();
     trouble.map_or(Ok(Exit::Done), |error| Err(refusal(error)))
 }
 
-/// `trouble` is a snapshot that is damaged, of which the text tells as well.
-fn of_run(folder: &RunFolder, trouble: &mut Option<SnapshotError>) -> Result<String, RunError> {
+/// `trouble` is what is wrong with a file that is damaged, of which the text tells as well.
+fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, RunError> {
     let config = Config::load_begun(&folder.configuration())?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
@@ -51,6 +51,9 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<SnapshotError>) -> Result<Str
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
+    let log = log(folder);
+    row(&mut text, "log", log.as_ref().unwrap_or_else(|damage| damage));
+    *trouble = log.err();
     let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
     if found.snapshots.is_empty() {
         row(&mut text, "snapshots", "none");
@@ -61,7 +64,7 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<SnapshotError>) -> Result<Str
             Ok(()) => format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state),
             Err(error) => {
                 let told = error.to_string();
-                trouble.get_or_insert(error);
+                trouble.get_or_insert_with(|| told.clone());
                 told
             }
         };
@@ -69,7 +72,7 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<SnapshotError>) -> Result<Str
     }
     for error in found.unusable {
         row(&mut text, "snapshot", &error.to_string());
-        trouble.get_or_insert(error);
+        trouble.get_or_insert_with(|| error.to_string());
     }
     Ok(text)
 }
@@ -100,7 +103,20 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
     steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
-    Ok(format!("{count} records, steps 0 to {last}, every {every}; {size} in {} files", files.len()))
+    let shapes = recording.stage().map_or("no shapes".to_owned(), shapes);
+    Ok(format!("{count} records, steps 0 to {last}, every {every}; {shapes}; {size} in {} files", files.len()))
+}
+
+fn shapes(stage: &Stage) -> String {
+    let plural = |count: usize, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
+    format!("{}, {}", plural(stage.kinds.len(), "kind"), plural(stage.statics.len(), "static"))
+}
+
+/// What there is of figures over time, or what is wrong with them.
+fn log(folder: &RunFolder) -> Result<String, String> {
+    let rows = Rows::find(&folder.log(), None, None).map_err(|error: LogError| error.to_string())?;
+    let steps = rows.and_then(|rows| Some((rows.count, rows.steps?)));
+    Ok(steps.map_or("none".to_owned(), |(count, (first, last))| format!("{count} rows, steps {first} to {last}")))
 }
 
 fn of_snapshot(snapshot: &Snapshot) -> Result<String, SnapshotError> {
@@ -146,6 +162,7 @@ fn of_segment(path: &Path) -> Result<String, RecordingError> {
     let steps: Vec<String> = records.iter().map(|record| record.step.to_string()).collect();
     row(&mut text, "steps", &steps.join(" "));
     row(&mut text, "rows", &records.iter().map(|record| record.rows).sum::<u64>().to_string());
+    row(&mut text, "shapes", &segment.stage()?.as_ref().map_or("none: format 1".to_owned(), shapes));
     row(&mut text, "size", &megabytes(iter::once(path)));
     Ok(text)
 }

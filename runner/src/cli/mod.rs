@@ -3,10 +3,13 @@
 pub(crate) mod args;
 mod console;
 mod diff;
+mod export;
 mod info;
 mod interrupt;
 mod output;
 mod progress;
+mod render;
+mod report;
 mod run;
 
 use crate::error::{Exit, RunError};
@@ -22,12 +25,15 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    let begun = console::init();
+    let begun = console::init(matches!(&cli.command, Command::Run(args) if args.trace.is_some()));
     interrupt::outlive_file_limits();
     let result = begun.and_then(|()| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
+        Command::Report(args) => report::run(args),
+        Command::Export(args) => export::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

@@ -36,7 +36,10 @@ impl Kept<'_> {
     ///
     /// # Errors
     /// Naming the first such path, and what is there.
-    pub(super) fn check(&self, options: [(&'static str, Option<&Path>); 2]) -> Result<(), RunError> {
+    pub(super) fn check<'a>(
+        &self,
+        options: impl IntoIterator<Item = (&'static str, Option<&'a Path>)>,
+    ) -> Result<(), RunError> {
         for (option, path) in options {
             if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
                 return Err(RunError::TakenOutput { option, path: path.to_owned(), what });
@@ -87,19 +90,25 @@ impl WholeFile {
         }
     }
 
-    /// As [`check`](Self::check), for two options, if given, which must not name one file.
+    /// As [`check`](Self::check), for some options, if given, which must name files of their own.
     ///
     /// # Errors
-    /// If a path cannot be written, or both are the same.
-    pub(super) fn check_two(options: [(&'static str, Option<&Path>); 2]) -> Result<[Option<Self>; 2], RunError> {
-        let [(first, path), (option, other)] = options;
-        if let Some(path) = other.filter(|_| other == path) {
-            let reason = format!("{first} writes to the same file");
-            return Err(RunError::BadOutput { option, path: path.to_owned(), reason });
+    /// If a path cannot be written, or two are the same.
+    pub(super) fn check_all<const N: usize>(
+        options: [(&'static str, Option<&Path>); N],
+    ) -> Result<[Option<Self>; N], RunError> {
+        for (i, (option, path)) in options.iter().enumerate() {
+            let before = options[..i].iter().find(|(_, other)| path.is_some() && other == path);
+            if let (Some((first, _)), Some(path)) = (before, path) {
+                let reason = format!("{first} writes to the same file");
+                return Err(RunError::BadOutput { option, path: path.to_path_buf(), reason });
+            }
         }
-        let check = |(option, path): (_, Option<&Path>)| path.map(|path| Self::check(option, path)).transpose();
-        let [first, second] = options.map(check);
-        Ok([first?, second?])
+        let mut files = [const { None }; N];
+        for (file, (option, path)) in files.iter_mut().zip(options) {
+            *file = path.map(|path| Self::check(option, path)).transpose()?;
+        }
+        Ok(files)
     }
 
     /// A path that is sure to be writable when it is needed, or else to fail then.

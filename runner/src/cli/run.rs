@@ -12,10 +12,10 @@ use crate::error::{Exit, RunError};
 use crate::folder::{Claim, RunFolder};
 use crate::launch;
 use crate::plan::Plan;
-use crate::rank::Observer;
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
-use crate::summary::{Summary, timings};
+use crate::rank::{Observer, check_logs};
+use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
@@ -130,18 +130,20 @@ fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
+    .map(|plan| Plan { log: args.log.clone(), ..plan })
 }
 
-/// A plan whose run can go on with what is recorded.
+/// A plan whose run can go on with what is recorded, and with its log.
 fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
-    plan.and_then(|plan| plan.check_recording().map(|()| plan))
+    plan.and_then(|plan| plan.check_recording().and_then(|()| check_logs(&plan)).map(|()| plan))
 }
 
 fn observer(args: &RunArgs, goes_on: bool) -> Observer {
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
     // What has been tried once is not tried again.
     let panic_at = args.panic_at.filter(|_| !goes_on);
-    Observer { listener: Some(Arc::new(Console::new(show))), panic_at, ..Observer::default() }
+    let trace = args.trace.is_some().then(|| args.trace_steps.clone().unwrap_or_default());
+    Observer { listener: Some(Arc::new(Console::new(show))), panic_at, trace, ..Observer::default() }
 }
 
 /// What the user may want to know before the run starts.
@@ -151,9 +153,10 @@ fn tell(plan: &Plan) {
     }
 }
 
-/// What is written to files of their own when the run is over, with the options that say where.
-fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 2] {
-    [("--json", args.json.as_deref()), ("--timings", args.timings.as_deref())]
+/// What is written to files of their own, with the options that say where.
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 4] {
+    let files = [("--json", &args.json), ("--timings", &args.timings), ("--trace", &args.trace), ("--log", &args.log)];
+    files.map(|(option, path)| (option, path.as_deref()))
 }
 
 /// Refuses to write them over what this run reads or keeps, or what another has left.
@@ -190,7 +193,9 @@ fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
 fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
     match config {
         Ok(config) => config.transport() == TransportKind::Mpi,
-        Err(_) => args.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched(),
+        Err(_) => {
+            args.values.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched()
+        }
     }
 }
 
@@ -240,12 +245,14 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
 /// Shows and writes what became of a run, and says with which exit code to end.
 fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // All are tried before any is complained about: the one may save what another lost.
-    let json = |file: &Option<WholeFile>| file.as_ref().map_or(Ok(()), |file| file.write(&summary.to_json()));
-    let (folder, json) = (json(&outputs.folder), json(&outputs.json));
-    let timings =
-        outputs.timings.as_ref().map_or(Ok(()), |file| file.write(timings::to_csv(&summary.timings).as_bytes()));
+    let write = |file: &Option<WholeFile>, bytes: &[u8]| file.as_ref().map_or(Ok(()), |file| file.write(bytes));
+    let (json, timings) = (summary.to_json(), timings::to_csv(&summary.timings));
+    // In a folder the summary comes last, and says that all is there.
+    let folder = write(&outputs.folder_timings, timings.as_bytes()).and(write(&outputs.folder, &json));
+    let (json, timings) = (write(&outputs.json, &json), write(&outputs.timings, timings.as_bytes()));
     let shown = output::show(summary);
-    folder.and(json).and(timings).and(shown)?;
+    let trace = outputs.trace.as_ref().map_or(Ok(()), |file| write_trace(summary, file));
+    folder.and(json).and(timings).and(trace).and(shown)?;
     if summary.escaped > 0 {
         let (escaped, bodies) = (summary.escaped, summary.bodies);
         complain(&format!(
@@ -258,13 +265,29 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     Ok(if summary.interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
+/// Writes what the threads did, and says where that is not all that was asked for.
+fn write_trace(summary: &Summary, file: &WholeFile) -> Result<(), RunError> {
+    let ranks = summary.trace.as_deref().unwrap_or_default();
+    file.write(&trace::to_json(summary, ranks))?;
+    if ranks.iter().all(|rank| rank.slices.is_empty()) {
+        complain(&"--trace: none of the steps that were to be traced was made; choose others with --trace-steps");
+    }
+    match trace::left_out(ranks) {
+        0 => {}
+        some => complain(&format!("--trace: the file has no room for {some} slices more; choose fewer --trace-steps")),
+    }
+    Ok(())
+}
+
 /// The files to write when the run is over.
 #[derive(Default)]
 struct Outputs {
     json: Option<WholeFile>,
     timings: Option<WholeFile>,
-    /// The summary in the folder of the run.
+    trace: Option<WholeFile>,
+    /// The summary and the timings in the folder of the run.
     folder: Option<WholeFile>,
+    folder_timings: Option<WholeFile>,
 }
 
 impl Outputs {
@@ -279,7 +302,7 @@ impl Outputs {
         error
     }
 
-    /// Where the summary and the timings are to go, checked.
+    /// Where everything is to go, checked.
     fn check(args: &RunArgs) -> Result<Self, RunError> {
         if let Some(folder) = folder(args)
             && let Err(error) = folder.check_free(args.overwrite)
@@ -288,8 +311,10 @@ impl Outputs {
         {
             return Err(error.into());
         }
-        let folder = folder(args).map(|folder| WholeFile::unchecked(&folder.summary()));
-        let [json, timings] = WholeFile::check_two(files(args))?;
-        Ok(Self { json, timings, folder })
+        let unchecked = |file: fn(&RunFolder) -> PathBuf| folder(args).map(|run| WholeFile::unchecked(&file(&run)));
+        // The log is written by the run itself.
+        let [json, timings, trace, _] = WholeFile::check_all(files(args))?;
+        let (folder, folder_timings) = (unchecked(RunFolder::summary), unchecked(RunFolder::timings));
+        Ok(Self { json, timings, trace, folder, folder_timings })
     }
 }

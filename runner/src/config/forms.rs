@@ -240,7 +240,7 @@ fn float(number: f32) -> Value {
 }
 
 /// The steps per second that a step of this length came from. Of several, the one that is shortest to write.
-fn hertz(dt: f32) -> f32 {
+pub(super) fn hertz(dt: f32) -> f32 {
     let nearest = 1.0 / dt;
     // Each of two divisions rounds by at most half a unit. For every number there is, that makes one unit at most.
     let near = [nearest, nearest.next_down(), nearest.next_up()];

@@ -106,6 +106,7 @@ pub(super) static KEYS: &[Key] = &[
     key("physics.sleep_time", What, &Float(|c| &mut c.params.sleep_time)),
     key("output.record_every", How, &OptionalWhole(|c| &mut c.output.record_every, 1..=MOST_STEPS)),
     key("output.checkpoint_every", How, &OptionalWhole(|c| &mut c.output.checkpoint_every, 1..=MOST_STEPS)),
+    key("output.log_every", How, &Whole(|c| Some(&mut c.output.log_every), |_| 1..=MOST_STEPS)),
 ];
 
 // What only some scenes have.

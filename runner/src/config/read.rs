@@ -21,6 +21,11 @@ impl Config {
         Self::read(&file, &text, &[], |_| true)
     }
 
+    /// As [`load_begun`](Self::load_begun), from text. `name` stands for it in errors.
+    pub(crate) fn from_begun_str(name: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::read(name, text, &[], |_| true)
+    }
+
     /// Reads a configuration from text. `name` stands for it in errors; `overrides` are keys and values as after
     /// `--set`.
     ///

@@ -1,5 +1,6 @@
 //! What a configuration holds, section by section, and what is usual where nobody says.
 
+use super::forms;
 use crate::scene::{SceneKind, SceneSpec};
 use atoll_core::Params;
 use std::time::Duration;
@@ -41,13 +42,15 @@ pub struct RunConfig {
     pub mpi_exchange: MpiExchange,
 }
 
-/// `[output]`: of runs that were given a folder for it.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+/// `[output]`: of runs that were given a folder for it, or a file for their log.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct OutputConfig {
     /// The bodies are recorded every so many steps; `None` records nothing.
     pub record_every: Option<u64>,
     /// A snapshot to go on from is written every so many steps; `None` writes none.
     pub checkpoint_every: Option<u64>,
+    /// The log gets a row every so many steps.
+    pub log_every: u64,
 }
 
 /// How ranks exchange messages over MPI. Both ways give the same bits.
@@ -110,11 +113,22 @@ impl Default for RunConfig {
     }
 }
 
+impl Default for OutputConfig {
+    fn default() -> Self {
+        Self { record_every: None, checkpoint_every: None, log_every: 10 }
+    }
+}
+
 impl Config {
     /// What is usual for a scene.
     pub(super) fn usual(kind: SceneKind) -> Self {
         let (run, output) = (RunConfig::default(), OutputConfig::default());
         Self { scene: SceneSpec::usual(kind), run, params: kind.usual_params(), output }
+    }
+
+    /// Steps in a second.
+    pub fn hertz(&self) -> f64 {
+        f64::from(forms::hertz(self.params.dt))
     }
 
     /// The transport that was chosen, or the one that suits the number of ranks.

@@ -132,6 +132,7 @@ fn every_key_can_be_given() {
         [output]
         record_every = 10
         checkpoint_every = 100
+        log_every = 5
     "#;
     let config = read(text, &[]).unwrap();
     assert_eq!(config.scene, SceneSpec { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
@@ -147,7 +148,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.params.iterations, config.params.baumgarte, config.params.linear_slop), (20, 0.3, 0.01));
     assert_eq!((config.params.island_search, config.params.ghosts), (IslandSearch::Dfs, Ghosts::Frozen));
     assert_eq!((config.params.sleep, config.params.sleep_speed, config.params.sleep_time), (true, 0.1, 1.0));
-    assert_eq!(config.output, OutputConfig { record_every: Some(10), checkpoint_every: Some(100) });
+    assert_eq!(config.output, OutputConfig { record_every: Some(10), checkpoint_every: Some(100), log_every: 5 });
 
     let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
     // The scene's four stand on one line; jitter, base, angle and friction belong to other kinds.

@@ -3,6 +3,8 @@
 //! ```text
 //! DIR/run.toml        the configuration with every value that was used; `atoll run` this file to repeat the run
 //! DIR/summary.json    as --json writes it, once the run has ended
+//! DIR/log.csv         figures over time, a row after every so many steps (log_file.rs)
+//! DIR/timings.csv     as --timings writes it, once the run has ended
 //! DIR/lock            held by every process of the run
 //! DIR/rank-00000/     segments of the recording, a folder for each rank (recording/)
 //! DIR/snapshots/      (snapshot/)
@@ -12,6 +14,7 @@ mod claim;
 pub(crate) mod durable;
 mod ended;
 mod error;
+mod log_file;
 pub(crate) mod recording;
 mod run_folder;
 pub(crate) mod snapshot;
@@ -19,4 +22,6 @@ pub(crate) mod snapshot;
 pub(crate) use claim::Claim;
 pub use ended::{Ended, EndedError};
 pub use error::FolderError;
+pub use log_file::LogError;
+pub(crate) use log_file::{LogFile, Rows};
 pub use run_folder::RunFolder;

@@ -40,6 +40,16 @@ impl RunFolder {
         self.path.join("summary.json")
     }
 
+    /// Figures over time.
+    pub fn log(&self) -> PathBuf {
+        self.path.join("log.csv")
+    }
+
+    /// Where the time of each rank went.
+    pub fn timings(&self) -> PathBuf {
+        self.path.join("timings.csv")
+    }
+
     /// The snapshots.
     pub fn snapshots(&self) -> PathBuf {
         self.path.join("snapshots")
@@ -82,15 +92,16 @@ impl RunFolder {
 
     /// Whether a run keeps a file or a folder of that name in its folder: nobody else may write there.
     pub fn owns(&self, name: &OsStr) -> bool {
-        let fixed = [self.configuration(), self.summary(), self.snapshots(), self.lock()];
-        fixed.iter().any(|path| path.file_name() == Some(name))
+        let written = [self.configuration(), self.summary(), self.timings()];
+        let fixed = [self.log(), self.snapshots(), self.lock()];
+        written.iter().chain(&fixed).any(|path| path.file_name() == Some(name))
             || name.to_str().is_some_and(recording::is_rank_folder)
             || self.is_unfinished(name)
     }
 
     /// Whether a file of that name in here is one that a killed run did not finish.
     fn is_unfinished(&self, name: &OsStr) -> bool {
-        [self.configuration(), self.summary()].iter().any(|path| is_temporary(name, path))
+        [self.configuration(), self.summary(), self.timings()].iter().any(|path| is_temporary(name, path))
     }
 
     /// Refuses a folder in which no run was begun.
@@ -125,15 +136,17 @@ impl RunFolder {
         self.refusal(format!("{error}; name a folder that can be written to"))
     }
 
-    /// Removes what a run left after `step`, as it goes on from there; everything but the configuration if there is no such
-    /// step.
+    /// Removes what a run left after `step`, as it goes on from there, but for the log, which only loses rows; everything but
+    /// the configuration if there is no such step.
     ///
     /// # Errors
     /// What the system says.
     pub fn remove_after(&self, step: Option<u64>) -> io::Result<()> {
         for entry in fs::read_dir(&self.path)? {
             let entry = entry?;
-            if entry.path() == self.summary() || self.is_unfinished(&entry.file_name()) {
+            let ended = [self.summary(), self.timings()].contains(&entry.path());
+            let begins_anew = step.is_none() && entry.path() == self.log();
+            if ended || begins_anew || self.is_unfinished(&entry.file_name()) {
                 fs::remove_file(entry.path())?;
             }
         }

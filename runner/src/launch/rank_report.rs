@@ -1,6 +1,7 @@
 //! What a rank in a process of its own reports to the process that started it: one line of JSON on its standard output.
 
 use crate::error::Exit;
+use crate::rank::trace::RankTrace;
 use crate::rank::{Gathered, RankEnd, RankError, RankFacts};
 use atoll_core::TileFacts;
 use atoll_transport::{Rank, RankFailure, TransportError};
@@ -18,11 +19,12 @@ enum Report {
     Aborted { reason: String },
 }
 
-/// The figures of all ranks as the 64-bit words they consist of.
+/// The figures of all ranks as the 64-bit words they consist of, and what their threads did.
 #[derive(Serialize, Deserialize)]
 struct Figures {
     ranks: Vec<u64>,
     tiles: Vec<u64>,
+    trace: Option<Vec<RankTrace>>,
 }
 
 /// Why a rank ended early.
@@ -44,6 +46,7 @@ pub(super) fn write(end: &Result<RankEnd, RankFailure>, complete: u64) -> String
                 Ok(gathered) => Ok(gathered.as_ref().map(|gathered| Figures {
                     ranks: bytemuck::cast_slice(&gathered.ranks).to_vec(),
                     tiles: bytemuck::cast_slice(&gathered.tiles).to_vec(),
+                    trace: gathered.trace.clone(),
                 })),
                 Err(error) => Err(trouble(error)),
             };
@@ -74,8 +77,8 @@ pub(super) fn read(rank: Rank, bytes: &[u8]) -> Option<(Result<RankEnd, RankFail
         Report::Ended { complete, result } => {
             let result = match result {
                 Ok(None) => Ok(None),
-                Ok(Some(figures)) => {
-                    Ok(Some(Gathered { ranks: records(&figures.ranks)?, tiles: records(&figures.tiles)? }))
+                Ok(Some(Figures { ranks, tiles, trace })) => {
+                    Ok(Some(Gathered { ranks: records(&ranks)?, tiles: records(&tiles)?, trace }))
                 }
                 Err(Trouble::Transport(text)) => Err(RankError::Transport(TransportError::from_text(&text)?)),
                 Err(Trouble::Other { text, exit }) => Err(RankError::Told { text, exit: Exit::from_code(exit) }),
@@ -100,6 +103,7 @@ const _: () = assert!(align_of::<RankFacts>() == 8 && align_of::<TileFacts>() ==
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rank::trace::Slice;
     use std::time::Duration;
 
     fn there_and_back(end: Result<RankEnd, RankFailure>) -> Result<RankEnd, RankFailure> {
@@ -114,7 +118,10 @@ mod tests {
     fn figures_arrive_bit_for_bit() {
         let ranks = vec![RankFacts { steps: u64::MAX, wait_nanos: 7, ..RankFacts::default() }; 3];
         let tiles = vec![TileFacts { mass: 0.1 + 0.2, max_violation: -0.0, ..TileFacts::default() }; 2];
-        let gathered = Gathered { ranks, tiles };
+        let slice = Slice { thread: 1, name: 0, of: Some((1, u64::MAX)), start: -5, nanos: 7 };
+        let names = ["substeps", "tile"].map(str::to_owned).to_vec();
+        let trace = Some(vec![RankTrace { left_out: 3, doubt: 2, names, slices: vec![slice] }]);
+        let gathered = Gathered { ranks, tiles, trace };
         let end = there_and_back(Ok(RankEnd { complete: 9, result: Ok(Some(gathered.clone())) })).unwrap();
         assert_eq!(end.complete, 9);
         let arrived = end.result.unwrap().unwrap();

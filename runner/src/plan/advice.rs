@@ -32,8 +32,9 @@ impl Plan {
                 "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
             ));
         }
-        if self.output.is_none() && self.config.output != OutputConfig::default() {
-            notes.push("[output] says what to write, and there is no --out: nothing is written".to_owned());
+        let unlogged = OutputConfig { log_every: OutputConfig::default().log_every, ..self.config.output };
+        if self.output.is_none() && unlogged != OutputConfig::default() {
+            notes.push("[output] says what to write, and there is no --out: none of it is written".to_owned());
         }
         let goes_on = self.output.as_ref().filter(|output| !output.begins);
         let unreadable = goes_on.and_then(|output| Ended::read(output.folder.path()).err());

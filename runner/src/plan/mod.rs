@@ -9,11 +9,12 @@ pub(crate) use assignment::Assignment;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
-use crate::folder::recording::{Recording, RunFacts};
+use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
 use atoll_core::{Blueprint, TileGrid, World};
+use std::path::PathBuf;
 
 /// A configuration, checked and resolved.
 #[derive(Debug)]
@@ -32,6 +33,8 @@ pub struct Plan {
     pub transport: TransportKind,
     /// What is written while it runs, if anything is.
     pub output: Option<Output>,
+    /// Where figures over time are written to, beside the folder.
+    pub log: Option<PathBuf>,
     /// Where it can go on from; nothing if it begins.
     pub found: Found,
 }
@@ -124,6 +127,12 @@ impl Plan {
         Self::from_found(config, scene, tiles, found, Some((folder, false)))
     }
 
+    /// Everywhere figures over time are written to.
+    pub(crate) fn logs(&self) -> Vec<PathBuf> {
+        let folder = self.output.as_ref().map(|output| output.folder.log());
+        folder.into_iter().chain(self.log.clone()).collect()
+    }
+
     /// Whether all that was recorded before the snapshot from which the run goes on is there, and of this run, by what every
     /// file says about itself. For one process of a run to ask.
     ///
@@ -134,7 +143,8 @@ impl Plan {
         let Some((output, newest)) = self.output.as_ref().zip(newest) else { return Ok(()) };
         let Some(every) = output.every.record_every else { return Ok(()) };
         let facts = RunFacts::new(&self.config, self.scene.domain(), self.tiles, every);
-        let run = (output.folder.configuration(), facts);
+        let stage = Some(StageText::new(&self.blueprint.kinds, &self.blueprint.statics));
+        let run = OfRun { path: output.folder.configuration(), facts, stage };
         Recording::check_until(output.folder.path(), run, newest)
             .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())
     }
@@ -171,7 +181,8 @@ impl Plan {
             every: config.output,
             begins,
         });
-        Ok(Self { config: config.clone(), scene, blueprint, tiles, assignment, transport, output, found })
+        let config = config.clone();
+        Ok(Self { config, scene, blueprint, tiles, assignment, transport, output, log: None, found })
     }
 }
 

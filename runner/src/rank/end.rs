@@ -1,5 +1,6 @@
 //! The beginning and the end of what a rank writes, which ranks come to together.
 
+use super::log::Log;
 use super::recorder::Recorder;
 use super::trouble::all_well;
 use super::{Observer, RankError};
@@ -76,6 +77,25 @@ pub(super) fn finish(
     {
         observer.note(&format!("old snapshots stay in {}: {error}", folder.snapshots().display()));
     }
+    Ok(time)
+}
+
+/// Makes the log of a run durable that writes nothing else, and says how long this rank spent on that. A `failure` to write it
+/// ended the run.
+pub(super) fn finish_log(
+    log: Option<&Log>,
+    failure: Option<RunError>,
+    complete: u64,
+    plan: &Plan,
+    transport: &mut impl Transport,
+) -> Result<Duration, RankError> {
+    let Some(log) = log else { return Ok(Duration::ZERO) };
+    let start = Instant::now();
+    let stopped =
+        |why: RunError| RunError::StoppedLogging { why: why.to_string(), complete, steps: plan.config.run.steps };
+    let trouble = failure.or_else(|| log.sync().err()).map(stopped);
+    let time = start.elapsed();
+    all_well(transport, trouble.as_ref())?;
     Ok(time)
 }
 

@@ -1,11 +1,12 @@
 //! What each rank brings to the summary.
 
+use super::trace::RankTrace;
 use crate::scene::Scene;
 use atoll_core::{Hashes, Phase, StepReport, TileFacts, World};
 use bytemuck::{Pod, Zeroable};
 
 /// How many phases a step has.
-pub(crate) const PHASES: usize = Phase::ALL.len();
+pub(super) const PHASES: usize = Phase::ALL.len();
 
 /// What one rank brings to the summary. Plain data, so that it travels as bytes.
 #[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
@@ -45,7 +46,7 @@ pub struct RankFacts {
     pub wall_nanos: u64,
     /// Time in which the exchange waited for other ranks.
     pub wait_nanos: u64,
-    /// Time in which the state was copied to be written, or the disk was waited for.
+    /// Time in which the state was copied to be written, the disk was waited for, or a row of the log was made.
     pub output_nanos: u64,
     /// Time of each phase, in the order of [`Phase::ALL`].
     pub phase_nanos: [u64; PHASES],
@@ -58,6 +59,8 @@ pub(crate) struct Gathered {
     pub ranks: Vec<RankFacts>,
     /// Of all tiles, in no order in particular.
     pub tiles: Vec<TileFacts>,
+    /// What their threads did in some steps, by rank, if anybody wants to see that.
+    pub trace: Option<Vec<RankTrace>>,
 }
 
 impl RankFacts {
@@ -75,6 +78,25 @@ impl RankFacts {
             phase_nanos: Phase::ALL.map(|phase| world.timings().total(phase).as_nanos() as u64),
             ..Self::default()
         }
+    }
+
+    /// The time of each phase in the order of the step, in nanoseconds, `wait`, the part of the exchange in which it waited for
+    /// other ranks, and `other`, which no phase accounts for, such as threads out of work. They add up to all of it, but for
+    /// rounding.
+    pub fn phases(&self) -> Vec<(&'static str, u64)> {
+        let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum::<u64>() + self.output_nanos);
+        let mut phases = Vec::with_capacity(PHASES + 3);
+        for (phase, nanos) in Phase::ALL.into_iter().zip(self.phase_nanos) {
+            if phase == Phase::Exchange {
+                // The part in which nothing was done but wait is told apart.
+                let waited = self.wait_nanos.min(nanos);
+                phases.extend([(phase.name(), nanos - waited), ("wait", waited)]);
+            } else {
+                phases.push((phase.name(), nanos));
+            }
+        }
+        phases.extend([("output", self.output_nanos), ("other", rest)]);
+        phases
     }
 
     /// What two ranks come to together, or two groups of ranks. How each figure joins is said here and nowhere else; the

@@ -5,6 +5,7 @@ use atoll_core::{CodecError, Frames, Halo, Inbox, Outbox, TileId, Verdict};
 use atoll_transport::{Incoming, Rank, Transport, TransportError};
 use std::time::Duration;
 use thiserror::Error;
+use tracing::trace_span;
 
 /// Why a sync point failed.
 #[derive(Clone, PartialEq, Debug, Error)]
@@ -62,7 +63,10 @@ impl<T: Transport> Halo for RankHalo<'_, T> {
         for (to, bytes) in outgoing.iter_mut().filter(|(_, bytes)| !bytes.is_empty()) {
             self.frames.encode(outbox, to.index(), bytes);
         }
-        self.transport.exchange(&mut self.incoming)?;
+        {
+            let _span = trace_span!("wait").entered();
+            self.transport.exchange(&mut self.incoming)?;
+        }
         self.waited += self.incoming.waited();
         // What stays on this rank never becomes bytes.
         outbox.deliver(inbox);

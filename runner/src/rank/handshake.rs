@@ -59,6 +59,7 @@ fn hello(plan: &Plan) -> Hello {
         ("configuration", plan.config.hash(plan.tiles)),
         ("mpi_exchange", format!("{:?}", run.mpi_exchange).to_lowercase()),
         ("output", format!("{:?}", plan.output.as_ref().map(|output| (output.folder.path(), output.every)))),
+        ("log", format!("{:?}", plan.log)),
         ("snapshots of steps", format!("{:?}", plan.found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>())),
     ];
     lines.map(|(name, value)| (name.to_owned(), value)).into()

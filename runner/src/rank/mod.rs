@@ -7,24 +7,31 @@ mod halo;
 // Threads are started alike as it is.
 #[cfg(any(test, feature = "iceoryx2", feature = "mpi"))]
 pub(crate) mod handshake;
+mod log;
 mod observer;
 mod recorder;
+pub(crate) mod trace;
 pub(crate) mod trouble;
 
-pub(crate) use facts::{Gathered, PHASES, RankFacts};
+pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
-pub use observer::{Listener, Observer, PanicAt, StopFlag};
+pub(crate) use log::check_logs;
+pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
+pub(crate) use trace::TraceSteps;
 use trouble::Refusal;
 
 use crate::error::Exit;
 use crate::plan::Plan;
-use atoll_core::{SetupError, StepError, StepReport, TileFacts};
+use atoll_core::{Phase, SetupError, StepError, StepReport, TileFacts};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use begin::Beginning;
 use bytemuck::Pod;
+use log::Log;
 use rayon::ThreadPoolBuilder;
+use recorder::Recorder;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use trace::{RankTrace, Tracer};
 use tracing::{debug, info_span};
 
 /// Why a rank ended early.
@@ -129,7 +136,10 @@ fn run<T: Transport>(
     let Beginning { mut world, resumed } = begin::build(plan, rank, observer, halo.transport())?;
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
+    let logs = log::find(plan, resumed, halo.transport())?;
     recorder = end::start(plan, rank, resumed, halo.transport())?;
+    let start_log = |logs| Log::start(plan, logs, resumed, (&world, &mut halo), (recorder.as_ref(), observer));
+    let mut log = logs.map(start_log).transpose()?;
     *complete = world.step_count();
     observer.complete.store(*complete, Ordering::Relaxed);
     let built = Instant::now();
@@ -138,12 +148,16 @@ fn run<T: Transport>(
     let told = observer.steps(rank == Rank(0), world.step_count(), steps);
     let before = halo.transport().stats();
     let mut last = StepReport::default();
-    let mut migrations = 0;
+    let (mut migrations, mut log_failure) = (0, None);
+    let threads = plan.config.run.threads * plan.config.run.ranks;
+    let mut tracer = Tracer::new(observer.trace.as_ref(), world.step_count(), threads);
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);
     }
+    observer.show(rank, &world);
     while world.step_count() < steps && !last.stopped {
-        if observer.stop.is_requested() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some()) {
+        let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
+        if observer.stop.is_requested() || unwritten {
             world.request_stop();
         }
         if observer.panic_at == Some(PanicAt { rank: rank.0, step: world.step_count() }) {
@@ -152,40 +166,64 @@ fn run<T: Transport>(
         if world.step_count() + 1 == steps {
             world.measure_next_step();
         }
+        if let Some(log) = &log {
+            log.prepare(&mut world);
+        }
+        tracer.before(Some(world.step_count()));
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
         *complete = world.step_count();
         observer.complete.store(*complete, Ordering::Relaxed);
+        if let Some(log) = &mut log {
+            let written = recorder.as_ref().map_or(Duration::ZERO, Recorder::time);
+            log.write_due(&world, &last, (migrations, written), &mut halo)?;
+            match (log.take_failure(), &recorder) {
+                // Before a snapshot that would be gone on from without the rows until then.
+                (Some(failure), Some(recorder)) => recorder.fail(failure),
+                (Some(failure), None) => log_failure = Some(failure),
+                (None, _) => {}
+            }
+        }
         if let Some(recorder) = &mut recorder {
             recorder.write_due(&world, last.stopped);
         }
+        observer.show(rank, &world);
         told.made(*complete);
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
+    tracer.before(None);
     // Whoever asks while the last step is made gets all of them.
     let interrupted = last.stopped && *complete < steps;
-    let output_time = match recorder {
+    let mut output_time = match recorder {
         Some(recorder) => end::finish(recorder, &world, interrupted, plan, observer, halo.transport())?,
-        None => Duration::ZERO,
+        None => end::finish_log(log.as_ref(), log_failure, *complete, plan, halo.transport())?,
     };
     drop(told);
     let finished = Instant::now();
 
-    let sent = halo.transport().stats().since(&before);
+    let mut sent = halo.transport().stats().since(&before);
+    let mut waited = halo.waited();
     let mut facts = RankFacts::new(&world, &last, &plan.scene);
+    if let Some(log) = &log {
+        output_time += log.time();
+        waited += log.waited();
+        // Waiting for others is part of an exchange, whatever is exchanged.
+        facts.phase_nanos[Phase::Exchange as usize] += log.waited().as_nanos() as u64;
+        sent = sent.since(&log.sent());
+    }
     facts.interrupted = interrupted.into();
     facts.migrations = migrations;
     facts.resumed_at = resumed.unwrap_or(0);
     (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
     facts.build_nanos = (built - start).as_nanos() as u64;
     facts.wall_nanos = (finished - built).as_nanos() as u64;
-    facts.wait_nanos = halo.waited().as_nanos() as u64;
+    facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();
     }
-    gather(halo.transport(), &facts, &tiles).map_err(RankError::Transport)
+    gather(halo.transport(), &facts, &tiles, &tracer).map_err(RankError::Transport)
 }
 
 /// Brings everything to rank 0.
@@ -193,11 +231,13 @@ fn gather(
     transport: &mut impl Transport,
     facts: &RankFacts,
     tiles: &[TileFacts],
+    tracer: &Tracer,
 ) -> Result<Option<Gathered>, TransportError> {
     let ranks = transport.gather(Rank(0), bytemuck::bytes_of(facts))?;
     let tiles = transport.gather(Rank(0), bytemuck::cast_slice(tiles))?;
+    let trace: Option<Vec<RankTrace>> = tracer.gather(transport)?;
     let Some((ranks, tiles)) = ranks.zip(tiles) else { return Ok(None) };
-    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)? };
+    let gathered = Gathered { ranks: records(&ranks)?, tiles: records(&tiles)?, trace };
     if gathered.ranks.len() == ranks.len() { Ok(Some(gathered)) } else { Err(unreadable(Rank(0))) }
 }
 

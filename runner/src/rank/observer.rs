@@ -1,5 +1,8 @@
 //! How a run is watched, and stopped.
 
+use super::trace::TraceSteps;
+use atoll_core::World;
+use atoll_transport::Rank;
 use std::fmt::Debug;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -17,15 +20,27 @@ pub trait Listener: Debug + Send + Sync {
     fn note(&self, text: &str);
 }
 
+/// Sees the world of each rank while it is run. It may make a rank wait; it can change nothing.
+pub trait Watcher: Debug + Send + Sync {
+    /// Whether to be shown what is there after so many steps. All ranks must be told the same.
+    fn wants(&self, step: u64) -> bool;
+    /// What a rank holds after a step that is wanted. Each rank shows this on its own thread, and goes on afterwards.
+    fn see(&self, rank: Rank, world: &World);
+}
+
 /// How a run is watched. The usual one hears nothing and never stops it.
 #[derive(Clone, Default, Debug)]
 pub struct Observer {
     /// Who hears of it.
     pub listener: Option<Arc<dyn Listener>>,
+    /// Who sees it.
+    pub watcher: Option<Arc<dyn Watcher>>,
     /// Ends the run early.
     pub stop: StopFlag,
     /// Lets a rank panic.
     pub panic_at: Option<PanicAt>,
+    /// Which steps to trace, if any.
+    pub trace: Option<TraceSteps>,
     /// Steps that were completed here, by the rank that said so last; so that they are known even after a panic.
     pub complete: Arc<AtomicU64>,
 }
@@ -35,6 +50,13 @@ impl Observer {
     pub(super) fn note(&self, text: &str) {
         if let Some(listener) = &self.listener {
             listener.note(text);
+        }
+    }
+
+    /// Shows what a rank holds, if somebody wants to see it.
+    pub(super) fn show(&self, rank: Rank, world: &World) {
+        if let Some(watcher) = self.watcher.as_deref().filter(|watcher| watcher.wants(world.step_count())) {
+            watcher.see(rank, world);
         }
     }
 

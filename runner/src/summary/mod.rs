@@ -2,10 +2,12 @@
 
 mod table;
 pub(crate) mod timings;
+pub(crate) mod trace;
 
 pub use timings::RankTimings;
 
 use crate::plan::Plan;
+use crate::rank::trace::RankTrace;
 use crate::rank::{Gathered, RankFacts};
 use atoll_core::{Facts, Hashes};
 use serde::{Serialize, Serializer};
@@ -110,11 +112,14 @@ pub struct Summary {
     /// The time of each rank, for a file of its own.
     #[serde(skip)]
     pub timings: Vec<RankTimings>,
+    /// What each rank did in the steps that somebody wanted to see, for a file of its own.
+    #[serde(skip)]
+    pub(crate) trace: Option<Vec<RankTrace>>,
 }
 
 impl Summary {
     /// Joins what the ranks and the tiles have to say.
-    pub(crate) fn new(plan: &Plan, Gathered { ranks, tiles }: Gathered) -> Self {
+    pub(crate) fn new(plan: &Plan, Gathered { ranks, tiles, trace }: Gathered) -> Self {
         let all = ranks.iter().copied().reduce(RankFacts::join).unwrap_or_default();
         let facts = Facts::total(tiles);
         let hashes = Hashes::from_words(all.hashes);
@@ -166,6 +171,7 @@ impl Summary {
             phases: phases(&timings),
             peak_rss_bytes: all.peak_rss_bytes,
             timings,
+            trace,
         }
     }
 

@@ -1,7 +1,6 @@
 //! Where the time of each rank went, as a table for `--timings`.
 
-use crate::rank::{PHASES, RankFacts};
-use atoll_core::Phase;
+use crate::rank::RankFacts;
 use std::fmt::Write as _;
 
 /// The first line of the table.
@@ -18,28 +17,15 @@ pub struct RankTimings {
     pub steps: u64,
     /// All steps, from the first to the last.
     pub wall_nanos: u64,
-    /// Each phase in the order of the step, `wait`, the part of the exchange in which it waited for other ranks, and
-    /// `other`, which no phase accounts for, such as threads out of work. They add up to the whole, but for rounding.
+    /// As [`RankFacts::phases`].
     pub phases: Vec<(&'static str, u64)>,
 }
 
 impl RankTimings {
     /// Those of a rank that has so many threads.
     pub fn new(rank: usize, threads: usize, facts: &RankFacts) -> Self {
-        let rest = facts.wall_nanos.saturating_sub(facts.phase_nanos.iter().sum::<u64>() + facts.output_nanos);
-        let mut phases = Vec::with_capacity(PHASES + 3);
-        for (phase, nanos) in Phase::ALL.into_iter().zip(facts.phase_nanos) {
-            if phase == Phase::Exchange {
-                // The part in which nothing was done but wait is told apart.
-                let waited = facts.wait_nanos.min(nanos);
-                phases.extend([(phase.name(), nanos - waited), ("wait", waited)]);
-            } else {
-                phases.push((phase.name(), nanos));
-            }
-        }
-        phases.extend([("output", facts.output_nanos), ("other", rest)]);
         let steps = facts.steps - facts.resumed_at;
-        Self { rank, threads, steps, wall_nanos: facts.wall_nanos, phases }
+        Self { rank, threads, steps, wall_nanos: facts.wall_nanos, phases: facts.phases() }
     }
 
     /// Mean time of a step spent in so many nanoseconds in all, in milliseconds.

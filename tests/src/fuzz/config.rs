@@ -10,12 +10,13 @@ use atoll::scene::SceneKind;
 const SMALL: (u64, usize, u32) = (2000, 64, 128);
 
 /// What may be said about how a run is computed, and must not show in what is computed.
-const HOW: [(&str, &str); 5] = [
+const HOW: [(&str, &str); 6] = [
     ("run.ranks", "3"),
     ("run.threads", "2"),
     ("run.transport", "channel"),
     ("run.peer_timeout", "5"),
     ("output.record_every", "7"),
+    ("output.log_every", "7"),
 ];
 
 /// The text of a file, and after it any number of `key=value` as for `--set`, with a zero byte before each. It is

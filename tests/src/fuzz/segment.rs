@@ -1,9 +1,9 @@
 //! Segments of recordings, as `Recording` reads them.
 
 use super::Outcome;
-use atoll::internals::{Record, RecordingWriter, rank_folder};
+use atoll::internals::{Record, RecordingWriter, StageText, rank_folder};
 use atoll::recording::{Recording, RecordingError, Row, RunFacts};
-use atoll_core::{Body, GlobalId, KindId, Rot};
+use atoll_core::{Body, GlobalId, Kind, KindId, Material, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 use std::fs;
 use std::path::PathBuf;
@@ -42,7 +42,7 @@ impl Run {
         let mut record = Record::default();
         record.fill(0, (0..BODIES).map(body));
         let rank = rank_folder(folder.path(), 0);
-        let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts).expect("a new folder");
+        let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts, &stage()).expect("a new folder");
         writer.write(&record).and_then(|()| writer.close_segment()).expect("room for a small file");
         let segment = fs::read_dir(rank).expect("the folder just made").next().expect("its only file");
         let segment = segment.expect("a name").path();
@@ -59,6 +59,14 @@ impl Run {
     }
 }
 
+/// Two kinds of bodies, and two statics, one of them turned.
+fn stage() -> StageText {
+    let kind = |shape| Kind { shape, material: Material::default() };
+    let wall = |id, x| StaticBody::new(GlobalId(id), kind(Shape::rectangle(1.0, 9.0)), DVec2::new(x, 4.0));
+    let turned = StaticBody { rotation: Rot::from_angle(0.25), ..wall(7, 8.5) };
+    StageText::new(&[kind(Shape::rectangle(0.5, 1.0)), kind(Shape::circle(0.25))], &[wall(6, -0.5), turned])
+}
+
 fn body(id: u64) -> Body {
     let part = (id * 7 + 3) as f32;
     Body {
@@ -67,7 +75,7 @@ fn body(id: u64) -> Body {
         rotation: Rot::from_angle(part / 32.0),
         velocity: Vec2::new(part, -part),
         angular_velocity: part / 3.0,
-        kind: KindId(0),
+        kind: KindId((id % 2) as u32),
     }
 }
 

@@ -64,8 +64,20 @@ const OPTIONS: &[&str] = &[
 ];
 
 /// Other words that mean something.
-const WORDS: &[&str] =
-    &["run", "diff", "info", "--overwrite", "--quiet", "--help", "--version", "help", "--", "-", "world.toml"];
+const WORDS: &[&str] = &[
+    "run",
+    "diff",
+    "info",
+    "export",
+    "--overwrite",
+    "--quiet",
+    "--help",
+    "--version",
+    "help",
+    "--",
+    "-",
+    "world.toml",
+];
 
 const KEYS: &[&str] = &["hertz", "scene.bodies", "run", "sleep", "solvr", "", "a\nb", "=", "tiles"];
 

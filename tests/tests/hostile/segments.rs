@@ -8,7 +8,7 @@ use atoll::scene::SplitMix64;
 use atoll_tests::fuzz::{self, Outcome};
 
 /// What a segment may be refused for, by words of the reason.
-const REASONS: [&str; 7] = [
+const REASONS: [&str; 8] = [
     "other steps than its name says",
     "its rank is none",
     "other row groups",
@@ -16,6 +16,7 @@ const REASONS: [&str; 7] = [
     "the bytes of step",
     "step 0: ",
     "is unreadable",
+    "has a number that cannot be",
 ];
 /// Of another reason, given by the Parquet library, which knows very many.
 const OTHER_REASON: &str = "Parquet's own";
@@ -63,7 +64,16 @@ fn segment(random: &mut SplitMix64, genuine: &[u8]) -> Vec<u8> {
 
 /// Puts other digits into what a footer says in words, which is read only if all around is as it was.
 fn rewrite(random: &mut SplitMix64, footer: &mut [u8]) {
-    let names: [&[u8]; 5] = [b"atoll.steps", b"atoll.rank", b"atoll.ranks", b"atoll.record_every", b"atoll.seed"];
+    let names: [&[u8]; 8] = [
+        b"atoll.steps",
+        b"atoll.rank",
+        b"atoll.ranks",
+        b"atoll.record_every",
+        b"atoll.seed",
+        b"\"box\":",
+        b"\"circle\":",
+        b"\"ids\":",
+    ];
     let name = one_of(random, &names);
     let at = footer.windows(name.len()).position(|part| part == name).unwrap() + name.len();
     let text = &mut footer[at..at + 6];

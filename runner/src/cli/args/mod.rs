@@ -2,9 +2,12 @@
 //! a file or from here.
 
 mod recordings;
+mod render;
 mod run;
+mod values;
 
-pub(crate) use recordings::{DiffArgs, InfoArgs};
+pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
+pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
 
 use crate::config::OneLine;
@@ -28,8 +31,14 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
     Diff(DiffArgs),
+    /// Make a picture or a film of what a run has recorded, or of a configuration, which is run for it.
+    Render(Box<RenderArgs>),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.
     Info(InfoArgs),
+    /// Write a page about a run, or two side by side: what was run, pictures, figures over time, where the time went.
+    Report(ReportArgs),
+    /// Write what a run has recorded as files for other programs.
+    Export(ExportArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

@@ -1,6 +1,7 @@
 //! Options of the verbs that look at what runs have written.
 
 use clap::Args;
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 /// Options of `atoll diff`.
@@ -27,6 +28,35 @@ pub struct DiffArgs {
 pub struct InfoArgs {
     /// The folder of a run, or a file in it.
     pub path: PathBuf,
+}
+
+/// Options of `atoll report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The folder of a run, or of two runs to compare.
+    #[arg(required = true, num_args = 1..=2, value_name = "DIR")]
+    pub runs: Vec<PathBuf>,
+    /// Write the page to this file, as HTML.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Options of `atoll export`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct ExportArgs {
+    /// The folder of a run.
+    pub run: PathBuf,
+    /// Write files for ParaView to this folder, which must be new or empty; run.pvd is the one to open.
+    #[arg(long, value_name = "OUT")]
+    pub vtk: PathBuf,
+    /// Write one of every K records, the first among them.
+    #[arg(long, value_name = "K", default_value_t = NonZeroU32::MIN, value_parser = every)]
+    pub every: NonZeroU32,
+}
+
+fn every(text: &str) -> Result<NonZeroU32, &'static str> {
+    text.parse().map_err(|_| "must be a whole number, at least 1")
 }
 
 fn tolerance(text: &str) -> Result<f64, &'static str> {
@@ -57,6 +87,19 @@ mod tests {
             assert!(error.contains("'--tolerance <T>': must be a finite number, at least 0"), "{error}");
         }
         assert!(parse::<DiffArgs>("a").unwrap_err().contains("<B>"));
+        let args = parse::<ReportArgs>("runs/a runs/b --out r.html").unwrap();
+        assert_eq!((args.runs.len(), args.out.as_path()), (2, Path::new("r.html")));
+        for line in ["--out r.html", "a", "a b c --out r.html"] {
+            assert!(parse::<ReportArgs>(line).is_err(), "{line}");
+        }
+        let args = parse::<ExportArgs>("runs/a --vtk out --every 5").unwrap();
+        assert_eq!((args.vtk.as_path(), args.every.get()), (Path::new("out"), 5));
+        assert_eq!(parse::<ExportArgs>("runs/a --vtk out").unwrap().every.get(), 1);
+        for value in ["0", "-1", "1.5", "all", "4294967296"] {
+            let error = parse::<ExportArgs>(&format!("a --vtk b --every {value}")).unwrap_err();
+            assert!(error.contains("'--every <K>': must be a whole number, at least 1"), "{error}");
+        }
+        assert!(parse::<ExportArgs>("a").unwrap_err().contains("--vtk <OUT>"));
         assert_eq!(parse::<InfoArgs>("runs/a").unwrap().path, Path::new("runs/a"));
     }
 }

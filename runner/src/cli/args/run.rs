@@ -1,55 +1,48 @@
 //! Options of `atoll run`.
 
+use super::values::{ValueArgs, given};
 use crate::config::{ConfigError, Override};
-use crate::rank::PanicAt;
-use clap::Args;
+use crate::rank::{PanicAt, TraceSteps};
+use clap::{ArgGroup, Args};
 use std::path::PathBuf;
 
 /// Options of `atoll run`.
 #[derive(Debug, Args)]
-#[command(allow_negative_numbers = true)]
+#[command(allow_negative_numbers = true, group = ArgGroup::new("logged").multiple(true))]
 pub struct RunArgs {
     /// The configuration, a TOML file such as configs/quickstart.toml. May be left out with --resume.
     #[arg(required_unless_present = "resume")]
     pub config: Option<PathBuf>,
-    /// Ranks that share the tiles [default: the configuration's, else 1].
-    #[arg(long, value_name = "N")]
-    pub ranks: Option<String>,
-    /// Threads of each rank [default: the configuration's, else 1].
-    #[arg(long, value_name = "T")]
-    pub threads: Option<String>,
-    /// What carries bytes between ranks: local, channel, iceoryx2 or mpi [default: local for one rank, else channel].
-    #[arg(long, value_name = "NAME")]
-    pub transport: Option<String>,
+    /// What wins over the file's values.
+    #[command(flatten)]
+    pub values: ValueArgs,
     /// Columns and rows of tiles, such as 17x17, or auto.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
-    /// Dynamic bodies.
-    #[arg(long, value_name = "N")]
-    pub bodies: Option<String>,
-    /// Steps to make.
-    #[arg(long, value_name = "S")]
-    pub steps: Option<String>,
-    /// Chooses among the random variants of the scene.
-    #[arg(long, value_name = "N")]
-    pub seed: Option<String>,
-    /// Any key of the configuration, by its full path or an unambiguous last part; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Give up a rank that stays silent for so long.
-    #[arg(long, value_name = "SECONDS")]
-    pub peer_timeout: Option<String>,
     /// Write the summary to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Write where the time of each rank went to this file, as CSV.
     #[arg(long, value_name = "FILE")]
     pub timings: Option<PathBuf>,
-    /// Write configuration and summary to this folder, which must be new or empty, and records and snapshots as asked for.
-    #[arg(long, value_name = "DIR", group = "folder")]
+    /// Write what each thread of each rank did, and when, to this file, for ui.perfetto.dev or chrome://tracing, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// Trace the steps A to B - 1, counted from 0 [default: the first ten, as viewers open no more than some hundred
+    /// megabytes].
+    #[arg(long, value_name = "A..B", requires = "trace")]
+    pub trace_steps: Option<TraceSteps>,
+    /// Write figures over time to this file, as CSV: energies, contacts, overlaps, times. With --out they are in DIR/log.csv.
+    #[arg(long, value_name = "FILE", group = "logged")]
+    pub log: Option<PathBuf>,
+    /// Add figures every so many steps [default: the configuration's, else 10].
+    #[arg(long, value_name = "K", requires = "logged")]
+    pub log_every: Option<String>,
+    /// Write configuration, summary and log to this folder, which must be new or empty, and records and snapshots as asked for.
+    #[arg(long, value_name = "DIR", groups = ["folder", "logged"])]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder from its newest snapshot. With CONFIG, begin it there if there is none yet.
-    #[arg(long, value_name = "DIR", group = "folder")]
+    #[arg(long, value_name = "DIR", groups = ["folder", "logged"])]
     pub resume: Option<PathBuf>,
     /// Record every so many steps [default: the configuration's, else never].
     #[arg(long, value_name = "K", requires = "folder")]
@@ -77,21 +70,13 @@ impl RunArgs {
     /// # Errors
     /// On a `--set` without an equals sign.
     pub fn overrides(&self) -> Result<Vec<Override>, ConfigError> {
-        let mut overrides = self.set.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let options = [
-            ("--ranks", "run.ranks", &self.ranks),
-            ("--threads", "run.threads", &self.threads),
-            ("--transport", "run.transport", &self.transport),
+        let mut overrides = self.values.overrides()?;
+        overrides.extend(given(&[
             ("--tiles", "run.tiles", &self.tiles),
-            ("--bodies", "scene.bodies", &self.bodies),
-            ("--steps", "run.steps", &self.steps),
-            ("--seed", "scene.seed", &self.seed),
-            ("--peer-timeout", "run.peer_timeout", &self.peer_timeout),
             ("--record-every", "output.record_every", &self.record_every),
             ("--checkpoint-every", "output.checkpoint_every", &self.checkpoint_every),
-        ];
-        let given = options.iter().filter_map(|(option, key, value)| Some((option, key, value.as_ref()?)));
-        overrides.extend(given.map(|(option, key, value)| Override::option(option, key, value)));
+            ("--log-every", "output.log_every", &self.log_every),
+        ]));
         Ok(overrides)
     }
 }
@@ -141,7 +126,14 @@ mod tests {
         for option in ["--record-every 5", "--checkpoint-every 5", "--restarts 1"] {
             assert_eq!(parse(&format!("c.toml {option}")).unwrap_err(), folder, "{option}");
         }
+        for line in ["c.toml --log-every 5 --log a.csv", "c.toml --log-every 5 --out d --log a.csv"] {
+            assert!(parse(line).unwrap().log.is_some(), "{line}");
+        }
         for (line, expected) in [
+            (
+                "c.toml --log-every 5",
+                "the following required arguments were not provided: <--log <FILE>|--out <DIR>|--r",
+            ),
             ("c.toml --overwrite", "the following required arguments were not provided: --out <DIR>; see"),
             ("--overwrite --resume d", "the argument '--overwrite' cannot be used with '--resume <DIR>'; see"),
             ("c.toml --out d --resume d", "the argument '--out <DIR>' cannot be used with '--resume <DIR>'; see"),

@@ -79,6 +79,17 @@ pub enum RecordingError {
         /// The step.
         step: u64,
     },
+    /// A recording that leaves shapes to its configuration, which is of no use.
+    #[error(
+        "{}: recordings of format 1 have no shapes, and there is none in its configuration: {}; record the run again",
+        .path.display(), OneLine(.reason)
+    )]
+    NoScene {
+        /// One of its files.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// There is no such record.
     #[error("{} has no record of step {step}", .path.display())]
     NoSuchStep {

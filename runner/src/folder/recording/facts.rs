@@ -6,7 +6,33 @@ use std::num::NonZeroU16;
 use std::str::FromStr;
 
 /// Grows when older programs could no longer read a recording.
-const FORMAT: &str = "1";
+const FORMAT: Format = Format::WithStage;
+
+/// Versions of the layout that this program reads.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Format {
+    /// The first, which leaves it to the configuration what bodies look like.
+    StatesAlone = 1,
+    /// With a column for the kinds of bodies, and a [`Stage`](super::Stage).
+    WithStage = 2,
+}
+
+impl Format {
+    /// From what a file says, by name. The error is what is wrong with it.
+    pub(super) fn from_texts<'a>(text: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
+        let format: String = parse(&text, "format")?;
+        let known = [Self::StatesAlone, Self::WithStage].into_iter().find(|known| known.number() == format);
+        known.ok_or_else(|| {
+            let told = "bring a program that is newer, or the segment as it was";
+            format!("its format is {format}, and this program reads those until {}: {told}", FORMAT.number())
+        })
+    }
+
+    /// As it is written.
+    pub(super) fn number(self) -> String {
+        (self as u8).to_string()
+    }
+}
 
 /// The run a recording is of. In a file's metadata each is a text under its name, with `atoll.` in front.
 #[derive(Clone, PartialEq, Debug)]
@@ -49,7 +75,7 @@ impl RunFacts {
         let [low, high] = self.domain;
         let [columns, rows] = self.tiles;
         let pairs = [
-            ("format", FORMAT.to_owned()),
+            ("format", FORMAT.number()),
             ("version", self.version.clone()),
             ("scene", self.scene.clone()),
             ("seed", self.seed.to_string()),
@@ -65,10 +91,6 @@ impl RunFacts {
 
     /// From what a file says, by name. The error is what is wrong with it.
     pub(super) fn from_texts<'a>(text: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
-        let format: String = parse(&text, "format")?;
-        if format != FORMAT {
-            return Err(format!("its format is {format}, and this program reads {FORMAT}"));
-        }
         let numbers: String = parse(&text, "domain")?;
         let numbers: Option<Vec<f64>> = numbers.split(' ').map(|number| number.parse().ok()).collect();
         let Some(&[x0, y0, x1, y1]) = numbers.as_deref() else { return Err("atoll.domain is unreadable".to_owned()) };
@@ -87,6 +109,12 @@ impl RunFacts {
             canonical: parse(&text, "canonical")?,
         };
         if facts.record_every == 0 { Err("atoll.record_every is 0".to_owned()) } else { Ok(facts) }
+    }
+
+    /// Steps in a second.
+    pub(crate) fn hertz(&self) -> Option<f64> {
+        let hertz = self.canonical.lines().find_map(|line| line.strip_prefix("physics.hertz = "))?;
+        hertz.parse().ok().filter(|hertz: &f64| hertz.is_finite() && *hertz > 0.0)
     }
 
     /// In what this differs from the facts of another file, if both cannot be of one run. A run that was taken up again may

@@ -3,8 +3,9 @@
 //! Measured on 700,000 bodies of `configs/normal.toml` at step 300, on one core: plain values take 40 bytes a body and
 //! 22 ms to encode; ids as differences bring that to 34 bytes in the same time; floats with their bytes sorted by
 //! significance and compressed with Snappy to 28 bytes (25 in the first steps) and 36 ms. LZ4 does as Snappy does; zstd
-//! gets 27 bytes and needs a C compiler.
+//! gets 27 bytes and needs a C compiler. Kinds as numbers of a dictionary take a bit a body where there are two.
 
+use super::facts::Format;
 use parquet::basic::{Compression, Encoding};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesPtr};
@@ -12,7 +13,8 @@ use parquet::schema::parser::parse_message_type;
 use parquet::schema::types::{ColumnPath, TypePtr};
 use std::sync::Arc;
 
-const SCHEMA: &str = "message atoll {
+/// The columns of the first format, which all others have as well.
+const STATES: &str = "
     required int32 step (INTEGER(32, false));
     required int64 id (INTEGER(64, false));
     required double x;
@@ -20,18 +22,26 @@ const SCHEMA: &str = "message atoll {
     required float angle;
     required float vx;
     required float vy;
-    required float omega;
-}";
+    required float omega;";
 
-/// The columns.
-pub(super) fn schema() -> TypePtr {
-    Arc::new(parse_message_type(SCHEMA).expect("the schema is well formed"))
+/// The column that the second brought.
+const KIND: &str = "
+    required int32 kind (INTEGER(32, false));";
+
+/// The columns of a format.
+pub(super) fn schema(format: Format) -> TypePtr {
+    let kind = match format {
+        Format::StatesAlone => "",
+        Format::WithStage => KIND,
+    };
+    let text = format!("message atoll {{{STATES}{kind}\n}}");
+    Arc::new(parse_message_type(&text).expect("the schema is well formed"))
 }
 
 /// How the pages of a column are compressed.
 pub(super) fn compression(column: &ColumnPath) -> Compression {
     match column.string().as_str() {
-        "step" | "id" => Compression::UNCOMPRESSED,
+        "step" | "id" | "kind" => Compression::UNCOMPRESSED,
         _ => Compression::SNAPPY,
     }
 }
@@ -46,7 +56,7 @@ pub(super) fn properties(facts: Vec<KeyValue>) -> WriterPropertiesPtr {
         .set_offset_index_disabled(true)
         // Pages of a mebibyte, which compress better than the usual ones of 20,000 rows.
         .set_data_page_row_count_limit(usize::MAX);
-    for column in schema().get_fields() {
+    for column in schema(Format::WithStage).get_fields() {
         let column = ColumnPath::from(column.name());
         builder = builder.set_column_compression(column.clone(), compression(&column));
         builder = match column.string().as_str() {
@@ -54,6 +64,8 @@ pub(super) fn properties(facts: Vec<KeyValue>) -> WriterPropertiesPtr {
             "step" => builder
                 .set_column_statistics_enabled(column.clone(), EnabledStatistics::Chunk)
                 .set_column_dictionary_enabled(column, true),
+            // Few values, of a bit or a few each; in runs, where bodies of one kind lie side by side.
+            "kind" => builder.set_column_dictionary_enabled(column, true),
             "id" => builder
                 .set_column_statistics_enabled(column.clone(), EnabledStatistics::Chunk)
                 .set_column_encoding(column, Encoding::DELTA_BINARY_PACKED),

@@ -19,6 +19,9 @@
 //! | `angle` | f32 | rad, from -pi to pi |
 //! | `vx`, `vy` | f32 | m/s |
 //! | `omega` | f32 | rad/s |
+//! | `kind` | unsigned, 32 bits | row of the table of kinds, which with all that never moves is in the metadata ([`Stage`]) |
+//!
+//! Recordings of format 1 have no such column and no such table.
 
 mod error;
 mod facts;
@@ -28,6 +31,7 @@ mod reader;
 mod record;
 mod remove;
 mod segment;
+mod stage;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -36,10 +40,13 @@ mod writer;
 
 pub use error::RecordingError;
 pub use facts::RunFacts;
+pub(crate) use reader::OfRun;
 pub use reader::Recording;
 pub use record::{Record, Row};
 pub(crate) use remove::remove_after;
 pub(crate) use segment::Segment;
+pub(crate) use stage::distinct_kinds;
+pub use stage::{Stage, StageText};
 pub use writer::RecordingWriter;
 
 use std::path::{Path, PathBuf};

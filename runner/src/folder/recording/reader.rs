@@ -3,6 +3,7 @@
 use super::facts::RunFacts;
 use super::record::Row;
 use super::segment::Segment;
+use super::stage::{Stage, StageText};
 use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
 use crate::folder::ended::Ended;
 use std::fs;
@@ -15,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct Recording {
     folder: PathBuf,
     facts: RunFacts,
+    /// None in the first format.
+    stage: Option<Stage>,
     files: Vec<PathBuf>,
     /// By step and rank.
     parts: Vec<Part>,
@@ -33,8 +36,34 @@ struct Part {
     file: usize,
 }
 
+/// What a file says of the run it is of, with which others are compared.
+#[derive(Debug)]
+pub(crate) struct OfRun {
+    /// The file.
+    pub path: PathBuf,
+    /// What it says.
+    pub facts: RunFacts,
+    /// And of kinds and statics.
+    pub stage: Option<StageText>,
+}
+
+impl OfRun {
+    /// In what a segment differs from that, if both cannot be of one run.
+    fn other_run(&self, segment: &Segment) -> Option<String> {
+        let format = |stage: &Option<StageText>| if stage.is_some() { 2 } else { 1 };
+        let (ours, theirs) = (format(&self.stage), format(&segment.stage));
+        if ours != theirs {
+            return Some(format!("format is {ours} in the one and {theirs} in the other"));
+        }
+        let facts = self.facts.other_run(&segment.facts);
+        let stage = || (self.stage != segment.stage).then(|| "their kinds or statics are not the same".to_owned());
+        facts.or_else(stage)
+    }
+}
+
 impl Recording {
-    /// Reads what all segments say about themselves, and no rows.
+    /// Reads what all segments say about themselves, and no rows. Kinds and statics are the same in all; of these only one
+    /// is read.
     ///
     /// # Errors
     /// If there are no records, a file cannot be read, files do not go together, or one is missing. What is missing after
@@ -42,7 +71,10 @@ impl Recording {
     /// summary that cannot be read counts as missing.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let nothing = || RecordingError::Nothing { path: folder.to_owned() };
-        let mut recording = Self::index(folder, None, u64::MAX)?.ok_or_else(nothing)?;
+        let (mut recording, stage) = Self::index(folder, None, u64::MAX)?.ok_or_else(nothing)?;
+        let stage = stage.map(|stage| stage.read()).transpose();
+        let bad = |reason| RecordingError::BadSegment { path: recording.files[0].clone(), reason };
+        recording.stage = stage.map_err(bad)?;
         recording.ended = Ended::read(folder).ok().flatten();
         (recording.steps, recording.incomplete) =
             recording.find_complete(recording.ended.as_ref().map(|ended| ended.steps))?;
@@ -54,19 +86,19 @@ impl Recording {
     ///
     /// # Errors
     /// If something is missing, damaged, or of another run.
-    pub(crate) fn check_until(folder: &Path, run: (PathBuf, RunFacts), step: u64) -> Result<(), RecordingError> {
+    pub(crate) fn check_until(folder: &Path, run: OfRun, step: u64) -> Result<(), RecordingError> {
         let missing = || RecordingError::Missing { folder: folder.to_owned(), step: 0 };
-        let recording = Self::index(folder, Some(run), step)?.ok_or_else(missing)?;
+        let (recording, _) = Self::index(folder, Some(run), step)?.ok_or_else(missing)?;
         recording.find_complete(Some(step)).map(drop)
     }
 
     /// Reads what the segments that begin until a step say about themselves. `first` is what they are compared with, or else
-    /// the first of them. None if there are none.
+    /// the first of them. None if there are none, and else also the kinds and statics of all, which are not read yet.
     fn index(
         folder: &Path,
-        mut first: Option<(PathBuf, RunFacts)>,
+        mut first: Option<OfRun>,
         until: u64,
-    ) -> Result<Option<Self>, RecordingError> {
+    ) -> Result<Option<(Self, Option<StageText>)>, RecordingError> {
         let (mut files, mut parts) = (Vec::new(), Vec::new());
         // Of the last step, which is what the run came to be.
         let mut last = None;
@@ -76,9 +108,13 @@ impl Recording {
                 let reason = format!("it is of rank {}", segment.rank);
                 return Err(RecordingError::BadSegment { path, reason });
             }
-            let (other, facts) = first.get_or_insert_with(|| (path.clone(), segment.facts.clone()));
-            if let Some(what) = facts.other_run(&segment.facts) {
-                return Err(RecordingError::OtherRun { paths: [other.clone(), path], what });
+            let first = first.get_or_insert_with(|| OfRun {
+                path: path.clone(),
+                facts: segment.facts.clone(),
+                stage: segment.stage.clone(),
+            });
+            if let Some(what) = first.other_run(&segment) {
+                return Err(RecordingError::OtherRun { paths: [first.path.clone(), path], what });
             }
             let (ranks, file) = (segment.ranks, files.len());
             parts.extend(segment.records.iter().map(|record| {
@@ -92,8 +128,11 @@ impl Recording {
             files.push(path);
         }
         parts.sort_by_key(|part| (part.step, part.rank));
-        let folder = folder.to_owned();
-        Ok(last.map(|(_, facts)| Self { folder, facts, files, parts, steps: Vec::new(), incomplete: 0, ended: None }))
+        let (folder, stage) = (folder.to_owned(), first.and_then(|first| first.stage));
+        Ok(last.map(|(_, facts)| {
+            let steps = Vec::new();
+            (Self { folder, facts, stage: None, files, parts, steps, incomplete: 0, ended: None }, stage)
+        }))
     }
 
     /// The folder it is in.
@@ -106,6 +145,12 @@ impl Recording {
         &self.facts
     }
 
+    /// The kinds of its bodies, and what never moves. None in recordings of format 1: there they are those of the
+    /// configuration's scene.
+    pub fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref()
+    }
+
     /// Its segments.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
@@ -114,6 +159,11 @@ impl Recording {
     /// The steps of the records, ascending.
     pub fn steps(&self) -> &[u64] {
         &self.steps
+    }
+
+    /// How many bodies there are in a record, by what its files say about themselves.
+    pub(crate) fn rows(&self, step: u64) -> u64 {
+        self.parts[self.parts_of(step)].iter().fold(0, |sum, part| sum.saturating_add(part.rows))
     }
 
     /// Steps after the last record that only some ranks hold: the run was killed before all had written them.
@@ -131,6 +181,19 @@ impl Recording {
     /// # Errors
     /// If there is no such record, or its files are damaged.
     pub fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
+        self.read_ranks(step, rows, |_, _| {})
+    }
+
+    /// As [`read`](Self::read); of each rank in turn it also tells where its bodies end.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub(crate) fn read_ranks(
+        &self,
+        step: u64,
+        rows: &mut Vec<Row>,
+        mut ends: impl FnMut(u32, usize),
+    ) -> Result<(), RecordingError> {
         rows.clear();
         if self.steps.binary_search(&step).is_err() {
             return Err(RecordingError::NoSuchStep { path: self.folder.clone(), step });
@@ -142,8 +205,12 @@ impl Recording {
             let reason = format!("step {step} has more rows than this machine can hold");
             RecordingError::Read { path: self.folder.clone(), reason }
         })?;
-        for part in parts.iter().filter(|part| part.rows > 0) {
-            Segment::open(&self.files[part.file])?.read(step, rows)?;
+        let kinds = self.stage.as_ref().map_or(0, |stage| stage.kinds.len());
+        for part in parts {
+            if part.rows > 0 {
+                Segment::open(&self.files[part.file])?.read(step, kinds, rows)?;
+            }
+            ends(part.rank, rows.len());
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ pub struct Record {
     pub(super) vx: Vec<f32>,
     pub(super) vy: Vec<f32>,
     pub(super) omega: Vec<f32>,
+    pub(super) kind: Vec<u32>,
 }
 
 impl Record {
@@ -32,6 +33,7 @@ impl Record {
         self.vx.clear();
         self.vy.clear();
         self.omega.clear();
+        self.kind.clear();
         bodies.for_each(|body| {
             self.id.push(body.id.0);
             self.x.push(body.position.x);
@@ -40,6 +42,7 @@ impl Record {
             self.vx.push(body.velocity.x);
             self.vy.push(body.velocity.y);
             self.omega.push(body.angular_velocity);
+            self.kind.push(body.kind.0);
         });
     }
 
@@ -72,7 +75,7 @@ pub struct Row {
     pub vy: f32,
     /// Angular velocity, in rad/s, counter-clockwise.
     pub omega: f32,
-    /// Row of the table of kinds.
+    /// Row of the table of kinds; in recordings of format 1, which have none, 0.
     pub kind: u32,
     /// Nothing: so that rows are plain data.
     #[doc(hidden)]

@@ -6,8 +6,9 @@
 //! should a page be forged together with its checksum, the panic is caught.
 
 use super::error::reason;
-use super::facts::{RunFacts, parse};
+use super::facts::{Format, RunFacts, parse};
 use super::record::Row;
+use super::stage::{Stage, StageText};
 use super::{RecordingError, layout, quiet, steps_of_segment};
 use parquet::column::reader::ColumnReaderImpl;
 use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
@@ -34,6 +35,8 @@ pub(crate) struct Segment {
     path: PathBuf,
     /// The run it is of.
     pub facts: RunFacts,
+    /// The kinds and statics of that run, unless the segment is of the first format.
+    pub stage: Option<StageText>,
     /// Who wrote it.
     pub rank: u32,
     /// Of so many.
@@ -69,26 +72,38 @@ impl Segment {
         let failed = |error: io::Error| RecordingError::Read { path: path.to_owned(), reason: error.to_string() };
         let file = File::open(path).map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len();
-        let columns = Arc::new(SchemaDescriptor::new(layout::schema()));
-        let reader = ParquetMetaDataReader::new()
-            .with_metadata_options(Some(ParquetMetaDataOptions::new().with_schema(columns)));
-        let metadata = reader.parse_and_finish(&file).map_err(|error| bad(reason(&error)))?;
+        let metadata = read_metadata(&file).map_err(|error| bad(reason(&error)))?;
         let pairs = metadata.file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
         let text = |name: &str| {
             let pair = pairs.iter().find(|pair| pair.key.strip_prefix("atoll.") == Some(name));
             pair.and_then(|pair| pair.value.as_deref())
         };
+        let format = Format::from_texts(text).map_err(bad)?;
         let facts = RunFacts::from_texts(text).map_err(bad)?;
+        let stage = match format {
+            Format::StatesAlone => None,
+            Format::WithStage => Some(StageText::from_texts(text).map_err(bad)?),
+        };
         let (rank, ranks) = (parse(text, "rank").map_err(bad)?, parse(text, "ranks").map_err(bad)?);
         let steps: String = parse(text, "steps").map_err(bad)?;
         let records = entries(&steps).ok_or("atoll.steps is unreadable").map_err(|text| bad(text.to_owned()))?;
-        let mut segment = Self { path: path.to_owned(), facts, rank, ranks, records, file: Arc::new(file), metadata };
-        segment.check(length).map_err(|reason| bad(reason.to_owned()))?;
+        let (path, file) = (path.to_owned(), Arc::new(file));
+        let mut segment = Self { path, facts, stage, rank, ranks, records, file, metadata };
+        segment.check(format, length).map_err(|reason| bad(reason.to_owned()))?;
         Ok(segment)
     }
 
+    /// The kinds and statics, if it has any.
+    ///
+    /// # Errors
+    /// If what it says of them cannot be.
+    pub(crate) fn stage(&self) -> Result<Option<Stage>, RecordingError> {
+        let bad = |reason| RecordingError::BadSegment { path: self.path.clone(), reason };
+        self.stage.as_ref().map(StageText::read).transpose().map_err(bad)
+    }
+
     /// Whether all that the metadata says can be. Finds where the records lie.
-    fn check(&mut self, length: u64) -> Result<(), &'static str> {
+    fn check(&mut self, format: Format, length: u64) -> Result<(), &'static str> {
         let (first, last) = self.records.first().zip(self.records.last()).ok_or("it holds no record")?;
         let name = self.path.file_name().and_then(|name| name.to_str());
         if name.and_then(steps_of_segment) != Some((first.step, last.step)) {
@@ -108,6 +123,10 @@ impl Segment {
         if !rows.eq(groups.iter().map(|group| group.num_rows().cast_unsigned())) {
             return Err("it holds other row groups than it says");
         }
+        let columns = layout::schema(format).get_fields().len();
+        if groups.iter().any(|group| group.num_columns() != columns) {
+            return Err("it has other columns than its format");
+        }
         let mut at = START;
         for (group, record) in groups.iter().zip(self.records.iter_mut().filter(|record| record.rows > 0)) {
             let range = range(group, at).filter(|range| range.end <= length);
@@ -122,8 +141,8 @@ impl Segment {
         Ok(())
     }
 
-    /// Appends the rows of a record to `rows`.
-    pub(super) fn read(&self, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
+    /// Appends the rows of a record to `rows`. Bodies are of one of so many kinds, unless the first format leaves that open.
+    pub(super) fn read(&self, step: u64, kinds: usize, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
         let bad = |reason| RecordingError::BadSegment { path: self.path.clone(), reason };
         let record = self.records.iter().find(|record| record.step == step);
         let record = record.ok_or_else(|| bad(format!("it no longer holds step {step}")))?;
@@ -137,7 +156,7 @@ impl Segment {
             return Err(bad(format!("the bytes of step {step} are not those that were written")));
         }
         // Rows that are half filled are of no use to anybody, nor are they looked at.
-        match quiet::catch(|| self.decode(record, rows)) {
+        match quiet::catch(|| self.decode(record, kinds, rows)) {
             Ok(decoded) => decoded.map_err(|error| bad(format!("step {step}: {}", reason(&error)))),
             Err(_) => Err(bad(format!("step {step} cannot be decoded"))),
         }
@@ -159,7 +178,7 @@ impl Segment {
         }
     }
 
-    fn decode(&self, record: &RecordEntry, rows: &mut Vec<Row>) -> Result<(), ParquetError> {
+    fn decode(&self, record: &RecordEntry, kinds: usize, rows: &mut Vec<Row>) -> Result<(), ParquetError> {
         let mut alike = true;
         self.column::<Int32Type>(record, 0, |_, steps| {
             alike &= steps.iter().all(|step| u64::from(step.cast_unsigned()) == record.step);
@@ -178,7 +197,17 @@ impl Segment {
         self.fill::<FloatType>(record, 4, rows, |row, angle| row.angle = angle)?;
         self.fill::<FloatType>(record, 5, rows, |row, vx| row.vx = vx)?;
         self.fill::<FloatType>(record, 6, rows, |row, vy| row.vy = vy)?;
-        self.fill::<FloatType>(record, 7, rows, |row, omega| row.omega = omega)
+        self.fill::<FloatType>(record, 7, rows, |row, omega| row.omega = omega)?;
+        if self.stage.is_none() {
+            return Ok(());
+        }
+        self.fill::<Int32Type>(record, 8, rows, |row, kind| row.kind = kind.cast_unsigned())?;
+        match rows.iter().find(|row| row.kind as usize >= kinds) {
+            Some(Row { id, kind, .. }) => {
+                Err(ParquetError::General(format!("body {id} is of kind {kind}, and there are {kinds}")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Gives each row its value of a column.
@@ -218,6 +247,16 @@ impl Segment {
         }
         Ok(())
     }
+}
+
+/// What the footer of a file says, whose columns are those of one format or the other: which one, only the footer tells.
+fn read_metadata(file: &File) -> Result<ParquetMetaData, ParquetError> {
+    let read = |format| {
+        let columns = Arc::new(SchemaDescriptor::new(layout::schema(format)));
+        let options = ParquetMetaDataOptions::new().with_schema(columns);
+        ParquetMetaDataReader::new().with_metadata_options(Some(options)).parse_and_finish(file)
+    };
+    read(Format::WithStage).or_else(|error| read(Format::StatesAlone).map_err(|_| error))
 }
 
 /// The records, as a text: step, rows and checksum of each.

@@ -1,7 +1,7 @@
 //! Small recordings for tests.
 
-use super::{Record, RecordingWriter, RunFacts, rank_folder};
-use atoll_core::{Body, GlobalId, KindId, Rot};
+use super::{Record, RecordingWriter, RunFacts, StageText, rank_folder};
+use atoll_core::{Body, GlobalId, Kind, KindId, Material, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 use std::path::Path;
 
@@ -15,8 +15,22 @@ pub(crate) fn facts(record_every: u64) -> RunFacts {
         domain: [DVec2::new(-20.0, 0.0), DVec2::new(20.0, 20.0)],
         tiles: [4, 2],
         config: "[scene]\nkind = \"rooms\"\n".to_owned(),
-        canonical: "scene.kind = \"rooms\"\nscene.seed = 7\nrun.steps = 100\n".to_owned(),
+        canonical: "scene.kind = \"rooms\"\nscene.seed = 7\nrun.steps = 100\nphysics.hertz = 50.0\n".to_owned(),
     }
+}
+
+/// A box of 2 m x 1 m, a disc of 1 m, and two walls, one of them turned.
+pub(crate) fn stage() -> (Vec<Kind>, Vec<StaticBody>) {
+    let kind = |shape| Kind { shape, material: Material::default() };
+    let wall = |id, x| StaticBody::new(GlobalId(id), kind(Shape::rectangle(1.0, 20.0)), DVec2::new(x, 10.0));
+    let turned = StaticBody { rotation: Rot::from_angle(0.1), ..wall(1, 20.0) };
+    (vec![kind(Shape::rectangle(2.0, 1.0)), kind(Shape::circle(1.0))], vec![wall(0, -20.0), turned])
+}
+
+/// The same as it is written.
+pub(crate) fn stage_text() -> StageText {
+    let (kinds, statics) = stage();
+    StageText::new(&kinds, &statics)
 }
 
 /// A body whose state looks like no other's.
@@ -28,7 +42,7 @@ pub(crate) fn body(id: u64, step: u64) -> Body {
         rotation: Rot::from_angle(6.0 * part(2) as f32 - 3.0),
         velocity: Vec2::new(part(3) as f32, -part(4) as f32),
         angular_velocity: part(5) as f32,
-        kind: KindId(0),
+        kind: KindId((id % 2) as u32),
     }
 }
 
@@ -46,7 +60,7 @@ pub(crate) fn record(
     bodies: impl Fn(u64) -> Vec<Body>,
 ) {
     for rank in 0..ranks {
-        let mut writer = RecordingWriter::new(rank_folder(folder, rank), rank, ranks, facts).unwrap();
+        let mut writer = RecordingWriter::new(rank_folder(folder, rank), rank, ranks, facts, &stage_text()).unwrap();
         let mut record = Record::default();
         for step in steps.clone() {
             let all = bodies(step);

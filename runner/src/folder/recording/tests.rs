@@ -1,4 +1,5 @@
-use super::testing::{bodies, body, facts, record};
+use super::facts::Format;
+use super::testing::{bodies, body, facts, record, stage, stage_text};
 use super::*;
 use atoll_core::Body;
 use parquet::column::writer::ColumnWriter;
@@ -23,8 +24,9 @@ fn recorded() -> TempDir {
 }
 
 fn row(body: Body) -> Row {
-    let (id, angle, omega) = (body.id.0, body.rotation.angle(), body.angular_velocity);
-    Row { id, x: body.position.x, y: body.position.y, angle, vx: body.velocity.x, vy: body.velocity.y, omega }
+    let Body { id, position, rotation, velocity, angular_velocity: omega, kind } = body;
+    let (angle, vx, vy) = (rotation.angle(), velocity.x, velocity.y);
+    Row { id: id.0, x: position.x, y: position.y, angle, vx, vy, omega, kind: kind.0, padding: 0 }
 }
 
 fn sorted(mut rows: Vec<Row>) -> Vec<Row> {
@@ -82,6 +84,8 @@ fn states_come_back_bit_for_bit_in_their_order() {
         assert_eq!(bytemuck::cast_slice::<_, u8>(&read), bytemuck::cast_slice::<_, u8>(&expected));
     }
     assert_eq!(recording.facts(), &facts(1));
+    let (kinds, statics) = stage();
+    assert_eq!(recording.stage(), Some(&Stage { kinds, statics }));
 }
 
 #[test]
@@ -129,7 +133,7 @@ fn only_closed_segments_have_a_name_and_can_be_synced() {
         let names = fs::read_dir(&rank).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
         names.collect::<Vec<_>>()
     };
-    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(10)).unwrap();
+    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(10), &stage_text()).unwrap();
     let mut record = Record::default();
     writer.sync().unwrap();
     writer.close_segment().unwrap();
@@ -152,7 +156,7 @@ fn a_segment_that_cannot_be_closed_leaves_nothing() {
     let rank = rank_folder(folder.path(), 0);
     // In the way of the name it would have.
     fs::create_dir_all(rank.join("steps-0000000000-0000000003.parquet/in-the-way")).unwrap();
-    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(1)).unwrap();
+    let mut writer = RecordingWriter::new(rank.clone(), 0, 1, &facts(1), &stage_text()).unwrap();
     let mut record = Record::default();
     for step in 0..4 {
         record.fill(step, bodies(step).into_iter());
@@ -168,7 +172,8 @@ fn a_segment_that_cannot_be_closed_leaves_nothing() {
     assert!(rank.join("steps-0000000003-0000000003.parquet").is_file());
 
     fs::write(folder.path().join("file"), "").unwrap();
-    let error = RecordingWriter::new(folder.path().join("file/rank-00000"), 0, 1, &facts(1)).unwrap_err();
+    let error =
+        RecordingWriter::new(folder.path().join("file/rank-00000"), 0, 1, &facts(1), &stage_text()).unwrap_err();
     assert!(error.to_string().contains("file/rank-00000: Not a directory"), "{error}");
 }
 
@@ -179,7 +184,7 @@ fn a_full_disk_is_an_error_and_no_segment() {
         return;
     }
     let folder = folder();
-    let mut writer = RecordingWriter::new(folder.path().join("r"), 0, 1, &facts(1)).unwrap();
+    let mut writer = RecordingWriter::new(folder.path().join("r"), 0, 1, &facts(1), &stage_text()).unwrap();
     let open = folder.path().join("r").join(open_segment_name(0));
     std::os::unix::fs::symlink("/dev/full", &open).unwrap();
     let mut record = Record::default();
@@ -270,7 +275,7 @@ fn what_is_missing_is_named() {
 #[test]
 fn what_a_run_goes_on_from_must_be_all_there() {
     let told = |folder: &TempDir, step| {
-        let run = (folder.path().join("run.toml"), facts(5));
+        let run = OfRun { path: folder.path().join("run.toml"), facts: facts(5), stage: Some(stage_text()) };
         Recording::check_until(folder.path(), run, step).map_err(|error| error.to_string())
     };
     let folder = recorded();
@@ -281,9 +286,16 @@ fn what_a_run_goes_on_from_must_be_all_there() {
     assert!(told(&folder, 50).unwrap_err().contains("is damaged, or no segment of a recording"));
     fs::remove_file(path(0, "steps-0000000050-0000000060.parquet")).unwrap();
     assert!(told(&folder, 50).unwrap_err().contains("rank-00000: the segment that holds step 50 is missing"));
-    let other = RunFacts { record_every: 3, ..facts(5) };
-    let error = Recording::check_until(folder.path(), (folder.path().join("run.toml"), other), 45).unwrap_err();
-    assert!(error.to_string().contains("run.toml and ") && error.to_string().contains("of different runs"), "{error}");
+    let against = |facts, stage| {
+        let run = OfRun { path: folder.path().join("run.toml"), facts, stage };
+        Recording::check_until(folder.path(), run, 45).unwrap_err().to_string()
+    };
+    let error = against(RunFacts { record_every: 3, ..facts(5) }, Some(stage_text()));
+    assert!(error.contains("run.toml and ") && error.contains("of different runs"), "{error}");
+    let error = against(facts(5), None);
+    assert!(error.contains("of different runs: format is 1 in the one and 2 in the other"), "{error}");
+    let error = against(facts(5), Some(StageText::new(&stage().0, &[])));
+    assert!(error.contains("of different runs: their kinds or statics are not the same"), "{error}");
     let nothing = tempfile::tempdir().unwrap();
     assert!(told(&nothing, 0).unwrap_err().contains("the segment that holds step 0 is missing"));
 }
@@ -327,7 +339,11 @@ fn strange_files_are_refused() {
         bytes
     };
     assert!(told(name, &swap(b"atoll.ranks", b"other.ranks")).contains("it has no atoll.ranks"));
-    assert!(told(name, &swap(b"atoll.format\x18\x011", b"atoll.format\x18\x019")).contains("its format is 9"));
+    assert!(told(name, &swap(b"atoll.format\x18\x012", b"atoll.format\x18\x019")).contains("its format is 9"));
+    let told_one = told(name, &swap(b"atoll.format\x18\x012", b"atoll.format\x18\x011"));
+    assert!(told_one.contains("it has other columns than its format"), "{told_one}");
+    assert!(told(name, &swap(b"\"circle\":1.0", b"\"circle\":0.0")).contains("kind 1 of atoll.kinds has a number"));
+    assert!(told(name, &swap(b"[[0,2]]", b"[[0,3]]")).contains("atoll.statics names others than it has"));
     assert!(told(name, &swap(b"0:20:", b"0:21:")).contains("it holds other row groups than it says"));
 }
 
@@ -376,7 +392,7 @@ fn rows_of_another_step_are_refused() {
     record(folder.path(), &facts(1), 1, step..step + 1, bodies);
     let path = rank_folder(folder.path(), 0).join(segment_name(step, step));
     let mut rows = Vec::new();
-    Segment::open(&path).unwrap().read(step, &mut rows).unwrap();
+    Segment::open(&path).unwrap().read(step, 2, &mut rows).unwrap();
     assert_eq!(rows.len(), 20);
 
     let mut bytes = fs::read(&path).unwrap();
@@ -390,7 +406,7 @@ fn rows_of_another_step_are_refused() {
     let forged = entry(&bytes);
     bytes[place..place + forged.len()].copy_from_slice(forged.as_bytes());
     fs::write(&path, bytes).unwrap();
-    let error = Segment::open(&path).unwrap().read(step, &mut rows).unwrap_err().to_string();
+    let error = Segment::open(&path).unwrap().read(step, 2, &mut rows).unwrap_err().to_string();
     assert!(error.contains("step 16909060: its rows are of another step"), "{error}");
 }
 
@@ -409,14 +425,20 @@ fn no_body_takes_less_than_a_byte() {
     let mut facts = facts(1).to_pairs();
     let more = [("atoll.rank", "0"), ("atoll.ranks", "1"), ("atoll.steps", "0:100000:0123456789abcdef")];
     facts.extend(more.map(|(key, text)| (key.to_owned(), text.to_owned())));
+    facts.extend(
+        [("atoll.kinds", "[]"), ("atoll.statics", r#"{"kinds":[],"ids":[],"kind":[],"x":[],"y":[]}"#)]
+            .map(|(key, text)| (key.to_owned(), text.to_owned())),
+    );
     let facts = facts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
     let mut properties = WriterProperties::builder().set_key_value_metadata(Some(facts));
-    for column in layout::schema().get_fields() {
+    for column in layout::schema(Format::WithStage).get_fields() {
         let column = ColumnPath::from(column.name());
         properties = properties.set_column_compression(column.clone(), layout::compression(&column));
     }
     let properties = Arc::new(properties.build());
-    let mut file = SerializedFileWriter::new(fs::File::create(&path).unwrap(), layout::schema(), properties).unwrap();
+    let mut file =
+        SerializedFileWriter::new(fs::File::create(&path).unwrap(), layout::schema(Format::WithStage), properties)
+            .unwrap();
     let mut group = file.next_row_group().unwrap();
     while let Some(mut column) = group.next_column().unwrap() {
         match column.untyped() {
@@ -433,4 +455,42 @@ fn no_body_takes_less_than_a_byte() {
     file.close().unwrap();
     let told = complaint(forged.path());
     assert!(told.contains("it has more rows than they have bytes"), "{told}");
+}
+
+#[test]
+fn bodies_of_kinds_that_are_not_there_are_refused() {
+    let folder = folder();
+    record(folder.path(), &facts(1), 1, 0..1, |step| {
+        let mut bodies = bodies(step);
+        bodies[7].kind.0 = 2;
+        bodies
+    });
+    let id = bodies(0)[7].id;
+    let told = complaint(folder.path());
+    assert!(told.contains(&format!("step 0: body {id} is of kind 2, and there are 2")), "{told}");
+}
+
+#[test]
+fn kinds_take_next_to_nothing() {
+    let size = |kind: fn(u64) -> u32| {
+        let folder = folder();
+        let of_kinds = |step| (0..100_000).map(move |id| Body { kind: atoll_core::KindId(kind(id)), ..body(id, step) });
+        record(folder.path(), &facts(1), 1, 0..1, |step| of_kinds(step).collect());
+        fs::metadata(rank_folder(folder.path(), 0).join(segment_name(0, 0))).unwrap().len()
+    };
+    let alike = size(|_| 1);
+    // A bit each, in no order that helps.
+    let mixed = size(|id| (id.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63) as u32);
+    assert!((12_000..13_500).contains(&(mixed - alike)), "{mixed} and {alike} bytes");
+}
+
+/// What the program wrote before it wrote kinds and statics.
+#[test]
+fn recordings_of_the_first_format_are_still_read() {
+    let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/recording-format-1");
+    let recording = Recording::open(&run).unwrap();
+    assert_eq!((recording.steps(), recording.stage()), (&[0, 10, 20][..], None));
+    let rows = sorted(read(&recording, 20));
+    assert_eq!((rows.len(), rows[0].id, rows[11].id), (12, 3, 14));
+    assert!(rows.iter().all(|row| row.kind == 0 && row.y > 0.0 && row.vy.is_finite()));
 }

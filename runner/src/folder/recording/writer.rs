@@ -1,8 +1,9 @@
 //! Writes the records of one rank.
 
 use super::error::reason;
-use super::facts::RunFacts;
+use super::facts::{Format, RunFacts};
 use super::record::Record;
+use super::stage::StageText;
 use super::{RECORDS_PER_SEGMENT, RecordingError, layout, open_segment_name, segment_name};
 use crate::folder::durable::{is_gone, sync_folder, sync_folder_of};
 use parquet::column::writer::ColumnWriterImpl;
@@ -41,13 +42,21 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// If the folder cannot be had.
-    pub fn new(folder: PathBuf, rank: u32, ranks: u32, facts: &RunFacts) -> Result<Self, RecordingError> {
+    pub fn new(
+        folder: PathBuf,
+        rank: u32,
+        ranks: u32,
+        facts: &RunFacts,
+        stage: &StageText,
+    ) -> Result<Self, RecordingError> {
         fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
         let mut texts = facts.to_pairs();
+        texts.push(("atoll.kinds".to_owned(), stage.kinds.clone()));
+        texts.push(("atoll.statics".to_owned(), stage.statics.clone()));
         texts.push(("atoll.rank".to_owned(), rank.to_string()));
         texts.push(("atoll.ranks".to_owned(), ranks.to_string()));
         let texts = texts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
-        let (schema, properties) = (layout::schema(), layout::properties(texts));
+        let (schema, properties) = (layout::schema(Format::WithStage), layout::properties(texts));
         Ok(Self { folder, schema, properties, open: None, complete: Vec::new(), named: false })
     }
 
@@ -219,7 +228,8 @@ fn write_columns(record: &Record, group: &mut SerializedRowGroupWriter<'_, Check
     })?;
     column::<FloatType>(group, |column| write(column, &record.vx))?;
     column::<FloatType>(group, |column| write(column, &record.vy))?;
-    column::<FloatType>(group, |column| write(column, &record.omega))
+    column::<FloatType>(group, |column| write(column, &record.omega))?;
+    column::<Int32Type>(group, |column| write(column, bytemuck::cast_slice(&record.kind)))
 }
 
 /// Writes the next column.

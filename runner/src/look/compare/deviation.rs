@@ -21,6 +21,8 @@ pub struct StepDeviation {
     pub velocity: Deviation,
     /// In rad/s.
     pub angular_velocity: Deviation,
+    /// Of the bodies that are compared, those that are of another kind. No tolerance is so great.
+    pub other_kind: Bodies,
     /// Bodies that the first record lacks.
     pub missing_in_a: Bodies,
     /// Bodies that the second record lacks.
@@ -68,9 +70,11 @@ impl StepDeviation {
         tolerance.map_or(self.is_none(), |most| self.has_same_bodies() && self.greatest() <= most)
     }
 
-    /// Whether each record has each body once.
+    /// Whether each record has each body once, of the same kind.
     pub(super) fn has_same_bodies(&self) -> bool {
-        [self.missing_in_a, self.missing_in_b, self.doubled_in_a, self.doubled_in_b].iter().all(|some| some.count == 0)
+        let missing = [self.missing_in_a, self.missing_in_b];
+        let doubled = [self.doubled_in_a, self.doubled_in_b];
+        missing.iter().chain(&doubled).chain([&self.other_kind]).all(|some| some.count == 0)
     }
 }
 
@@ -112,7 +116,7 @@ pub(super) fn measure<'a>(
 ) -> (StepDeviation, Option<[&'a [Row]; 2]>) {
     let (mut bodies, mut differing, mut sums) = (0, 0, [Sum::default(); 4]);
     let (mut missing, mut doubled) = ([Bodies::default(); 2], [Bodies::default(); 2]);
-    let mut first = None;
+    let (mut other_kind, mut first) = (Bodies::default(), None);
     while let Some(id) = a.first().into_iter().chain(b.first()).map(|row| row.id).min() {
         let both = [take(&mut a, id), take(&mut b, id)];
         if let [[in_a], [in_b]] = both {
@@ -123,7 +127,9 @@ pub(super) fn measure<'a>(
             differing += 1;
             let apart = apart(in_a, in_b);
             sums.iter_mut().zip(apart).for_each(|(sum, value)| sum.add(id, value));
-            if tolerance.is_some_and(|most| apart.iter().all(|value| *value <= most)) {
+            if in_a.kind != in_b.kind {
+                other_kind.add(id);
+            } else if tolerance.is_some_and(|most| apart.iter().all(|value| *value <= most)) {
                 continue;
             }
         }
@@ -146,6 +152,7 @@ pub(super) fn measure<'a>(
         angle,
         velocity,
         angular_velocity,
+        other_kind,
         missing_in_a,
         missing_in_b,
         doubled_in_a,

@@ -108,6 +108,8 @@ pub struct State {
     pub vy: f32,
     /// In rad/s.
     pub omega: f32,
+    /// Row of the table of kinds, if its recording says.
+    pub kind: Option<u32>,
 }
 
 /// Compares the recordings in two folders. `compared` is told of how many steps are done, and of how many.
@@ -128,10 +130,15 @@ pub fn compare(
     let common = || a.steps().iter().copied().filter(|step| b.steps().binary_search(step).is_ok());
     let count = common().count();
     let (mut of_a, mut of_b) = (Vec::new(), Vec::new());
+    let kinds = a.stage().is_some() && b.stage().is_some();
     let (mut steps, mut first_difference) = (Vec::with_capacity(count), None);
     for step in common() {
         let (read_a, read_b) = rayon::join(|| read_sorted(&a, step, &mut of_a), || read_sorted(&b, step, &mut of_b));
         read_a.and(read_b)?;
+        if !kinds {
+            // Where one does not say, there is nothing to compare.
+            of_a.iter_mut().chain(&mut of_b).for_each(|row| row.kind = 0);
+        }
         let (deviation, first) = deviation::measure(step, &of_a, &of_b, tolerance);
         steps.push(deviation);
         if first_difference.is_none() {
@@ -217,8 +224,9 @@ impl State {
         let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).ok();
         let position = DVec2::new(row.x, row.y);
         let tile = grid.filter(|_| position.is_finite()).map(|grid| grid.locate(position).0);
-        let &Row { id: _, x, y, angle, vx, vy, omega, kind: _, padding: _ } = row;
-        Self { tile, x, y, angle, vx, vy, omega }
+        let &Row { id: _, x, y, angle, vx, vy, omega, kind, padding: _ } = row;
+        let kind = recording.stage().map(|_| kind);
+        Self { tile, x, y, angle, vx, vy, omega, kind }
     }
 
     fn columns_that_differ(&self, other: &Self) -> Vec<&'static str> {
@@ -233,6 +241,8 @@ impl State {
             ]
         };
         let pairs = columns(self).into_iter().zip(columns(other));
-        pairs.filter(|(ours, theirs)| ours.1 != theirs.1).map(|(ours, _)| ours.0).collect()
+        let states = pairs.filter(|(ours, theirs)| ours.1 != theirs.1).map(|(ours, _)| ours.0);
+        let kinds = self.kind.zip(other.kind).filter(|(ours, theirs)| ours != theirs).map(|_| "kind");
+        states.chain(kinds).collect()
     }
 }

@@ -383,3 +383,24 @@ fn pictures_show_growth_and_its_absence() {
         assert!(picture.len() < 100_000 && !picture.contains("NaN"), "{}", picture.len());
     }
 }
+
+#[test]
+fn a_body_of_another_kind_is_another_body_at_any_tolerance() {
+    let a = run(10, unchanged);
+    let b = run(10, |step, bodies| {
+        if step > 0 {
+            with_id(bodies, 104).kind.0 = 1;
+        }
+    });
+    for tolerance in [None, Some(1e9)] {
+        let comparison = compared(&a, &b, tolerance);
+        assert!(!comparison.same && !comparison.identical);
+        let first = comparison.first_difference.as_ref().unwrap();
+        assert_eq!((first.step, first.id, first.columns.as_slice()), (5, 104, &["kind"][..]));
+        let other = comparison.steps[2].other_kind;
+        assert_eq!((other.count, other.first, comparison.steps[0].other_kind.count), (1, Some(104), 0));
+        let text = told(&a, &b, &comparison);
+        let line = "B has of other kinds 1 body at step 5, the lowest is 104, and some at 1 later step\n";
+        assert!(text.contains(line) && text.contains(", kind 0\n") && text.contains(", kind 1\n"), "{text}");
+    }
+}

@@ -89,19 +89,17 @@ impl Comparison {
         let sides = || [&self.a, &self.b].into_iter();
         let missing = sides().zip(missing).map(|(side, bodies)| (side, "lacks", bodies));
         let doubled = sides().zip(doubled).map(|(side, bodies)| (side, "has more than once", bodies));
-        for (side, does, bodies) in missing.chain(doubled) {
+        let name = |side: &Side| side.folder.display().to_string();
+        let all = missing.chain(doubled).map(|(side, does, bodies)| (format!("{} {does}", name(side)), bodies));
+        let other: (String, Kind) = (format!("{} has of other kinds", name(&self.b)), |step| step.other_kind);
+        for (does, bodies) in all.chain([other]) {
             let mut steps = self.steps.iter().filter(|step| bodies(step).count > 0);
             if let Some(step) = steps.next() {
                 let (some, more) = (bodies(step), steps.count());
                 let (count, id) = (plural(some.count as usize, "body"), some.first.unwrap_or(0));
                 let more =
                     if more > 0 { format!(", and some at {}", plural(more, "later step")) } else { String::new() };
-                writeln!(
-                    f,
-                    "{} {does} {count} at step {}, the lowest is {id}{more}",
-                    side.folder.display(),
-                    step.step
-                )?;
+                writeln!(f, "{does} {count} at step {}, the lowest is {id}{more}", step.step)?;
             }
         }
         Ok(())
@@ -178,8 +176,9 @@ impl Display for State {
         if let Some(tile) = self.tile {
             write!(f, "in tile {tile}: ")?;
         }
-        let Self { tile: _, x, y, angle, vx, vy, omega } = self;
-        write!(f, "x {x}, y {y}, angle {angle}, vx {vx}, vy {vy}, omega {omega}")
+        let Self { tile: _, x, y, angle, vx, vy, omega, kind } = self;
+        write!(f, "x {x}, y {y}, angle {angle}, vx {vx}, vy {vy}, omega {omega}")?;
+        kind.map_or(Ok(()), |kind| write!(f, ", kind {kind}"))
     }
 }
 

@@ -18,10 +18,13 @@ use crate::plan::{Output, Plan};
 use atoll_core::World;
 use atoll_transport::Rank;
 use buffers::Buffers;
+use std::fs::File;
+use std::path::PathBuf;
 use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+use tracing::trace_span;
 use writer::{Job, Saved, Writer};
 
 /// Between two looks at whether everything is written.
@@ -87,6 +90,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn write_due(&mut self, world: &World, stopped: bool) {
         let start = Instant::now();
         let step = world.step_count();
+        let _span = trace_span!("output", step).entered();
         let due = |every: Option<u64>| every.is_some_and(|every| step.is_multiple_of(every));
         if !stopped
             && self.last_snapshot.is_some_and(|last| last < step)
@@ -137,6 +141,17 @@ impl<'a> Recorder<'a> {
     /// What is written, and where to.
     pub(super) fn output(&self) -> &'a Output {
         self.output
+    }
+
+    /// Lets these files be made durable before each snapshot from now on, and at the end.
+    pub(super) fn sync_with_snapshots(&self, files: Vec<(PathBuf, File)>) {
+        self.ask(Job::Sync(files));
+    }
+
+    /// Nothing is written any more, as something else could not be that belongs to it.
+    pub(super) fn fail(&self, error: RunError) {
+        // The first is told.
+        let _ = self.failure.set(error);
     }
 
     /// Why nothing is written any more, if something could not be.

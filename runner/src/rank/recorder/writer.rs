@@ -2,11 +2,12 @@
 
 use crate::error::RunError;
 use crate::folder::durable::is_gone;
-use crate::folder::recording::{Record, RecordingWriter, RunFacts};
+use crate::folder::recording::{Record, RecordingWriter, RunFacts, StageText};
 use crate::folder::snapshot::{self, SnapshotWriter};
 use crate::plan::{Output, Plan};
 use atoll_core::{SavedTile, World};
 use atoll_transport::Rank;
+use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender};
@@ -19,6 +20,8 @@ pub(super) enum Job {
     Record(Record),
     /// A snapshot.
     Snapshot(Saved),
+    /// Files to be made durable with what is written.
+    Sync(Vec<(PathBuf, File)>),
     /// Snapshots from before this step are no longer needed.
     RemoveBefore(u64),
 }
@@ -42,6 +45,8 @@ pub(super) struct Writer {
     recording: Option<RecordingWriter>,
     snapshot: SnapshotWriter,
     snapshots: PathBuf,
+    /// What others write beside.
+    beside: Vec<(PathBuf, File)>,
     /// The file of the last one.
     saved: Option<PathBuf>,
     /// After the first failure nothing is written any more, so that what is there is of one piece.
@@ -58,11 +63,12 @@ impl Writer {
         let (ranks, identity) = (plan.config.run.ranks as u32, plan.config.identity(plan.tiles));
         let recording = |every| {
             let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, every);
-            RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts)
+            let stage = StageText::new(&plan.blueprint.kinds, &plan.blueprint.statics);
+            RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts, &stage)
         };
         let recording = output.every.record_every.map(recording).transpose()?;
         let snapshot = SnapshotWriter::new(rank.0, ranks, plan.tiles, identity);
-        Ok(Self { recording, snapshot, snapshots: output.folder.snapshots(), saved: None, failure })
+        Ok(Self { recording, snapshot, snapshots: output.folder.snapshots(), beside: Vec::new(), saved: None, failure })
     }
 
     /// Does what it is asked for until nobody can ask any more, and gives the buffers back.
@@ -78,6 +84,7 @@ impl Writer {
                     self.attempt(|writer| writer.save(&saved));
                     let _ = saves.send(saved);
                 }
+                Job::Sync(files) => self.beside = files,
                 // After a failure nobody can tell which snapshots are whole.
                 Job::RemoveBefore(_) if self.failure.get().is_some() => {}
                 Job::RemoveBefore(step) => {
@@ -124,7 +131,10 @@ impl Writer {
     /// Whether everything is there still that was written and not removed by the run itself.
     fn check_there(&self) -> Result<(), RunError> {
         let saved = self.saved.clone().filter(|path| is_gone(path));
-        let gone = self.recording.as_ref().and_then(RecordingWriter::gone).or(saved);
+        // What lies elsewhere is the user's own.
+        let in_folder = |path: &&PathBuf| path.parent() == self.snapshots.parent();
+        let beside = self.beside.iter().map(|(path, _)| path).filter(in_folder).find(|path| is_gone(path));
+        let gone = self.recording.as_ref().and_then(RecordingWriter::gone).or(saved).or(beside.cloned());
         gone.map_or(Ok(()), |path| Err(RunError::Gone { path }))
     }
 
@@ -134,6 +144,8 @@ impl Writer {
             recording.close_segment()?;
             recording.sync()?;
         }
-        Ok(())
+        self.beside.iter().try_for_each(|(path, file)| {
+            file.sync_all().map_err(|error| RunError::Output { path: path.clone(), reason: error.to_string() })
+        })
     }
 }

@@ -1,0 +1,37 @@
+//! `atoll export`: what a run has recorded, as files for other programs.
+
+use super::args::ExportArgs;
+use super::output::{self, Kept};
+use super::progress::{Progress, Show};
+use crate::error::{Exit, RunError};
+use crate::look::recorded::Recorded;
+use crate::look::vtk;
+use std::io::{self, IsTerminal};
+
+/// Does it.
+///
+/// # Errors
+/// If there is no recording to read, or it cannot be written.
+pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
+    let recorded = Recorded::open(&args.run)?;
+    Kept { runs: vec![&args.run], configuration: None }.check([("--vtk", Some(args.vtk.as_path()))])?;
+    // On a terminal only: a log has no use for that.
+    let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
+    let mut progress = None;
+    let exported = vtk::export(&recorded, &args.vtk, args.every.get() as usize, |done, of| {
+        progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
+    });
+    if let Some(progress) = progress {
+        progress.finish();
+    }
+    let vtk::Written { collection, steps, bodies, bytes } = exported?;
+    let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
+    output::show(&format!(
+        "{} records of {bodies} bodies, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
+        steps.len(),
+        recorded.setting().statics.len(),
+        bytes as f64 * 1e-6,
+        collection.display()
+    ))?;
+    Ok(Exit::Done)
+}

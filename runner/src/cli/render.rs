@@ -1,0 +1,222 @@
+//! `atoll render`: a picture or a film of a run.
+
+use super::args::RenderArgs;
+use super::console::{Console, complain};
+use super::interrupt::stop_on_signals;
+use super::output::{self, Kept};
+use super::progress::Show;
+use crate::config::{Config, OutputConfig};
+use crate::error::{Exit, RunError};
+use crate::look::film::{Film, FilmKind, remove_unfinished};
+use crate::look::frame::{Frame, Setting};
+use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
+use crate::look::recorded::Recorded;
+use crate::look::source::{End, Live, Shown, show_recorded};
+use crate::plan::Plan;
+use crate::rank::{Listener, Observer};
+use atoll_core::GlobalId;
+use glam::DVec2;
+use std::sync::Arc;
+
+/// Pictures in a second of a film, where nobody says.
+const FPS: u32 = 30;
+/// How many times as wide as a body that is followed is what is shown around it.
+const AROUND: f64 = 20.0;
+
+/// Does it, with everything that can be refused refused before anything heavy starts.
+///
+/// # Errors
+/// Whatever kept it from being made. Nothing is left behind then.
+pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
+    Kept { runs: vec![&args.source], configuration: Some(args.source.as_path()).filter(|source| source.is_file()) }
+        .check([("--out", Some(args.out.as_path()))])?;
+    let kind = FilmKind::of(&args.out)?;
+    check_out(args, kind)?;
+    let mut source = if args.source.is_dir() { open(args)? } else { plan(args)? };
+    let (setting, shown) = (source.setting().clone(), source.shown(args, kind)?);
+    if let Some(id) = args.follow {
+        source.check_followed(GlobalId(id), &setting)?;
+    }
+
+    let mut film = Film::create(&args.out, args.size, args.fps.unwrap_or(FPS))?;
+    let layers = Layers { tiles: args.tiles, ghosts: args.ghosts, contacts: args.contacts };
+    let look = Look { size: args.size, color: args.color, layers };
+    let mut painter = Painter::new(&setting, look);
+    let mut draw = |frame: &Frame| {
+        let view = view(args, &setting, frame)?;
+        film.add(painter.draw(frame, &view))
+    };
+    let out = args.out.clone();
+    let stop = stop_on_signals(true, move || {
+        remove_unfinished(&out);
+        std::process::exit(Exit::Interrupted as i32)
+    });
+    let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
+    let console = Arc::new(Console::new(show));
+    let end = match &mut source {
+        Source::Live(live) => {
+            let observer = Observer { listener: Some(console), stop, ..Observer::default() };
+            live.show(shown, needs_run(args).is_some(), observer, &mut draw)?.0
+        }
+        Source::Recorded(recorded) => {
+            console.begins(shown.first, shown.last);
+            let shown = show_recorded(recorded, shown, &stop, &mut |frame| {
+                draw(frame)?;
+                console.made(frame.step);
+                Ok(())
+            });
+            console.ends();
+            shown?
+        }
+    };
+    if end == End::Interrupted {
+        complain(&format!("interrupted: {} is not written", args.out.display()));
+        return Ok(Exit::Interrupted);
+    }
+    film.finish()?;
+    let (frames, [width, height]) = (shown.count(), args.size);
+    let frames = if frames == 1 { "1 picture".to_owned() } else { format!("{frames} pictures") };
+    let steps = if shown.count() == 1 {
+        format!("step {}", shown.first)
+    } else {
+        format!("steps {} to {}, every {}", shown.first, shown.last, shown.every)
+    };
+    output::show(&format!("{}: {frames} of {width} x {height}, {steps}\n", args.out.display()))?;
+    Ok(Exit::Done)
+}
+
+/// What frames come from.
+enum Source {
+    Recorded(Box<Recorded>),
+    Live(Box<Live>),
+}
+
+fn unsuitable(option: impl ToString, reason: impl ToString) -> RunError {
+    RunError::Unsuitable { option: option.to_string(), reason: reason.to_string() }
+}
+
+/// Refuses options that do not suit what is to be made.
+fn check_out(args: &RenderArgs, kind: FilmKind) -> Result<(), RunError> {
+    let film = [args.every.map(|every| ("--every", every)), args.fps.map(|fps| ("--fps", fps.into()))];
+    match (kind.is_film(), args.step, film.into_iter().flatten().next()) {
+        (false, _, Some((option, value))) => Err(unsuitable(
+            format!("{option} {value}"),
+            "a .png is one picture; leave it out, or name a film such as .gif",
+        )),
+        (true, Some(step), _) => {
+            Err(unsuitable(format!("--step {step}"), "a film shows many steps; leave it out, or name a .png"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The first option that only a run under way can satisfy, if one was given.
+fn needs_run(args: &RenderArgs) -> Option<&'static str> {
+    match args.color {
+        _ if args.ghosts => Some("--ghosts"),
+        _ if args.contacts => Some("--contacts"),
+        ColorBy::Contacts => Some("--color contacts"),
+        ColorBy::Asleep => Some("--color asleep"),
+        _ => None,
+    }
+}
+
+/// What was recorded.
+fn open(args: &RenderArgs) -> Result<Source, RunError> {
+    if let Some(option) = args.values.first() {
+        return Err(unsuitable(option, "what is recorded stays as it is; name a configuration to run it anew"));
+    }
+    if let Some(option) = needs_run(args) {
+        let again = args.source.join("run.toml");
+        let reason = format!("a recording does not tell; {} runs it again, and shows it", again.display());
+        return Err(unsuitable(option, reason));
+    }
+    Ok(Source::Recorded(Box::new(Recorded::open(&args.source)?)))
+}
+
+/// What a configuration is about to do.
+fn plan(args: &RenderArgs) -> Result<Source, RunError> {
+    let mut config = Config::load(&args.source, &args.values.overrides()?)?;
+    // Whatever it wants to be written.
+    config.output = OutputConfig::default();
+    Live::check(&config)?;
+    let plan = Plan::new(&config)?;
+    for note in plan.notes() {
+        complain(&note);
+    }
+    Ok(Source::Live(Box::new(Live::new(plan))))
+}
+
+impl Source {
+    fn setting(&self) -> &Setting {
+        match self {
+            Self::Recorded(recorded) => recorded.setting(),
+            Self::Live(live) => live.setting(),
+        }
+    }
+
+    /// The steps to show.
+    fn shown(&self, args: &RenderArgs, kind: FilmKind) -> Result<Shown, RunError> {
+        let (last, between, every) = match self {
+            Self::Recorded(recorded) => {
+                let (recording, every) = (recorded.recording(), recorded.recording().facts().record_every);
+                (recording.steps().last().copied().unwrap_or_default(), every, every)
+            }
+            Self::Live(live) => {
+                let real_time = live.setting().hertz / f64::from(args.fps.unwrap_or(FPS));
+                (live.plan().config.run.steps, 1, real_time.round().max(1.0) as u64)
+            }
+        };
+        let recorded = format!("what is recorded is every {between} steps, up to {last}");
+        if !kind.is_film() {
+            return match (args.step.unwrap_or(last), self) {
+                (step, Self::Recorded(_)) if step > last || !step.is_multiple_of(between) => {
+                    Err(unsuitable(format!("--step {step}"), format!("{recorded}; give one of these")))
+                }
+                (step, Self::Live(_)) if step > last => {
+                    let reason = format!("the run makes {last} steps; give --steps {step} as well");
+                    Err(unsuitable(format!("--step {step}"), reason))
+                }
+                (step, _) => Ok(Shown::only(step)),
+            };
+        }
+        let every = args.every.unwrap_or(every);
+        if !every.is_multiple_of(between) {
+            return Err(unsuitable(format!("--every {every}"), format!("{recorded}; give a multiple of {between}")));
+        }
+        Ok(Shown { first: 0, every, last: last - last % every })
+    }
+
+    /// Whether there is a body to follow.
+    fn check_followed(&self, id: GlobalId, setting: &Setting) -> Result<(), RunError> {
+        let refused = |reason| Err(unsuitable(format!("--follow {id}"), reason));
+        if setting.statics.iter().any(|body| body.id == id) {
+            return refused("that one never moves; name a dynamic body, or use --view");
+        }
+        let known = match self {
+            Self::Recorded(recorded) => {
+                let mut rows = Vec::new();
+                recorded.recording().read(0, &mut rows)?;
+                rows.iter().any(|row| row.id == id.0)
+            }
+            Self::Live(live) => live.has(id),
+        };
+        if known { Ok(()) } else { refused("there is no body of that name; give the id of another") }
+    }
+}
+
+/// The part of the world that a frame shows.
+fn view(args: &RenderArgs, setting: &Setting, frame: &Frame) -> Result<View, RunError> {
+    if let Some([low, high]) = args.view {
+        return Ok(View { low, high });
+    }
+    let Some(id) = args.follow else { return Ok(whole_view(setting)) };
+    let body = frame.bodies.iter().find(|body| body.id == id).ok_or_else(|| {
+        unsuitable(format!("--follow {id}"), format!("this body is gone after step {}; give another", frame.step))
+    })?;
+    let size = 2.0 * f64::from(setting.kinds[body.kind as usize].shape.bounding_radius());
+    let width = args.width.unwrap_or(AROUND * size);
+    let [columns, rows] = args.size.map(f64::from);
+    let (center, half) = (DVec2::new(body.x, body.y), DVec2::new(0.5 * width, 0.5 * width * rows / columns));
+    Ok(View { low: center - half, high: center + half })
+}

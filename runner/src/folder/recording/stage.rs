@@ -1,0 +1,313 @@
+//! What every record refers to and none holds: the table of kinds, and what never moves. As JSON in the metadata of every
+//! file, so that a recording can be drawn by itself.
+//!
+//! Numbers are the shortest decimals that lead back to the same bits. A shape is known by its key, and whatever other keys
+//! a newer program may write are passed over.
+
+use atoll_core::{GlobalId, Kind, Material, Rot, Shape, StaticBody};
+use glam::{DVec2, Vec2};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// What every record refers to and none holds.
+#[derive(Clone, PartialEq, Default, Debug)]
+pub struct Stage {
+    /// Shapes and materials, which bodies refer to by number.
+    pub kinds: Vec<Kind>,
+    /// What never moves.
+    pub statics: Vec<StaticBody>,
+}
+
+/// The same as texts, which are made once for all files of a run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct StageText {
+    pub(super) kinds: String,
+    pub(super) statics: String,
+}
+
+/// A [`Kind`]. It has one shape.
+#[derive(Serialize, Deserialize)]
+struct KindText {
+    /// Half the width and half the height.
+    #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
+    half: Option<[f32; 2]>,
+    /// Radius.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    circle: Option<f32>,
+    density: f32,
+    friction: f32,
+    restitution: f32,
+}
+
+/// All statics, a column for each field.
+#[derive(Default, Serialize, Deserialize)]
+struct StaticsText {
+    /// Those that statics are of, each once.
+    kinds: Vec<KindText>,
+    /// The first of some names that follow each other, and how many those are.
+    ids: Vec<[u64; 2]>,
+    /// Rows of the table.
+    kind: Vec<u32>,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Cosines and sines; none if all stand upright.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    cos: Vec<f32>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    sin: Vec<f32>,
+}
+
+impl StageText {
+    /// That of a run with these.
+    pub fn new(kinds: &[Kind], statics: &[StaticBody]) -> Self {
+        let kinds: Vec<KindText> = kinds.iter().map(KindText::new).collect();
+        Self { kinds: to_json(&kinds), statics: to_json(&StaticsText::new(statics)) }
+    }
+
+    /// From what a file says, and none from one of format 1, by name. The error is what is wrong with it.
+    pub(super) fn from_texts<'a>(text: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
+        Ok(Self { kinds: super::facts::parse(&text, "kinds")?, statics: super::facts::parse(&text, "statics")? })
+    }
+
+    /// Reads both, and trusts nothing in them. The error is what is wrong.
+    pub(super) fn read(&self) -> Result<Stage, String> {
+        let kinds: Vec<KindText> = from_json("atoll.kinds", &self.kinds)?;
+        let kinds = read_kinds("atoll.kinds", &kinds)?;
+        let statics: StaticsText = from_json("atoll.statics", &self.statics)?;
+        Ok(Stage { kinds, statics: statics.read()? })
+    }
+}
+
+fn to_json<T: Serialize>(value: &T) -> String {
+    serde_json::to_string(value).expect("numbers, under names")
+}
+
+fn from_json<'a, T: Deserialize<'a>>(name: &str, text: &'a str) -> Result<T, String> {
+    serde_json::from_str(text).map_err(|error| format!("{name} is unreadable: {error}"))
+}
+
+impl KindText {
+    fn new(kind: &Kind) -> Self {
+        let Kind { shape, material: Material { density, friction, restitution } } = *kind;
+        let (half, circle) = match shape {
+            Shape::Box { half } => (Some(half.to_array()), None),
+            Shape::Circle { radius } => (None, Some(radius)),
+        };
+        Self { half, circle, density, friction, restitution }
+    }
+
+    /// None if it has no shape that is known, or several.
+    fn read(&self) -> Option<Kind> {
+        let Self { half, circle, density, friction, restitution } = *self;
+        let shape = match (half, circle) {
+            (Some(half), None) => Shape::Box { half: Vec2::from_array(half) },
+            (None, Some(radius)) => Shape::Circle { radius },
+            _ => return None,
+        };
+        Some(Kind { shape, material: Material { density, friction, restitution } })
+    }
+}
+
+fn read_kinds(name: &str, texts: &[KindText]) -> Result<Vec<Kind>, String> {
+    let read = |(number, text): (usize, &KindText)| {
+        let kind = text.read().ok_or_else(|| format!("kind {number} of {name} is neither a box nor a circle"))?;
+        let valid = Some(kind).filter(Kind::is_valid);
+        valid.ok_or_else(|| format!("kind {number} of {name} has a number that cannot be"))
+    };
+    texts.iter().enumerate().map(read).collect()
+}
+
+impl StaticsText {
+    fn new(statics: &[StaticBody]) -> Self {
+        let (kinds, kind) = distinct_kinds(statics);
+        let mut text = Self { kinds: kinds.iter().map(KindText::new).collect(), kind, ..Self::default() };
+        for StaticBody { id, position, rotation: _, kind: _ } in statics {
+            text.x.push(position.x);
+            text.y.push(position.y);
+            match text.ids.last_mut() {
+                Some([first, count]) if first.checked_add(*count) == Some(id.0) => *count += 1,
+                _ => text.ids.push([id.0, 1]),
+            }
+        }
+        let is_upright = |fixed: &StaticBody| bytemuck::bytes_of(&fixed.rotation) == bytemuck::bytes_of(&Rot::IDENTITY);
+        if !statics.iter().all(is_upright) {
+            text.cos = statics.iter().map(|fixed| fixed.rotation.c).collect();
+            text.sin = statics.iter().map(|fixed| fixed.rotation.s).collect();
+        }
+        text
+    }
+
+    fn read(&self) -> Result<Vec<StaticBody>, String> {
+        let bad = |what: &str| format!("atoll.statics {what}");
+        let kinds = read_kinds("atoll.statics", &self.kinds)?;
+        let (count, turned) = (self.kind.len(), !(self.cos.is_empty() && self.sin.is_empty()));
+        let columns = [self.x.len(), self.y.len()];
+        let turns = [self.cos.len(), self.sin.len()];
+        if columns != [count; 2] || turned && turns != [count; 2] {
+            return Err(bad("has columns of different lengths"));
+        }
+        let named = self.ids.iter().try_fold(0_u64, |sum, [first, count]| {
+            // The last name of each is one as well.
+            first.checked_add(count.checked_sub(1)?)?;
+            sum.checked_add(*count)
+        });
+        if named != Some(count as u64) {
+            return Err(bad("names others than it has"));
+        }
+        let ids = self.ids.iter().flat_map(|&[first, count]| (0..count).map(move |i| GlobalId(first + i)));
+        let body = |(i, id): (usize, GlobalId)| {
+            let position = DVec2::new(self.x[i], self.y[i]);
+            let rotation = if turned { Rot { c: self.cos[i], s: self.sin[i] } } else { Rot::IDENTITY };
+            let kind =
+                *kinds.get(self.kind[i] as usize).ok_or_else(|| bad("has a body of a kind that is not there"))?;
+            if !(position.is_finite() && rotation.c.is_finite() && rotation.s.is_finite()) {
+                return Err(bad("has a body that is nowhere"));
+            }
+            Ok(StaticBody { id, position, rotation, kind })
+        };
+        ids.enumerate().map(body).collect()
+    }
+}
+
+/// The kinds that statics are of, each once, and for each static the number of its own.
+pub(crate) fn distinct_kinds(statics: &[StaticBody]) -> (Vec<Kind>, Vec<u32>) {
+    let (mut kinds, mut rows) = (Vec::new(), HashMap::new());
+    let row = |fixed: &StaticBody| {
+        *rows.entry(bits(&fixed.kind)).or_insert_with(|| {
+            kinds.push(fixed.kind);
+            kinds.len() as u32 - 1
+        })
+    };
+    let numbers = statics.iter().map(row).collect();
+    (kinds, numbers)
+}
+
+/// What tells one kind from another.
+fn bits(kind: &Kind) -> [u32; 6] {
+    let (tag, x, y) = match kind.shape {
+        Shape::Box { half } => (0, half.x, half.y),
+        Shape::Circle { radius } => (1, radius, 0.0),
+    };
+    let Material { density, friction, restitution } = kind.material;
+    [tag, x.to_bits(), y.to_bits(), density.to_bits(), friction.to_bits(), restitution.to_bits()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scene, SceneKind, SceneSpec, SplitMix64};
+
+    fn kind(shape: Shape) -> Kind {
+        Kind { shape, material: Material::default() }
+    }
+
+    /// By its bits, which tells zeros of either sign apart.
+    fn assert_comes_back(kinds: &[Kind], statics: &[StaticBody]) {
+        let read = StageText::new(kinds, statics).read().unwrap();
+        let place = |fixed: &StaticBody| {
+            let (position, rotation) = (fixed.position, fixed.rotation);
+            let at = [position.x.to_bits(), position.y.to_bits()];
+            (fixed.id, at, [rotation.c.to_bits(), rotation.s.to_bits()], bits(&fixed.kind))
+        };
+        assert!(read.kinds.iter().map(bits).eq(kinds.iter().map(bits)), "{kinds:?} and {:?}", read.kinds);
+        assert!(read.statics.iter().map(place).eq(statics.iter().map(place)), "{statics:?} and {:?}", read.statics);
+    }
+
+    #[test]
+    fn every_scene_comes_back_bit_for_bit() {
+        for kind in SceneKind::USUAL {
+            let scene = Scene::new(&SceneSpec { bodies: 500.max(kind.least_bodies()), ..SceneSpec::usual(kind) });
+            assert_comes_back(&scene.kinds(), scene.statics());
+        }
+        assert_comes_back(&[], &[]);
+    }
+
+    #[test]
+    fn any_numbers_come_back_bit_for_bit() {
+        let mut random = SplitMix64::after(11, 0);
+        let mut size = || f32::from_bits((random.bits() as u32 & 0x7fff_ffff).clamp(1, 0x7f7f_ffff));
+        let material = |a: f32, b: f32| Material { density: a, friction: b, restitution: -0.0 };
+        let any = |i: u64| {
+            let half = Vec2::new(size(), size());
+            let shape = if i.is_multiple_of(2) { Shape::Box { half } } else { Shape::circle(size()) };
+            Kind { shape, material: material(size(), size()) }
+        };
+        let kinds: Vec<Kind> = (0..2000).map(any).collect();
+        let fixed = |(i, &kind): (usize, &Kind)| {
+            let mut finite = || f64::from_bits(random.bits() & !(1 << 62));
+            let position = DVec2::new(finite(), finite());
+            let rotation = Rot::from_angle(i as f32);
+            // Some of the names follow each other.
+            StaticBody { id: GlobalId(i as u64 * (1 + i as u64 / 1000)), position, rotation, kind }
+        };
+        let statics: Vec<StaticBody> = kinds.iter().enumerate().map(fixed).collect();
+        assert_comes_back(&kinds, &statics);
+        let last = StaticBody { id: GlobalId(u64::MAX), position: DVec2::new(-0.0, 5e-324), ..statics[0] };
+        assert_comes_back(&kinds, &[statics[0], last]);
+    }
+
+    #[test]
+    fn the_text_is_short_and_fit_to_be_read() {
+        let wall = |id, x| StaticBody::new(GlobalId(id), kind(Shape::rectangle(0.2, 1.0)), DVec2::new(x, 0.5));
+        let text = StageText::new(&[kind(Shape::circle(0.2))], &[wall(0, 1.0), wall(1, -0.1), wall(7, 1e9)]);
+        assert_eq!(text.kinds, r#"[{"circle":0.2,"density":1.0,"friction":0.6,"restitution":0.0}]"#);
+        let expected = r#"{"kinds":[{"box":[0.1,0.5],"density":1.0,"friction":0.6,"restitution":0.0}],"ids":[[0,2],[7,1]],"kind":[0,0,0],"x":[1.0,-0.1,1000000000.0],"y":[0.5,0.5,0.5]}"#;
+        assert_eq!(text.statics, expected);
+        // Tens of thousands of statics are no burden to every file.
+        let many: Vec<_> = (0..30_000).map(|id| wall(id, id as f64 * 0.25)).collect();
+        assert!(StageText::new(&[], &many).statics.len() < 20 * many.len());
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let good = StageText::new(
+            &[kind(Shape::circle(0.2)), kind(Shape::rectangle(1.0, 1.0))],
+            &[0, 1].map(|id| StaticBody { rotation: Rot { c: 0.6, s: 0.8 }, ..wall(id) }),
+        );
+        fn wall(id: u64) -> StaticBody {
+            StaticBody::new(GlobalId(id), kind(Shape::rectangle(0.5, 4.0)), DVec2::new(3.0, 7.0))
+        }
+        // A newer program may say more.
+        let more =
+            |text: &str| text.replace("\"density\"", "\"color\":[1,{}],\"density\"").replace("\"x\"", "\"z\":0,\"x\"");
+        let newer = StageText { kinds: more(&good.kinds), statics: more(&good.statics) };
+        assert_eq!(newer.read(), good.read());
+
+        for (from, to, expected) in [
+            ("0.2", "0.0", "kind 0 of atoll.kinds has a number that cannot be"),
+            ("0.2", "-0.2", "kind 0 of atoll.kinds has a number that cannot be"),
+            ("0.2", "1e39", "atoll.kinds is unreadable: number out of range"),
+            ("0.2", "NaN", "atoll.kinds is unreadable: expected value at line 1"),
+            ("0.2", "null", "kind 0 of atoll.kinds is neither a box nor a circle"),
+            ("[0.5,0.5]", "[0.5,0.0]", "kind 1 of atoll.kinds has a number that cannot be"),
+            ("[0.5,0.5]", "[0.5]", "atoll.kinds is unreadable: invalid length 1"),
+            ("\"box\"", "\"capsule\"", "kind 1 of atoll.kinds is neither a box nor a circle"),
+            ("\"box\"", "\"circle\":1.0,\"box\"", "kind 1 of atoll.kinds is neither a box nor a circle"),
+            ("\"restitution\":0.0", "\"restitution\":1.5", "has a number that cannot be"),
+            ("\"density\":1.0,", "", "atoll.kinds is unreadable: missing field `density`"),
+        ] {
+            let (kinds, statics) = (good.kinds.replace(from, to), good.statics.clone());
+            assert_ne!(kinds, good.kinds, "{from}");
+            let error = StageText { kinds, statics }.read().unwrap_err();
+            assert!(error.contains(expected) && !error.contains('\n'), "{to}: {error}");
+        }
+        for (from, to, expected) in [
+            ("\"x\":[3.0,3.0]", "\"x\":[3.0]", "atoll.statics has columns of different lengths"),
+            ("\"cos\":[0.6,0.6]", "\"cos\":[]", "atoll.statics has columns of different lengths"),
+            ("\"cos\":[0.6,0.6]", "\"cos\":[0.6,1e40]", "atoll.statics"),
+            ("[[0,2]]", "[[0,3]]", "atoll.statics names others than it has"),
+            ("[[0,2]]", "[[0,0],[0,2]]", "atoll.statics names others than it has"),
+            ("[[0,2]]", "[[18446744073709551615,2]]", "atoll.statics names others than it has"),
+            ("[[0,2]]", "[[0,18446744073709551615],[0,3]]", "atoll.statics names others than it has"),
+            ("\"kind\":[0,0]", "\"kind\":[0,1]", "atoll.statics has a body of a kind that is not there"),
+            ("\"kind\":[0,0]", "\"kind\":[0,-1]", "atoll.statics is unreadable"),
+            ("0.25", "0.0", "kind 0 of atoll.statics has a number that cannot be"),
+            ("7.0,7.0", "7.0,1e999", "atoll.statics is unreadable: number out of range"),
+        ] {
+            let (kinds, statics) = (good.kinds.clone(), good.statics.replace(from, to));
+            assert_ne!(statics, good.statics, "{from}");
+            let error = StageText { kinds, statics }.read().unwrap_err();
+            assert!(error.contains(expected) && !error.contains('\n'), "{to}: {error}");
+        }
+    }
+}

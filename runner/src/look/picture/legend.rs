@@ -1,0 +1,125 @@
+//! What colors and signs mean.
+
+use super::canvas::Rgb;
+use super::colors::{self, Scale};
+use super::paint::{self, ColorBy, MOST_CONTACTS};
+use super::{Layers, bodies};
+use crate::look::frame::Setting;
+use atoll_core::Shape;
+
+/// The meaning of one color or sign.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Sign {
+    /// A square.
+    Square(Rgb),
+    /// A disc.
+    Disc(Rgb),
+    /// A ring.
+    Ring(Rgb),
+}
+
+/// What is written beside a picture about its colors.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Legend {
+    /// What the colors tell.
+    pub title: String,
+    /// A scale, and what its beginning, middle and end stand for.
+    pub scale: Option<(Scale, [String; 3])>,
+    /// Signs, and what they stand for.
+    pub rows: Vec<(Sign, String)>,
+}
+
+impl Legend {
+    /// Of a way to color, and what else is drawn; `most` is what has the last color of a scale.
+    pub(super) fn new(by: ColorBy, layers: &Layers, setting: &Setting, ranks: u32, most: f32) -> Self {
+        let square = |color, text: &str| (Sign::Square(color), text.to_owned());
+        let (title, scale, mut rows) = match by {
+            ColorBy::Kind => ("kind", None, (0..).zip(&setting.kinds).map(|(i, kind)| shape(i, &kind.shape)).collect()),
+            ColorBy::Speed => {
+                let labels = ["0".to_owned(), short(0.5 * f64::from(most)), format!("{}+", short(f64::from(most)))];
+                ("speed, m/s", Some((Scale::Amount, labels)), Vec::new())
+            }
+            ColorBy::Spin => {
+                let end = short(f64::from(most));
+                ("spin, rad/s", Some((Scale::Ways, [format!("−{end}"), "0".to_owned(), format!("+{end}")])), Vec::new())
+            }
+            ColorBy::Tile => ("tile", None, Vec::new()),
+            ColorBy::Rank => {
+                ("rank", None, (0..ranks).map(|rank| square(colors::distinct(rank), &rank.to_string())).collect())
+            }
+            ColorBy::Contacts => {
+                let text =
+                    |count: u16| if count == MOST_CONTACTS { format!("{count} and more") } else { count.to_string() };
+                let row = |count| square(paint::contacts(count), &text(count));
+                ("contacts of a body", None, (0..=MOST_CONTACTS).map(row).collect())
+            }
+            ColorBy::Asleep => ("state", None, vec![square(colors::AWAKE, "awake"), square(colors::ASLEEP, "asleep")]),
+        };
+        if by == ColorBy::Tile {
+            let count = format!("{} × {}, told apart by color", setting.grid.columns(), setting.grid.rows());
+            rows.push((Sign::Square(colors::tile(0, 0)), count));
+        }
+        rows.push(square(colors::STATIC, "never moves"));
+        if setting.statics.is_empty() {
+            rows.pop();
+        }
+        if layers.ghosts {
+            rows.push((Sign::Ring(colors::GHOST), "ghost".to_owned()));
+        }
+        if layers.contacts {
+            rows.push((Sign::Disc(bodies::contact_color(1.0)), "contact; larger: pressed harder".to_owned()));
+        }
+        Self { title: title.to_owned(), scale, rows }
+    }
+
+    /// With no more rows than so many; if there are more, the last says how many are not there.
+    pub(super) fn shortened(mut self, most: usize) -> Self {
+        if self.rows.len() > most {
+            let kept = most.saturating_sub(1);
+            let text = format!("and {} more", self.rows.len() - kept);
+            self.rows.truncate(kept);
+            self.rows.push((Sign::Square(colors::PAPER), text));
+        }
+        self
+    }
+}
+
+/// A kind, told by its shape.
+fn shape(number: u32, shape: &Shape) -> (Sign, String) {
+    let color = colors::distinct(number);
+    let meters = |length: f32| short(f64::from(length));
+    match shape {
+        Shape::Circle { radius } => (Sign::Disc(color), format!("circle, {} m wide", meters(2.0 * radius))),
+        Shape::Box { half } => {
+            (Sign::Square(color), format!("box, {} × {} m", meters(2.0 * half.x), meters(2.0 * half.y)))
+        }
+    }
+}
+
+/// A number with as few digits as it takes, up to four behind the point.
+pub(super) fn short(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A length in the unit that suits it.
+pub(super) fn length(meters: f64) -> String {
+    match meters {
+        _ if meters >= 1000.0 => format!("{} km", short(meters / 1000.0)),
+        _ if meters >= 0.1 => format!("{} m", short(meters)),
+        _ => format!("{} mm", short(meters * 1000.0)),
+    }
+}
+
+/// A whole number, its digits in groups of three.
+pub(super) fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}

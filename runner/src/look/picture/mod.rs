@@ -1,0 +1,158 @@
+//! Pictures: what there is after a step as an image. Bodies wider than two pixels are drawn as what they are; of smaller ones
+//! how much they cover and in which mean color, so that no body is lost and a million are one pass over them. The same frame
+//! gives the same pixels on every machine: nothing here depends on the mathematics of the host.
+
+mod bodies;
+mod canvas;
+mod colors;
+mod labels;
+mod legend;
+mod paint;
+#[cfg(test)]
+mod tests;
+mod tiles;
+mod view;
+
+pub(crate) use canvas::Image;
+pub(crate) use paint::ColorBy;
+pub(crate) use view::{View, whole_view};
+
+use crate::look::frame::{Frame, Setting};
+use bodies::Bodies;
+use canvas::{Canvas, Field, Letters, Tone};
+use labels::Labels;
+use legend::Legend;
+use paint::{Paint, Range};
+use std::mem::take;
+use tiles::Edges;
+use view::Fit;
+
+/// What is drawn beside bodies and what never moves.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(crate) struct Layers {
+    /// The grid of tiles, and which rank has which.
+    pub tiles: bool,
+    /// Copies that tiles hold of their neighbours' bodies; of a run only.
+    pub ghosts: bool,
+    /// Points where bodies touch; of a run only.
+    pub contacts: bool,
+}
+
+/// What a picture is to look like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Look {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// What the colors of bodies tell.
+    pub color: ColorBy,
+    /// What else is drawn.
+    pub layers: Layers,
+}
+
+/// Draws one picture after another. Used again, it allocates little.
+#[derive(Debug)]
+pub(crate) struct Painter {
+    setting: Setting,
+    look: Look,
+    canvas: Canvas,
+    field: Field,
+    letters: Letters,
+    range: Range,
+    ranks: Vec<Option<u32>>,
+    /// Names and places of the bodies that are drawn.
+    order: Vec<(u64, usize)>,
+}
+
+impl Painter {
+    /// Of a world, with a look.
+    pub(crate) fn new(setting: &Setting, look: Look) -> Self {
+        Self {
+            setting: setting.clone(),
+            look,
+            canvas: Canvas::new(look.size),
+            field: Field::default(),
+            letters: Letters::new(),
+            range: Range { most: 1e-3 },
+            ranks: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+
+    /// Draws a frame, as much of it as is in view.
+    pub(crate) fn draw(&mut self, frame: &Frame, view: &View) -> &Image {
+        let fit = Fit::new(view, self.canvas.size());
+        self.range.grow(self.look.color, frame);
+        self.canvas.image.step = frame.step;
+        self.canvas.unclip();
+        self.canvas.fill(colors::MARGIN);
+        let ([left, bottom], [right, top]) = (fit.place(view.low), fit.place(view.high));
+        self.canvas.clip([left, top], [right, bottom]);
+        self.canvas.fill(colors::PAPER);
+        self.draw_statics(&fit);
+        self.draw_bodies(frame, fit);
+        if self.look.layers.tiles {
+            self.draw_tiles(frame, &fit);
+        }
+        self.canvas.unclip();
+        let ranks = frame.ranks.last().map_or(1, |(rank, _)| rank + 1);
+        let legend = Legend::new(self.look.color, &self.look.layers, &self.setting, ranks, self.range.most);
+        Labels::new(&self.letters, legend, frame, self.setting.hertz, fit.scale).draw(&mut self.canvas);
+        &self.canvas.image
+    }
+
+    fn draw_statics(&mut self, fit: &Fit) {
+        let Self { setting, canvas, field, .. } = self;
+        field.reset(canvas.image.size);
+        setting.statics.iter().for_each(|fixed| bodies::draw_static(canvas, field, fit, fixed));
+        field.draw(canvas, &Tone::new(1.0));
+    }
+
+    /// Draws bodies, then ghosts, then contacts.
+    fn draw_bodies(&mut self, frame: &Frame, fit: Fit) {
+        let Self { setting, look, canvas, field, order, .. } = self;
+        let bodies = Bodies::new(fit, setting.kinds.iter().map(|kind| kind.shape));
+        let [has_small, has_large] = bodies.has();
+        let tone = bodies.tone();
+        if has_small {
+            let paint = Paint::new(look.color, setting, frame, self.range);
+            field.reset(look.size);
+            frame.bodies.iter().enumerate().for_each(|(i, row)| bodies.splat(field, row, || paint.color(i, row)));
+            field.draw(canvas, &tone);
+        }
+        if has_large {
+            let paint = Paint::new(look.color, setting, frame, self.range);
+            // Where two meet in a pixel, the one with the higher name is upon the other, on whatever ranks they are.
+            let seen = frame.bodies.iter().enumerate().filter(|(_, row)| bodies.is_seen(canvas, row));
+            order.clear();
+            order.extend(seen.map(|(i, row)| (row.id, i)));
+            order.sort_unstable();
+            order.iter().map(|&(_, i)| (i, &frame.bodies[i])).for_each(|(i, row)| {
+                bodies.draw(canvas, row, || paint.color(i, row));
+            });
+        }
+        let Some(live) = &frame.live else { return };
+        if look.layers.ghosts {
+            field.reset(look.size);
+            live.ghosts.iter().for_each(|(row, _)| bodies.draw_ghost(canvas, field, row));
+            field.draw(canvas, &tone);
+        }
+        if look.layers.contacts {
+            field.reset(look.size);
+            bodies::draw_contacts(canvas, field, &fit, bodies.widest(), live);
+            field.draw(canvas, &Tone::new(0.5));
+        }
+    }
+
+    fn draw_tiles(&mut self, frame: &Frame, fit: &Fit) {
+        let unit = self.canvas.size()[1] / 1080.0;
+        let edges = Edges::new(&self.setting.grid, fit);
+        edges.draw_grid(&mut self.canvas, unit);
+        let mut ranks = take(&mut self.ranks);
+        tiles::ranks_of_tiles(&self.setting, frame, &mut ranks);
+        if ranks.iter().flatten().any(|rank| Some(*rank) != ranks[0]) {
+            edges.outline_ranks(&mut self.canvas, &ranks, unit);
+            edges.name_ranks(&mut self.canvas, &self.letters, &ranks, (22.0 * unit).max(10.0));
+        }
+        self.ranks = ranks;
+    }
+}

@@ -1,0 +1,69 @@
+//! What is looked at, and where it is on an image.
+
+use crate::look::frame::Setting;
+use atoll_core::{Shape, StaticBody};
+use glam::DVec2;
+
+/// What stands around the domain is shown for so much of the longer side of the domain, and no more.
+const AROUND: f64 = 0.03;
+/// Around all of it so much of the longer side stays free.
+const FREE: f64 = 0.01;
+
+/// A rectangle of the world, in meters.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct View {
+    /// Its low corner.
+    pub low: DVec2,
+    /// Its high corner.
+    pub high: DVec2,
+}
+
+/// The domain, and of what stands around it so much that one sees what it is.
+pub(crate) fn whole_view(setting: &Setting) -> View {
+    let (low, high) = (setting.grid.min(), setting.grid.max());
+    let side = (high - low).max_element();
+    let extents = setting.statics.iter().map(extent);
+    let (least, most) = extents.fold((low, high), |(least, most), (from, to)| (least.min(from), most.max(to)));
+    let (around, free) = (DVec2::splat(AROUND * side), DVec2::splat(FREE * side));
+    View { low: least.max(low - around) - free, high: most.min(high + around) + free }
+}
+
+/// Low and high corner of a static.
+fn extent(fixed: &StaticBody) -> (DVec2, DVec2) {
+    let half = match fixed.kind.shape {
+        Shape::Circle { radius } => DVec2::splat(f64::from(radius)),
+        Shape::Box { half } => {
+            let (c, s) = (f64::from(fixed.rotation.c).abs(), f64::from(fixed.rotation.s).abs());
+            let (x, y) = (f64::from(half.x), f64::from(half.y));
+            DVec2::new(c * x + s * y, s * x + c * y)
+        }
+    };
+    (fixed.position - half, fixed.position + half)
+}
+
+/// A view upon an image: as large as both its sides allow, in the middle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fit {
+    /// Pixels of a meter.
+    pub scale: f64,
+    /// Where the image's lower left corner is in the world.
+    origin: DVec2,
+    /// Of the image.
+    height: f64,
+}
+
+impl Fit {
+    pub(super) fn new(view: &View, [width, height]: [f64; 2]) -> Self {
+        let size = view.high - view.low;
+        let scale = (width / size.x).min(height / size.y);
+        let origin = 0.5 * (view.low + view.high) - 0.5 * DVec2::new(width, height) / scale;
+        Self { scale, origin, height }
+    }
+
+    /// Where a point of the world is on the image.
+    #[inline]
+    pub(super) fn place(&self, point: DVec2) -> [f64; 2] {
+        let from = (point - self.origin) * self.scale;
+        [from.x, self.height - from.y]
+    }
+}

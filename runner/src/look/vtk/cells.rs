@@ -1,0 +1,80 @@
+//! What there is in a file: bodies of one rank, or statics.
+
+use super::outline::Outline;
+use super::piece::{self, Column, Form, Output};
+use crate::folder::recording::{Row, distinct_kinds};
+use crate::look::frame::Setting;
+use atoll_core::Rot;
+use glam::DVec2;
+use std::fs::File;
+use std::io::{self, Write};
+
+/// What bodies have: names, forms, and numbers in each. Statics have the first two.
+pub(super) const COLUMNS: [(&str, Form, usize); 6] = [
+    ("id", Form::UInt64, 1),
+    ("kind", Form::UInt32, 1),
+    ("velocity", Form::Float32, 3),
+    ("spin", Form::Float32, 1),
+    ("tile", Form::UInt32, 1),
+    ("rank", Form::UInt32, 1),
+];
+
+/// What is shown first, and which columns are what.
+pub(super) const ATTRIBUTES: &str = "Scalars=\"kind\" Vectors=\"velocity\"";
+
+/// Writes the bodies of one rank.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn write_bodies(setting: &Setting, rows: &[Row], rank: u32, file: &mut File) -> io::Result<()> {
+    let center = |row: &Row| DVec2::new(row.x, row.y);
+    let outlines = rows.iter().map(|row| Outline {
+        center: center(row),
+        rotation: Rot::from_angle(row.angle),
+        shape: setting.kinds[row.kind as usize].shape,
+    });
+    let columns: [Values<'_>; 6] = [
+        Box::new(|out| rows.iter().try_for_each(|row| out.write_all(&row.id.to_le_bytes()))),
+        Box::new(|out| rows.iter().try_for_each(|row| out.write_all(&row.kind.to_le_bytes()))),
+        Box::new(|out| {
+            let velocities = rows.iter().flat_map(|row| [row.vx, row.vy, 0.0]);
+            velocities.into_iter().try_for_each(|component| out.write_all(&component.to_le_bytes()))
+        }),
+        Box::new(|out| rows.iter().try_for_each(|row| out.write_all(&row.omega.to_le_bytes()))),
+        Box::new(|out| {
+            let mut tiles = rows.iter().map(|row| setting.grid.locate(center(row)).0);
+            tiles.try_for_each(|tile| out.write_all(&tile.to_le_bytes()))
+        }),
+        Box::new(|out| rows.iter().try_for_each(|_| out.write_all(&rank.to_le_bytes()))),
+    ];
+    piece::write(outlines, &named(columns), ATTRIBUTES, file)
+}
+
+/// Writes what never moves. Its kinds are numbered after those of bodies.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn write_statics(setting: &Setting, file: &mut File) -> io::Result<()> {
+    let statics = &setting.statics;
+    let outlines = statics.iter().map(|fixed| Outline {
+        center: fixed.position,
+        rotation: fixed.rotation,
+        shape: fixed.kind.shape,
+    });
+    let (_, numbers) = distinct_kinds(statics);
+    let first = setting.kinds.len() as u32;
+    let columns: [Values<'_>; 2] = [
+        Box::new(|out| statics.iter().try_for_each(|fixed| out.write_all(&fixed.id.0.to_le_bytes()))),
+        Box::new(|out| numbers.iter().try_for_each(|number| out.write_all(&(first + number).to_le_bytes()))),
+    ];
+    piece::write(outlines, &named(columns), "Scalars=\"kind\"", file)
+}
+
+/// Writes the values of a column.
+type Values<'a> = Box<dyn Fn(&mut Output<'_>) -> io::Result<()> + 'a>;
+
+/// The first of [`COLUMNS`], with their values.
+fn named<const N: usize>(values: [Values<'_>; N]) -> Vec<Column<'_>> {
+    let columns = COLUMNS.into_iter().zip(values);
+    columns.map(|((name, form, components), values)| Column { name, form, components, values }).collect()
+}

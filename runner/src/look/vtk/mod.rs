@@ -1,0 +1,124 @@
+//! Files for ParaView, and whatever else reads VTK's XML: bodies as polygons, so that no filter is needed to see them.
+//!
+//! ```text
+//! OUT/run.pvd                              what to open: every step with its time, and the statics with each
+//! OUT/bodies-0000000010.pvtu               a step, of all ranks
+//! OUT/bodies-0000000010/rank-00000.vtu     what one rank recorded of it
+//! OUT/statics.vtu
+//! ```
+//!
+//! Numbers are raw bytes behind the XML, with lengths of 64 bits, so that a file may be of any size; names of files have no
+//! dot but the one before their ending, as readers take what follows the first for the ending.
+
+mod cells;
+mod outline;
+mod piece;
+mod target;
+#[cfg(test)]
+mod tests;
+
+use super::frame::{Frame, Setting};
+use super::recorded::Recorded;
+use crate::error::RunError;
+use cells::{write_bodies, write_statics};
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use target::Target;
+
+/// What ParaView is to open.
+const COLLECTION: &str = "run.pvd";
+
+/// What never moves.
+const STATICS: &str = "statics.vtu";
+
+/// What was written.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Written {
+    /// What ParaView is to open.
+    pub collection: PathBuf,
+    /// The steps.
+    pub steps: Vec<u64>,
+    /// Bodies in the last of them.
+    pub bodies: usize,
+    /// Bytes of all files.
+    pub bytes: u64,
+}
+
+/// Writes one of every so many records to a folder, which must be new or empty. Of records there is never more than one in
+/// memory. `written` is told how many are done, and of how many.
+///
+/// # Errors
+/// If the folder cannot be had, a record cannot be read, or a file cannot be written. What was written is removed then.
+pub(crate) fn export(
+    recorded: &Recorded,
+    out: &Path,
+    every: usize,
+    mut written: impl FnMut(usize, usize),
+) -> Result<Written, RunError> {
+    let mut target = Target::new(out)?;
+    let setting = recorded.setting();
+    target.write(STATICS, |file| write_statics(setting, file))?;
+    let steps: Vec<u64> = recorded.recording().steps().iter().copied().step_by(every).collect();
+    let mut frame = Frame::default();
+    for (done, &step) in (1..).zip(&steps) {
+        recorded.read(step, &mut frame)?;
+        write_frame(setting, &frame, &mut target)?;
+        written(done, steps.len());
+    }
+    let text = collection(setting.hertz, &steps);
+    target.write(COLLECTION, |file| file.write_all(text.as_bytes()))?;
+    Ok(Written { collection: out.join(COLLECTION), steps, bodies: frame.bodies.len(), bytes: target.finish() })
+}
+
+/// The name of a step, without an ending.
+fn name_of(step: u64) -> String {
+    format!("bodies-{step:010}")
+}
+
+/// A step: a file for each rank that has bodies, and one that names those.
+fn write_frame(setting: &Setting, frame: &Frame, target: &mut Target) -> Result<(), RunError> {
+    let name = name_of(frame.step);
+    target.folder(&name)?;
+    let (mut pieces, mut start) = (Vec::new(), 0);
+    for &(rank, end) in &frame.ranks {
+        let rows = &frame.bodies[start..end];
+        start = end;
+        if !rows.is_empty() {
+            let piece = format!("{name}/rank-{rank:05}.vtu");
+            target.write(&piece, |file| write_bodies(setting, rows, rank, file))?;
+            pieces.push(piece);
+        }
+    }
+    target.write(&format!("{name}.pvtu"), |file| file.write_all(parallel(&pieces).as_bytes()))
+}
+
+/// What names the pieces of a step, and what there is in each.
+fn parallel(pieces: &[String]) -> String {
+    let mut text = piece::heading("PUnstructuredGrid");
+    text += " <PUnstructuredGrid GhostLevel=\"0\">\n  <PPoints>\n";
+    text += "   <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n  </PPoints>\n";
+    writeln!(text, "  <PCellData {}>", cells::ATTRIBUTES).expect("a string takes any text");
+    for (name, form, components) in cells::COLUMNS {
+        let form = form.name();
+        writeln!(text, "   <PDataArray type=\"{form}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>")
+            .expect("a string takes any text");
+    }
+    text += "  </PCellData>\n";
+    pieces.iter().for_each(|piece| text += &format!("  <Piece Source=\"{piece}\"/>\n"));
+    text + " </PUnstructuredGrid>\n</VTKFile>\n"
+}
+
+/// What names all steps, with their times in s. The statics are a second part of each.
+fn collection(hertz: f64, steps: &[u64]) -> String {
+    let mut text = piece::heading("Collection");
+    text += " <Collection>\n";
+    for &step in steps {
+        let (time, name) = (step as f64 / hertz, name_of(step));
+        for (part, of, file) in [(0, "bodies", format!("{name}.pvtu")), (1, "statics", STATICS.to_owned())] {
+            writeln!(text, "  <DataSet timestep=\"{time}\" group=\"\" part=\"{part}\" name=\"{of}\" file=\"{file}\"/>")
+                .expect("a string takes any text");
+        }
+    }
+    text + " </Collection>\n</VTKFile>\n"
+}
