@@ -17,7 +17,8 @@ pub struct RankTimings {
     pub steps: u64,
     /// All steps, from the first to the last.
     pub wall_nanos: u64,
-    /// As [`RankFacts::phases`].
+    /// The time of each phase in the order of the step, in nanoseconds; `wait`, the part of the exchange in which the rank
+    /// waited for others; `output`; and `other`, which nothing of that accounts for.
     pub phases: Vec<(&'static str, u64)>,
 }
 
