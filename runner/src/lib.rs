@@ -96,5 +96,5 @@ pub mod internals {
     pub use crate::folder::recording::{Record, RecordingWriter, StageText, rank_folder};
     pub use crate::launch::run as run_plan;
     pub use crate::plan::Plan;
-    pub use crate::rank::{PanicAt, Watcher};
+    pub use crate::rank::{Held, Host, Next, PanicAt, Watcher};
 }

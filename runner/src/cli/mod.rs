@@ -11,6 +11,7 @@ mod progress;
 mod render;
 mod report;
 mod run;
+mod view;
 
 use crate::error::{Exit, RunError};
 use args::{Cli, Command};
@@ -21,14 +22,15 @@ use std::process::ExitCode;
 
 /// Reads the command line and does what it says.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let command = match Cli::try_parse() {
+        Ok(cli) => view::as_run(cli.command),
         Err(error) => return usage(&error),
     };
-    let begun = console::init(matches!(&cli.command, Command::Run(args) if args.trace.is_some()));
+    let begun = console::init(matches!(&command, Command::Run(args) if args.trace.is_some()));
     interrupt::outlive_file_limits();
-    let result = begun.and_then(|()| match &cli.command {
+    let result = begun.and_then(|()| match &command {
         Command::Run(args) => run::run(args),
+        Command::View(args) => view::run(args),
         Command::Diff(args) => diff::run(args),
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
@@ -39,7 +41,7 @@ pub fn main() -> ExitCode {
         if !matches!(error, RunError::ToldElsewhere { .. }) {
             console::complain(&error);
         }
-        match (&cli.command, error.exit()) {
+        match (&command, error.exit()) {
             (_, Exit::Output) => Exit::Output,
             // One code tells of all that keeps a comparison from its answer.
             (Command::Diff(_), _) => Exit::Usage,

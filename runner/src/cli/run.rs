@@ -5,6 +5,7 @@ use super::console::{Console, complain};
 use super::interrupt::stop_on_signals;
 use super::output::{self, Kept, WholeFile};
 use super::progress::Show;
+use super::view::Window;
 use crate::config::Config;
 #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
 use crate::config::TransportKind;
@@ -29,9 +30,15 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     if let Some(rank) = launch::iceoryx2::RankProcess::of_this() {
         let goes_on = rank.goes_on();
         let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on || is_begun(args)));
+        let opened = Window::open(args, rank.speaks());
+        let (plan, window) = match plan.and_then(|plan| opened.map(|window| (plan, window))) {
+            Ok((plan, window)) => (Ok(plan), window),
+            Err(error) => (Err(error), None),
+        };
+        let host = plan.as_ref().ok().and_then(|plan| window.as_ref().map(|window| window.host(plan)));
         // Whoever signals all processes at once means what the launcher is about to say.
         let stop = stop_on_signals(false, || {});
-        return Ok(rank.run(plan, Observer { stop, ..observer(args, goes_on) }));
+        return Ok(rank.run(plan, Observer { stop, host, ..observer(args, goes_on) }));
     }
     let config = load(args, false);
     #[cfg(feature = "mpi")]
@@ -68,9 +75,13 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         let run = |plan: &Plan, goes_on| launch::iceoryx2::run(plan, &wishes, goes_on);
         return conclude(&supervise(args, &config, first, run, || wishes.stop.is_requested())?, &outputs);
     }
+    let window = Window::open(args, true)?;
     let _claim = claim(&first, held)?;
     let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
-    let run = |plan: &Plan, goes_on| launch::run(plan, &Observer { stop: stop.clone(), ..observer(args, goes_on) });
+    let run = |plan: &Plan, goes_on| {
+        let host = window.as_ref().map(|window| window.host(plan));
+        launch::run(plan, &Observer { stop: stop.clone(), host, ..observer(args, goes_on) })
+    };
     conclude(&supervise(args, &config, first, run, || stop.is_requested())?, &outputs)
 }
 
@@ -221,9 +232,9 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         let config = job.adapt(config)?;
         // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
-        Ok((prepare(&config, &outputs, begun)?, outputs))
+        Ok((prepare(&config, &outputs, begun)?, outputs, Window::open(args, speaks)?))
     });
-    let (mut plan, outputs) = job.agree(prepared, |(plan, _)| plan)?;
+    let (mut plan, outputs, window) = job.agree(prepared, |(plan, ..)| plan)?;
     let held = job.all_well(if speaks { hold_new(args, &plan, held) } else { Ok(None) })?;
     if job.told(speaks && !begun && is_begun(args)) {
         plan = job.agree(prepare(&plan.config, &outputs, true), |plan| plan)?;
@@ -234,7 +245,8 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     }
     // Silently: the launcher sends signals of its own when it ends a job.
     let stop = stop_on_signals(false, || launch::mpi::Job::quit());
-    let concluded = match job.run(&plan, &Observer { stop, ..observer(args, false) })? {
+    let host = window.as_ref().map(|window| window.host(&plan));
+    let concluded = match job.run(&plan, &Observer { stop, host, ..observer(args, false) })? {
         Some(summary) => conclude(&summary, &outputs),
         None => Ok(Exit::Done),
     };

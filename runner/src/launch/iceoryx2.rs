@@ -108,6 +108,11 @@ impl RankProcess {
         env::var_os(GOES_ON).is_some()
     }
 
+    /// Whether it is the one that speaks for all.
+    pub(crate) fn speaks(&self) -> bool {
+        iceoryx2::process_rank() == Some(Rank(0))
+    }
+
     /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end. The plan
     /// is given, as ranks wait for each other no longer than the peer timeout once they have joined.
     pub(crate) fn run(self, plan: Result<Plan, RunError>, observer: Observer) -> Exit {

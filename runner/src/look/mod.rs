@@ -3,6 +3,7 @@
 pub mod compare;
 pub(crate) mod film;
 pub(crate) mod frame;
+pub(crate) mod live;
 pub(crate) mod picture;
 pub(crate) mod recorded;
 pub(crate) mod report;

@@ -5,9 +5,9 @@
 
 use super::{Observer, RankError};
 use atoll_core::{StepReport, World};
-use atoll_transport::{Collective, Rank, Transport};
+use atoll_transport::{Collective, Counting, Rank, Stats, Transport, TransportError};
 use std::fmt::Debug;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What rank 0 does next in a meeting.
 #[derive(Clone, PartialEq, Debug)]
@@ -35,7 +35,7 @@ pub struct Held<'a> {
 
 /// Who asks. Every process of a run has one; only that of rank 0 has questions.
 pub trait Host: Debug + Send + Sync {
-    /// On rank 0, before a step: whether ranks are to meet after it. It may wait here, which slows the run down.
+    /// On rank 0, before a step: whether ranks are to meet once so many steps are made.
     fn calls(&self, steps: u64) -> bool;
     /// On rank 0, in a meeting after so many steps: what is next, in no longer than `patience`.
     fn next(&self, steps: u64, patience: Duration) -> Next;
@@ -43,8 +43,9 @@ pub trait Host: Debug + Send + Sync {
     fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8>;
     /// On rank 0: the answers to its last question, by rank.
     fn hear(&self, answers: Vec<Vec<u8>>);
-    /// On every rank: whether to meet once more when all steps are made, until rank 0 goes on or the run is asked to stop.
-    fn stays(&self) -> bool;
+    /// On every rank alike: whether to meet before the first step as well, and when all are made, then until the run is asked to
+    /// stop.
+    fn lingers(&self) -> bool;
 }
 
 /// The first byte of what rank 0 tells the others.
@@ -54,41 +55,95 @@ const WAIT: u8 = 2;
 /// What other ranks say: nothing, or that they are to stop.
 const STOP: u8 = 1;
 
-/// Meets, until rank 0 lets time go on, or somebody asks the run to stop.
-///
-/// # Errors
-/// If a rank is lost.
-pub(super) fn hold(
-    host: &dyn Host,
-    held: &Held<'_>,
-    observer: &Observer,
-    peer_timeout: Duration,
-    transport: &mut impl Transport,
-) -> Result<(), RankError> {
-    // Whoever is silent for too long is given up.
-    let patience = (peer_timeout / 4).min(Duration::from_millis(250));
-    loop {
-        let mut word = if observer.stop.is_requested() { vec![STOP] } else { Vec::new() };
+/// The meetings of one rank, and what they have cost. Where there is no host, there are none.
+#[derive(Debug)]
+pub(super) struct Meetings<'a> {
+    observer: &'a Observer,
+    /// The longest that rank 0 is silent.
+    patience: Duration,
+    /// How long time stood still because somebody wished so.
+    pub(super) stood: Duration,
+    /// How long ranks asked and answered.
+    pub(super) spent: Duration,
+    /// What they sent each other for that.
+    pub(super) sent: Stats,
+}
+
+impl<'a> Meetings<'a> {
+    /// None yet. Whoever is silent for `peer_timeout` is given up.
+    pub(super) fn new(observer: &'a Observer, peer_timeout: Duration) -> Self {
+        let patience = (peer_timeout / 4).min(Duration::from_millis(250));
+        Self { observer, patience, stood: Duration::ZERO, spent: Duration::ZERO, sent: Stats::default() }
+    }
+
+    fn host(&self) -> Option<&'a dyn Host> {
+        self.observer.host.as_deref()
+    }
+
+    /// Before a step: lets all ranks know if they are to meet after it.
+    pub(super) fn prepare(&self, rank: Rank, world: &mut World) {
+        if rank == Rank(0) && self.host().is_some_and(|host| host.calls(world.step_count() + 1)) {
+            world.request_meeting();
+        }
+    }
+
+    /// Meets before the first step, or after the last, if that is wanted.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn linger<T: Transport>(
+        &mut self,
+        held: &Held<'_>,
+        transport: &mut Counting<T>,
+    ) -> Result<(), RankError> {
+        if self.host().is_some_and(Host::lingers) { self.hold(held, transport) } else { Ok(()) }
+    }
+
+    /// Meets, until rank 0 lets time go on, or somebody asks the run to stop.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn hold<T: Transport>(&mut self, held: &Held<'_>, transport: &mut Counting<T>) -> Result<(), RankError> {
+        let Some(host) = self.host() else { return Ok(()) };
+        let before = transport.stats();
+        while self.go_round(host, held, transport).map_err(RankError::Transport)? {}
+        self.sent += transport.stats().since(&before);
+        Ok(())
+    }
+
+    /// One word of rank 0 and what follows from it. Says whether the meeting goes on.
+    fn go_round(
+        &mut self,
+        host: &dyn Host,
+        held: &Held<'_>,
+        transport: &mut impl Transport,
+    ) -> Result<bool, TransportError> {
+        let start = Instant::now();
+        let mut word = if self.observer.stop.is_requested() { vec![STOP] } else { Vec::new() };
         if held.rank == Rank(0) && word.is_empty() {
-            word = match host.next(held.world.step_count(), patience) {
+            word = match host.next(held.world.step_count(), self.patience) {
                 Next::Ask(question) => [&[0, ASK][..], &question].concat(),
                 Next::Wait => vec![0, WAIT],
                 Next::GoOn => vec![0],
             };
         }
-        let words = transport.all_gather(&word).map_err(RankError::Transport)?;
+        let words = transport.all_gather(&word)?;
+        self.stood += start.elapsed();
         if words.iter().any(|word| word.first() == Some(&STOP)) {
-            return Ok(());
+            return Ok(false);
         }
         match words[0].get(1) {
             Some(&ASK) => {
+                let start = Instant::now();
                 let answer = host.answer(&words[0][2..], held);
-                if let Some(answers) = transport.gather(Rank(0), &answer).map_err(RankError::Transport)? {
+                if let Some(answers) = transport.gather(Rank(0), &answer)? {
                     host.hear(answers);
                 }
+                self.spent += start.elapsed();
+                Ok(true)
             }
-            Some(_) => {}
-            None => return Ok(()),
+            Some(_) => Ok(true),
+            None => Ok(false),
         }
     }
 }

@@ -8,6 +8,7 @@ mod halo;
 #[cfg(any(test, feature = "iceoryx2", feature = "mpi"))]
 pub(crate) mod handshake;
 mod log;
+mod meeting;
 mod observer;
 mod recorder;
 pub(crate) mod trace;
@@ -16,6 +17,7 @@ pub(crate) mod trouble;
 pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
+pub use meeting::{Held, Host, Next};
 pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 pub(crate) use trace::TraceSteps;
 use trouble::Refusal;
@@ -27,6 +29,7 @@ use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use begin::Beginning;
 use bytemuck::Pod;
 use log::Log;
+use meeting::Meetings;
 use rayon::ThreadPoolBuilder;
 use recorder::Recorder;
 use std::sync::atomic::Ordering;
@@ -155,6 +158,8 @@ fn run<T: Transport>(
         recorder.write_due(&world, false);
     }
     observer.show(rank, &world);
+    let mut meetings = Meetings::new(observer, plan.config.run.peer_timeout);
+    meetings.linger(&Held { rank, world: &world, last: &last, waited: Duration::ZERO }, halo.transport())?;
     while world.step_count() < steps && !last.stopped {
         let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
         if observer.stop.is_requested() || unwritten {
@@ -169,6 +174,7 @@ fn run<T: Transport>(
         if let Some(log) = &log {
             log.prepare(&mut world);
         }
+        meetings.prepare(rank, &mut world);
         tracer.before(Some(world.step_count()));
         last = atoll_core::step(&mut world, &mut halo).map_err(RankError::Step)?;
         migrations += last.migrations;
@@ -189,6 +195,10 @@ fn run<T: Transport>(
         }
         observer.show(rank, &world);
         told.made(*complete);
+        if last.meeting {
+            let waited = halo.waited();
+            meetings.hold(&Held { rank, world: &world, last: &last, waited }, halo.transport())?;
+        }
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
     tracer.before(None);
@@ -201,7 +211,8 @@ fn run<T: Transport>(
     drop(told);
     let finished = Instant::now();
 
-    let mut sent = halo.transport().stats().since(&before);
+    let mut sent = halo.transport().stats().since(&before).since(&meetings.sent);
+    output_time += meetings.spent;
     let mut waited = halo.waited();
     let mut facts = RankFacts::new(&world, &last, &plan.scene);
     if let Some(log) = &log {
@@ -216,9 +227,12 @@ fn run<T: Transport>(
     facts.resumed_at = resumed.unwrap_or(0);
     (facts.bytes_sent, facts.messages_sent) = (sent.bytes_sent, sent.messages_sent);
     facts.build_nanos = (built - start).as_nanos() as u64;
-    facts.wall_nanos = (finished - built).as_nanos() as u64;
+    facts.wall_nanos = (finished - built).saturating_sub(meetings.stood).as_nanos() as u64;
     facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
+    if !last.stopped {
+        meetings.linger(&Held { rank, world: &world, last: &last, waited: halo.waited() }, halo.transport())?;
+    }
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();

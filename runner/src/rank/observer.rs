@@ -1,5 +1,6 @@
 //! How a run is watched, and stopped.
 
+use super::meeting::Host;
 use super::trace::TraceSteps;
 use atoll_core::World;
 use atoll_transport::Rank;
@@ -35,6 +36,8 @@ pub struct Observer {
     pub listener: Option<Arc<dyn Listener>>,
     /// Who sees it.
     pub watcher: Option<Arc<dyn Watcher>>,
+    /// Who lets ranks meet between steps, and asks them.
+    pub host: Option<Arc<dyn Host>>,
     /// Ends the run early.
     pub stop: StopFlag,
     /// Lets a rank panic.

@@ -5,10 +5,12 @@ mod recordings;
 mod render;
 mod run;
 mod values;
+mod view;
 
 pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
 pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
+pub(crate) use view::ViewArgs;
 
 use crate::config::OneLine;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -31,6 +33,8 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Compare what two runs recorded: the exit code is 0 if it is the same, 1 if it differs, 2 if that cannot be told.
     Diff(DiffArgs),
+    /// Look at a run while it goes on, or at what runs have recorded, in a browser.
+    View(Box<ViewArgs>),
     /// Make a picture or a film of what a run has recorded, or of a configuration, which is run for it.
     Render(Box<RenderArgs>),
     /// Tell what the folder of a run, a snapshot or a segment of a recording holds.

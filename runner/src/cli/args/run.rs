@@ -4,10 +4,11 @@ use super::values::{ValueArgs, given};
 use crate::config::{ConfigError, Override};
 use crate::rank::{PanicAt, TraceSteps};
 use clap::{ArgGroup, Args};
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 /// Options of `atoll run`.
-#[derive(Debug, Args)]
+#[derive(Default, Debug, Args)]
 #[command(allow_negative_numbers = true, group = ArgGroup::new("logged").multiple(true))]
 pub struct RunArgs {
     /// The configuration, a TOML file such as configs/quickstart.toml. May be left out with --resume.
@@ -56,6 +57,21 @@ pub struct RunArgs {
     /// Go on from the newest snapshot up to so many times where a rank is lost.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "folder")]
     pub restarts: u32,
+    /// Let a page in the browser look while it goes on; its address is told.
+    #[arg(long)]
+    pub view: bool,
+    /// Serve that page at this port [default: any that is free].
+    #[arg(long, value_name = "P", requires = "view")]
+    pub port: Option<u16>,
+    /// Serve it at this address of this machine, so that others can look who know what is told [default: 127.0.0.1].
+    #[arg(long, value_name = "ADDRESS", requires = "view")]
+    pub bind: Option<IpAddr>,
+    /// Open that page in a browser.
+    #[arg(long, requires = "view")]
+    pub open: bool,
+    /// Let pages look before the first step, and after the last one until somebody asks to stop.
+    #[arg(skip)]
+    pub lingers: bool,
     /// Show no progress, only the closing report.
     #[arg(long)]
     pub quiet: bool,

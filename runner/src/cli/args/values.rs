@@ -4,7 +4,7 @@ use crate::config::{ConfigError, Override};
 use clap::Args;
 
 /// Values of a configuration that win over the file's.
-#[derive(Debug, Args)]
+#[derive(Default, Debug, Args)]
 pub struct ValueArgs {
     /// Ranks that share the tiles [default: the configuration's, else 1].
     #[arg(long, value_name = "N")]

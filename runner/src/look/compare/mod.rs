@@ -160,6 +160,30 @@ pub fn compare(
     Ok(Comparison { same, identical, tolerance, a, b, configuration, first_difference, only_in_a, only_in_b, steps })
 }
 
+/// The first step that two runs have both recorded, and after which any body is not the same, bit for bit; None if there is no
+/// such step. Nothing if somebody asked to stop before that was known.
+///
+/// # Errors
+/// If a recording cannot be read.
+pub(crate) fn first_step_apart(
+    a: &Path,
+    b: &Path,
+    stop: impl Fn() -> bool,
+) -> Result<Option<Option<u64>>, RecordingError> {
+    let (a, b) = (Recording::open(a)?, Recording::open(b)?);
+    let (mut of_a, mut of_b) = (Vec::new(), Vec::new());
+    for &step in a.steps().iter().filter(|step| b.steps().binary_search(step).is_ok()) {
+        if stop() {
+            return Ok(None);
+        }
+        read_sorted(&a, step, &mut of_a).and(read_sorted(&b, step, &mut of_b))?;
+        if deviation::measure(step, &of_a, &of_b, None).1.is_some() {
+            return Ok(Some(Some(step)));
+        }
+    }
+    Ok(Some(None))
+}
+
 /// The rows of a record by the names of their bodies.
 fn read_sorted(recording: &Recording, step: u64, rows: &mut Vec<Row>) -> Result<(), RecordingError> {
     recording.read(step, rows)?;

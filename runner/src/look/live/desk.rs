@@ -16,6 +16,9 @@ const MOST_TEXTS: usize = 64;
 /// The least time between two frames for one page.
 const FRAME: Duration = Duration::from_millis(33);
 
+/// A body that is so near to where somebody has pointed is meant, in pixels.
+const NEAR: f64 = 3.0;
+
 /// Which page.
 pub(crate) type PageId = u64;
 
@@ -41,13 +44,15 @@ pub(crate) struct Due {
     pub gaze: Gaze,
     /// The number the frame is to have.
     pub number: u32,
+    /// What there is to see now.
+    pub version: u64,
 }
 
 /// The body that somebody wants to know about: it is picked for all pages.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Pick {
-    /// Whichever is there: a world and a place in m.
-    At(u32, [f64; 2]),
+    /// Whichever is there: a world, a place, and how far from it at most, in m.
+    At(u32, [f64; 2], f64),
     /// This one of that world.
     Body(u32, u64),
 }
@@ -55,7 +60,7 @@ pub(crate) enum Pick {
 /// See the head of this file.
 #[derive(Debug)]
 pub(crate) struct Desk {
-    /// Whether somebody may want something, so that who has nothing to do with pages need not lock.
+    /// Whether a page is there, so that who has nothing to do with pages need not lock.
     wanted: AtomicBool,
     inner: Mutex<Inner>,
     /// Somebody wants something.
@@ -72,8 +77,10 @@ struct Inner {
     /// How it is when nobody looks.
     usual: Pace,
     picked: Option<Pick>,
+    /// How often somebody has wanted something.
+    wishes: u64,
     /// What each new page is told first.
-    greeting: Option<Say>,
+    greeting: Vec<Say>,
     closed: bool,
 }
 
@@ -86,8 +93,10 @@ struct Page {
     free: bool,
     /// Whether it looks at something else since.
     moved: bool,
+    /// What there was to see on the last frame.
+    seen: Option<u64>,
     last: Option<Instant>,
-    frame: Option<Vec<u8>>,
+    frames: Vec<Vec<u8>>,
     texts: Vec<String>,
 }
 
@@ -96,8 +105,8 @@ struct Page {
 pub(crate) enum Ready {
     /// Words, in order.
     Texts(Vec<String>),
-    /// A frame.
-    Frame(Vec<u8>),
+    /// A frame, of each world.
+    Frame(Vec<Vec<u8>>),
     /// Nothing, for now.
     Nothing,
     /// Nothing ever again.
@@ -108,8 +117,8 @@ impl Desk {
     /// One at which time goes on or stands still at first, at this speed.
     pub(crate) fn new(playing: bool, times: f64) -> Self {
         let pace = Pace { playing, times, by: 0, seek: None };
-        let inner =
-            Inner { pages: BTreeMap::new(), next: 0, pace, usual: pace, picked: None, greeting: None, closed: false };
+        let (pages, greeting) = (BTreeMap::new(), Vec::new());
+        let inner = Inner { pages, next: 0, pace, usual: pace, picked: None, wishes: 0, greeting, closed: false };
         Self { wanted: AtomicBool::new(false), inner: Mutex::new(inner), wish: Condvar::new(), ready: Condvar::new() }
     }
 
@@ -129,6 +138,7 @@ impl Desk {
         inner.next += 1;
         let texts = inner.greeting.iter().map(text).collect();
         inner.pages.insert(id, Page { free: true, texts, ..Page::default() });
+        self.wanted.store(true, Ordering::Relaxed);
         Some(id)
     }
 
@@ -139,7 +149,9 @@ impl Desk {
         // Nobody is there who could let time go on again.
         if inner.pages.is_empty() {
             (inner.pace, inner.picked) = (inner.usual, None);
+            self.wanted.store(false, Ordering::Relaxed);
         }
+        inner.wishes += 1;
         drop(inner);
         self.wish.notify_all();
     }
@@ -147,12 +159,12 @@ impl Desk {
     /// A page wants something.
     pub(crate) fn hear(&self, page: PageId, wish: Wish) {
         let mut inner = self.lock();
-        let Inner { pages, pace, picked, .. } = &mut *inner;
+        let Inner { pages, pace, picked, wishes, .. } = &mut *inner;
+        *wishes += 1;
         let Some(page) = pages.get_mut(&page) else { return };
         match wish {
             Wish::Look { view: [x0, y0, x1, y1], size, color } => {
-                let view = super::super::picture::View { low: (x0, y0).into(), high: (x1, y1).into() };
-                page.gaze = Some(Gaze { view, size, color });
+                page.gaze = Some(Gaze { view: [x0, y0, x1, y1].into(), size, color });
                 page.moved = true;
             }
             Wish::Ack { frame } => page.free |= frame == page.given,
@@ -161,10 +173,12 @@ impl Desk {
             Wish::Step { by } => (pace.playing, pace.by) = (false, pace.by.saturating_add(by.into())),
             Wish::Seek { step } => pace.seek = Some(step),
             Wish::Speed { times } => pace.times = times,
-            Wish::Pick { source, at } => *picked = Some(Pick::At(source, at)),
+            Wish::Pick { source, at } => {
+                let pixel = |gaze: Gaze| (gaze.view.high.x - gaze.view.low.x) / f64::from(gaze.size[0]);
+                *picked = Some(Pick::At(source, at, NEAR * page.gaze.map_or(0.0, pixel)));
+            }
             Wish::Drop => *picked = None,
         }
-        self.wanted.store(true, Ordering::Relaxed);
         drop(inner);
         self.wish.notify_all();
     }
@@ -172,7 +186,7 @@ impl Desk {
     /// What is ready for a page, once something is, or after so long.
     pub(crate) fn next(&self, page: PageId, patience: Duration) -> Ready {
         let waits = |inner: &mut Inner| {
-            !inner.closed && inner.pages.get(&page).is_some_and(|page| page.texts.is_empty() && page.frame.is_none())
+            !inner.closed && inner.pages.get(&page).is_some_and(|page| page.texts.is_empty() && page.frames.is_empty())
         };
         let (mut inner, _) =
             self.ready.wait_timeout_while(self.lock(), patience, waits).unwrap_or_else(PoisonError::into_inner);
@@ -180,8 +194,8 @@ impl Desk {
         let Some(page) = inner.pages.get_mut(&page) else { return Ready::Closed };
         if !page.texts.is_empty() {
             Ready::Texts(std::mem::take(&mut page.texts))
-        } else if let Some(frame) = page.frame.take() {
-            Ready::Frame(frame)
+        } else if !page.frames.is_empty() {
+            Ready::Frame(std::mem::take(&mut page.frames))
         } else if closed {
             Ready::Closed
         } else {
@@ -194,7 +208,11 @@ impl Desk {
     /// Tells each page that comes from now on, first of all, and those that are there.
     pub(crate) fn greet(&self, greeting: Say) {
         self.tell(&greeting);
-        self.lock().greeting = Some(greeting);
+        let mut inner = self.lock();
+        if matches!(greeting, Say::Hello(_)) {
+            inner.greeting.clear();
+        }
+        inner.greeting.push(greeting);
     }
 
     /// Tells all pages.
@@ -210,33 +228,34 @@ impl Desk {
         self.ready.notify_all();
     }
 
-    /// Whether somebody may want something. Costs nothing.
+    /// Whether a page is there. Costs nothing.
     pub(crate) fn is_wanted(&self) -> bool {
         self.wanted.load(Ordering::Relaxed)
     }
 
-    /// The frames that are due: of pages that have drawn their last one, a while ago, and either the world has changed, or they
-    /// look elsewhere.
-    pub(crate) fn due(&self, changed: bool) -> Vec<Due> {
-        let mut inner = self.lock();
+    /// The frames that are due when there is this to see: of pages that have drawn their last one, a while ago, and have not seen
+    /// it yet, or look elsewhere.
+    pub(crate) fn due(&self, version: u64) -> Vec<Due> {
         let now = Instant::now();
-        let rested = |page: &Page| page.last.is_none_or(|last| now - last >= FRAME);
-        let mut due = Vec::new();
-        for (&id, page) in &mut inner.pages {
-            if let (Some(gaze), true) = (page.gaze, page.free && rested(page) && (changed || page.moved)) {
-                due.push(Due { page: id, gaze, number: page.given.wrapping_add(1) });
-            }
-        }
-        // Whoever draws now will want another.
-        self.wanted.store(!inner.pages.is_empty(), Ordering::Relaxed);
-        due
+        let due = |(&page, of): (&PageId, &Page)| {
+            let gaze = of.gaze.filter(|_| of.wants(version) && of.rests(now).is_zero())?;
+            Some(Due { page, gaze, number: of.given.wrapping_add(1), version })
+        };
+        self.lock().pages.iter().filter_map(due).collect()
     }
 
-    /// Gives a page its frame.
-    pub(crate) fn give(&self, due: &Due, frame: Vec<u8>) {
+    /// How long until a frame is due, if nobody wants anything else.
+    pub(crate) fn rests(&self, version: u64) -> Option<Duration> {
+        let now = Instant::now();
+        self.lock().pages.values().filter(|page| page.wants(version)).map(|page| page.rests(now)).min()
+    }
+
+    /// Gives a page its frame, of each world.
+    pub(crate) fn give(&self, due: &Due, frames: Vec<Vec<u8>>) {
         let mut inner = self.lock();
         if let Some(page) = inner.pages.get_mut(&due.page) {
-            page.frame = Some(frame);
+            page.frames = frames;
+            page.seen = Some(due.version);
             page.given = due.number;
             page.free = false;
             page.moved &= page.gaze != Some(due.gaze);
@@ -272,10 +291,25 @@ impl Desk {
         }
     }
 
-    /// Waits until somebody wants something, but no longer than `patience`.
-    pub(crate) fn wait(&self, patience: Duration) {
-        let inner = self.lock();
-        drop(self.wish.wait_timeout(inner, patience));
+    /// How time is to go on.
+    pub(crate) fn pace(&self) -> Pace {
+        self.lock().pace
+    }
+
+    /// One of the steps that were to be made whether or not time goes on is made.
+    pub(crate) fn made_one(&self) {
+        self.lock().pace.by -= 1;
+    }
+
+    /// How often somebody has wanted something.
+    pub(crate) fn wishes(&self) -> u64 {
+        self.lock().wishes
+    }
+
+    /// Waits until somebody has wanted something more than so often, but no longer than `patience`.
+    pub(crate) fn wait(&self, wishes: u64, patience: Duration) {
+        let waits = |inner: &mut Inner| inner.wishes == wishes && !inner.closed;
+        drop(self.wish.wait_timeout_while(self.lock(), patience, waits));
     }
 
     /// Nothing more will be shown. Who waits for it is told.
@@ -283,6 +317,18 @@ impl Desk {
         self.lock().closed = true;
         self.wish.notify_all();
         self.ready.notify_all();
+    }
+}
+
+impl Page {
+    /// Whether it has room for a frame with this to see, and has not seen it.
+    fn wants(&self, version: u64) -> bool {
+        self.gaze.is_some() && self.free && (self.moved || self.seen != Some(version))
+    }
+
+    /// How long it is to rest after its last frame.
+    fn rests(&self, now: Instant) -> Duration {
+        self.last.map_or(Duration::ZERO, |last| FRAME.saturating_sub(now - last))
     }
 }
 
@@ -309,24 +355,24 @@ mod tests {
     #[test]
     fn a_page_gets_a_frame_once_it_has_drawn_the_last_or_looks_elsewhere() {
         let desk = Desk::new(true, 0.0);
-        assert!(!desk.is_wanted() && desk.due(true).is_empty());
+        assert!(!desk.is_wanted() && desk.due(0).is_empty());
         let page = desk.open().unwrap();
-        assert!(desk.due(true).is_empty(), "it looks at nothing yet");
+        assert!(desk.due(0).is_empty(), "it looks at nothing yet");
         desk.hear(page, look(0.0));
         assert!(desk.is_wanted());
-        let [due] = desk.due(false)[..] else { panic!("one page looks") };
-        desk.give(&due, vec![1]);
-        assert!(desk.due(true).is_empty(), "the first is not drawn");
-        assert_eq!(desk.next(page, NOW), Ready::Frame(vec![1]));
+        let [due] = desk.due(0)[..] else { panic!("one page looks") };
+        desk.give(&due, vec![vec![1]]);
+        assert!(desk.due(1).is_empty(), "the first is not drawn");
+        assert_eq!(desk.next(page, NOW), Ready::Frame(vec![vec![1]]));
         rest();
-        assert!(desk.due(true).is_empty(), "nor is it now");
+        assert!(desk.due(1).is_empty() && desk.rests(1).is_none(), "nor is it now");
         desk.hear(page, Wish::Ack { frame: due.number });
-        assert!(desk.due(false).is_empty(), "nothing has changed");
+        assert!(desk.due(0).is_empty(), "nothing has changed");
+        assert_eq!((desk.due(1).len(), desk.rests(1)), (1, Some(NOW)));
         desk.hear(page, look(1.0));
-        assert_eq!(desk.due(false).len(), 1);
-        assert_eq!(desk.due(true).len(), 1);
+        assert_eq!(desk.due(0).len(), 1);
         desk.close(page);
-        assert!(desk.due(true).is_empty() && !desk.is_wanted());
+        assert!(desk.due(1).is_empty() && !desk.is_wanted());
         assert_eq!(desk.next(page, NOW), Ready::Closed);
     }
 
@@ -340,7 +386,7 @@ mod tests {
         assert_eq!(desk.take_pace(), Pace { playing: false, times: 0.5, by: 2, seek: None });
         desk.close(one);
         assert_eq!(desk.take_pace(), Pace { playing: false, times: 0.5, by: 0, seek: None });
-        assert_eq!(desk.picked(), Some(Pick::At(0, [1.0, 2.0])));
+        assert_eq!(desk.picked(), Some(Pick::At(0, [1.0, 2.0], 0.0)));
         desk.close(other);
         assert_eq!(desk.take_pace(), Pace { playing: true, times: 0.0, by: 0, seek: None });
         assert_eq!(desk.picked(), None);
@@ -351,9 +397,9 @@ mod tests {
         let desk = Desk::new(true, 0.0);
         let pages: Vec<_> = std::iter::from_fn(|| desk.open()).collect();
         assert_eq!(pages.len(), MOST_PAGES);
-        (0..1000).for_each(|i| desk.tell(&Say::Note { text: i.to_string() }));
+        (0..1000).for_each(|i| desk.tell(&Say::Difference { step: Some(i) }));
         let Ready::Texts(texts) = desk.next(pages[0], NOW) else { panic!("much was said") };
-        assert_eq!((texts.len(), texts.last().unwrap().as_str()), (MOST_TEXTS, r#"{"type":"note","text":"999"}"#));
+        assert_eq!((texts.len(), texts.last().unwrap().as_str()), (MOST_TEXTS, r#"{"type":"difference","step":999}"#));
         desk.end();
         assert_eq!(desk.next(pages[0], NOW), Ready::Closed);
         assert!(matches!(desk.next(pages[1], NOW), Ready::Texts(_)), "what was said before is");

@@ -28,7 +28,7 @@ const MAGIC: u32 = u32::from_le_bytes(*b"ATOL");
 const MOST_PIXELS: u32 = 8192;
 
 /// What a page wants.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase", deny_unknown_fields)]
 pub(crate) enum Wish {
     /// To see this from now on.
@@ -94,7 +94,7 @@ impl Wish {
 }
 
 /// What a page looks at.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Gaze {
     /// The rectangle.
     pub view: View,
@@ -126,17 +126,10 @@ pub(crate) enum Say {
         /// It.
         body: Option<PickedBody>,
     },
-    /// Which rank holds each tile has changed.
-    Ranks {
-        /// Of which of the worlds.
-        source: u32,
-        /// For each tile its rank.
-        rank_of_tile: Vec<u32>,
-    },
-    /// A sentence.
-    Note {
-        /// It.
-        text: String,
+    /// The first record in which two worlds differ, or that there is none.
+    Difference {
+        /// Its step.
+        step: Option<u64>,
     },
 }
 
@@ -151,12 +144,12 @@ pub(crate) struct Hello {
     pub steps: Vec<u64>,
     /// The last step of the run.
     pub last_step: u64,
-    /// The first record in which two worlds differ.
-    pub first_difference: Option<u64>,
     /// What colors can tell.
     pub colors: Vec<ColorBy>,
-    /// Colors of ranks, 0 to 1, which repeat.
-    pub rank_colors: Vec<[f32; 3]>,
+    /// Colors of ranks, which repeat.
+    pub rank_colors: Vec<[u8; 3]>,
+    /// The color of what never moves.
+    pub static_color: [u8; 3],
 }
 
 /// A world.
@@ -170,8 +163,10 @@ pub(crate) struct Source {
     pub tiles: [u32; 2],
     /// For each tile its rank.
     pub rank_of_tile: Vec<u32>,
-    /// Half width, half height and radius of each kind, then of each static's, in m.
+    /// Half width, half height and radius of each kind, in m.
     pub shapes: Vec<[f32; 3]>,
+    /// What never moves: x, y in m, cosine and sine of how it is turned, half width, half height and radius in m.
+    pub statics: Vec<[f64; 7]>,
 }
 
 /// What there is to know about a body.
@@ -197,8 +192,8 @@ pub(crate) struct Dot {
     pub shape: u16,
     /// Red, green, blue.
     pub color: [u8; 3],
-    /// Bit 0: a static.
-    pub flags: u8,
+    /// The same row, divided by 65,536.
+    pub shape_high: u8,
 }
 
 /// A frame before it becomes bytes.
@@ -222,15 +217,15 @@ pub(crate) struct Picture<'a> {
     pub legend: &'a str,
     /// Of the density image, four bytes each.
     pub pixels: &'a [u8],
-    /// The bodies, perhaps in several parts.
-    pub dots: &'a [&'a [Dot]],
+    /// The bodies, [`Dot`]s as bytes, perhaps in several parts.
+    pub dots: &'a [&'a [u8]],
 }
 
 impl Picture<'_> {
     /// As the page reads it.
     pub(crate) fn encode(&self) -> Vec<u8> {
         let padding = self.legend.len().next_multiple_of(4) - self.legend.len();
-        let bodies: usize = self.dots.iter().map(|part| part.len()).sum();
+        let bodies = self.dots.iter().map(|part| part.len()).sum::<usize>() / size_of::<Dot>();
         let mut bytes = Vec::with_capacity(120 + self.legend.len() + padding + self.pixels.len() + 12 * bodies);
         let words = |bytes: &mut Vec<u8>, words: &[u32]| words.iter().for_each(|word| bytes.extend(word.to_le_bytes()));
         let doubles = |bytes: &mut Vec<u8>, of: &[f64]| of.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
@@ -245,7 +240,7 @@ impl Picture<'_> {
         bytes.extend_from_slice(self.legend.as_bytes());
         bytes.extend(std::iter::repeat_n(b' ', padding));
         bytes.extend_from_slice(self.pixels);
-        self.dots.iter().for_each(|part| bytes.extend_from_slice(bytemuck::cast_slice(part)));
+        self.dots.iter().for_each(|part| bytes.extend_from_slice(part));
         bytes
     }
 }
@@ -282,7 +277,7 @@ mod tests {
     #[test]
     fn a_frame_lies_as_the_page_reads_it() {
         let view = |x: f64| View { low: DVec2::splat(x), high: DVec2::splat(x + 1.0) };
-        let dot = Dot { place: [0x0201, 0x0403], angle: 0x0605, shape: 0x0807, color: [9, 10, 11], flags: 12 };
+        let dot = Dot { place: [0x0201, 0x0403], angle: 0x0605, shape: 0x0807, color: [9, 10, 11], shape_high: 12 };
         let frame = Picture {
             source: 1,
             number: 7,
@@ -293,7 +288,7 @@ mod tests {
             picked: None,
             legend: "{}\n",
             pixels: &[1, 2, 3, 4, 5, 6, 7, 8],
-            dots: &[&[dot], &[], &[dot]],
+            dots: &[bytemuck::bytes_of(&dot), &[], bytemuck::bytes_of(&dot)],
         };
         let bytes = frame.encode();
         assert_eq!(bytes.len(), 120 + 4 + 8 + 24);

@@ -254,7 +254,8 @@ fn answer(stream: &mut TcpStream, status: &str, kind: &str, content: &str) -> io
 /// A socket: one thread reads what the page wants, this one writes what is ready.
 fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io::Result<()> {
     let accept = derive_accept_key(key.as_bytes());
-    let head = "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: ";
+    let head =
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: ";
     stream.write_all(format!("{head}{accept}\r\n\r\n").as_bytes())?;
     stream.set_read_timeout(None)?;
     let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
@@ -271,7 +272,7 @@ fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io
     while !gone.load(Ordering::Relaxed) {
         let sent = match door.desk.next(page, POLL) {
             Ready::Texts(texts) => texts.into_iter().try_for_each(|text| output.send(Message::text(text))),
-            Ready::Frame(frame) => output.send(Message::binary(frame)),
+            Ready::Frame(frames) => frames.into_iter().try_for_each(|frame| output.send(Message::binary(frame))),
             Ready::Nothing => Ok(()),
             Ready::Closed => break,
         };

@@ -9,7 +9,7 @@ use atoll_core::{Rot, Shape, StaticBody};
 use glam::DVec2;
 
 /// What is wider than this, in pixels, is drawn as what it is.
-const DRAWN: f64 = 2.0;
+pub(crate) const DRAWN: f64 = 2.0;
 /// From this width on, in pixels, outlines and marks begin to show, and from twice as much they show fully.
 const DETAILED: f64 = 5.0;
 /// A static is never drawn thinner, in pixels.

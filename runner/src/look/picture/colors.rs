@@ -7,7 +7,7 @@ pub(super) const PAPER: Rgb = Rgb::hex(0xFFFFFF);
 /// Beside what is looked at.
 pub(super) const MARGIN: Rgb = Rgb::hex(0xEEF0F3);
 /// What never moves.
-pub(super) const STATIC: Rgb = Rgb::hex(0x59636E);
+pub(crate) const STATIC: Rgb = Rgb::hex(0x59636E);
 /// Letters and lines.
 pub(super) const INK: Rgb = Rgb::hex(0x1F2933);
 /// Letters that matter less.
@@ -52,7 +52,7 @@ pub(super) fn tile(column: usize, row: usize) -> Rgb {
 
 /// A scale of colors, from its first to its last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Scale {
+pub(crate) enum Scale {
     /// From nothing to much: the map plasma of matplotlib, without its brightest part, which paper outshines.
     Amount,
     /// From one way through nothing to the other way.
@@ -61,7 +61,7 @@ pub(super) enum Scale {
 
 impl Scale {
     /// The color so far along the scale, from 0 to 1.
-    pub(super) fn at(self, part: f32) -> Rgb {
+    pub(crate) fn at(self, part: f32) -> Rgb {
         let stops: &[u32] = match self {
             Self::Amount => &[0x2A0F91, 0x4C02A1, 0x7E03A8, 0xAA2395, 0xCC4778, 0xE66C5C, 0xF89540, 0xFDB830],
             Self::Ways => &[0x0B3C8C, 0x2F7BC0, 0x86AFCB, 0xABB0B5, 0xD9A08A, 0xCF4F3E, 0x8E1024],

@@ -9,7 +9,7 @@ use atoll_core::Shape;
 
 /// The meaning of one color or sign.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Sign {
+pub(crate) enum Sign {
     /// A square.
     Square(Rgb),
     /// A disc.
@@ -20,7 +20,7 @@ pub(super) enum Sign {
 
 /// What is written beside a picture about its colors.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Legend {
+pub(crate) struct Legend {
     /// What the colors tell.
     pub title: String,
     /// A scale, and what its beginning, middle and end stand for.
@@ -31,7 +31,7 @@ pub(super) struct Legend {
 
 impl Legend {
     /// Of a way to color, and what else is drawn; `most` is what has the last color of a scale.
-    pub(super) fn new(by: ColorBy, layers: &Layers, setting: &Setting, ranks: u32, most: f32) -> Self {
+    pub(crate) fn new(by: ColorBy, layers: &Layers, setting: &Setting, ranks: u32, most: f32) -> Self {
         let square = |color, text: &str| (Sign::Square(color), text.to_owned());
         let (title, scale, mut rows) = match by {
             ColorBy::Kind => ("kind", None, (0..).zip(&setting.kinds).map(|(i, kind)| shape(i, &kind.shape)).collect()),
@@ -73,7 +73,7 @@ impl Legend {
     }
 
     /// With no more rows than so many; if there are more, the last says how many are not there.
-    pub(super) fn shortened(mut self, most: usize) -> Self {
+    pub(crate) fn shortened(mut self, most: usize) -> Self {
         if self.rows.len() > most {
             let kept = most.saturating_sub(1);
             let text = format!("and {} more", self.rows.len() - kept);
@@ -112,7 +112,7 @@ pub(super) fn length(meters: f64) -> String {
 }
 
 /// A whole number, its digits in groups of three.
-pub(super) fn grouped(number: usize) -> String {
+pub(crate) fn grouped(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {

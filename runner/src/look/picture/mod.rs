@@ -13,16 +13,18 @@ mod tests;
 mod tiles;
 mod view;
 
-pub(crate) use canvas::Image;
-pub(crate) use paint::ColorBy;
+pub(crate) use bodies::DRAWN;
+pub(crate) use canvas::{Field, Image, Rgb, Tone};
+pub(crate) use colors::STATIC;
+pub(crate) use legend::{Legend, Sign, grouped};
+pub(crate) use paint::{ColorBy, Range, Tint};
 pub(crate) use view::{View, whole_view};
 
 use crate::look::frame::{Frame, Setting};
 use bodies::Bodies;
-use canvas::{Canvas, Field, Letters, Tone};
+use canvas::{Canvas, Letters};
 use labels::Labels;
-use legend::Legend;
-use paint::{Paint, Range};
+use paint::Paint;
 use std::mem::take;
 use tiles::Edges;
 use view::Fit;
@@ -72,7 +74,7 @@ impl Painter {
             canvas: Canvas::new(look.size),
             field: Field::default(),
             letters: Letters::new(),
-            range: Range { most: 1e-3 },
+            range: Range::default(),
             ranks: Vec::new(),
             order: Vec::new(),
         }

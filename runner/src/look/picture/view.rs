@@ -3,6 +3,7 @@
 use crate::look::frame::Setting;
 use atoll_core::{Shape, StaticBody};
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 /// What stands around the domain is shown for so much of the longer side of the domain, and no more.
 const AROUND: f64 = 0.03;
@@ -10,12 +11,25 @@ const AROUND: f64 = 0.03;
 const FREE: f64 = 0.01;
 
 /// A rectangle of the world, in meters.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(from = "[f64; 4]", into = "[f64; 4]")]
 pub(crate) struct View {
     /// Its low corner.
     pub low: DVec2,
     /// Its high corner.
     pub high: DVec2,
+}
+
+impl From<[f64; 4]> for View {
+    fn from([x0, y0, x1, y1]: [f64; 4]) -> Self {
+        Self { low: DVec2::new(x0, y0), high: DVec2::new(x1, y1) }
+    }
+}
+
+impl From<View> for [f64; 4] {
+    fn from(View { low, high }: View) -> Self {
+        [low.x, low.y, high.x, high.y]
+    }
 }
 
 /// The domain, and of what stands around it so much that one sees what it is.

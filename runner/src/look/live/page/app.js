@@ -22,6 +22,7 @@ const state = {
   camera: { x: 0, y: 0, zoom: 1 },
   playing: true,
   body: null,
+  difference: null,
   following: false,
   step: 0,
   due: false,
@@ -38,7 +39,7 @@ socket.onclose = () => say(state.hello ? "The run is over; this is what was seen
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, figures, body, note, ranks: new_ranks })[type]?.(message);
+    ({ hello, figures, body, difference })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -61,28 +62,47 @@ function hello(message) {
   const times = [0.1, 0.25, 0.5, 1, 2, 4, 8].map((times) => [times, `${times} ×`]);
   options(at("speed"), message.recorded ? times : [[0, "unbounded"], ...times]);
   at("speed").value = message.recorded ? 1 : 0;
-  for (const id of ["scrub", "back"]) at(id).hidden = !message.recorded;
+  for (const id of ["track", "back"]) at(id).hidden = !message.recorded;
   if (message.recorded) {
     Object.assign(at("scrub"), { min: 0, max: message.steps.length - 1, value: 0 });
   }
-  at("difference").hidden = message.first_difference === null;
+  state.difference = null;
+  at("difference").hidden = message.sources.length < 2;
+  at("difference").disabled = true;
+  at("difference").textContent = "Comparing…";
+  at("apart").hidden = true;
+  state.asked = "";
   fit();
 }
 
 function start_drawing() {
   state.drawing = new Drawing(canvas);
   state.sources = state.hello.sources.map((source) => {
-    const made = state.drawing.source(source.shapes);
+    const made = state.drawing.source(source.shapes, source.statics, state.hello.static_color);
     state.drawing.grid(made, source.tiles, source.rank_of_tile, state.hello.rank_colors);
     return made;
   });
 }
 
-/// Tiles have changed hands.
-function new_ranks({ source, rank_of_tile }) {
-  const { tiles } = state.hello.sources[source];
-  state.hello.sources[source].rank_of_tile = rank_of_tile;
-  state.drawing.grid(state.sources[source], tiles, rank_of_tile, state.hello.rank_colors);
+/// Two worlds differ from a record on, or nowhere.
+function difference({ step }) {
+  state.difference = step;
+  at("difference").hidden = false;
+  at("difference").disabled = step === null;
+  at("difference").textContent = step === null ? "No difference" : "First difference";
+  mark_difference();
+  if (state.time !== undefined) clock();
+}
+
+/// Where on the bar two worlds part.
+function mark_difference() {
+  const { steps } = state.hello, { difference } = state;
+  at("apart").hidden = difference === null;
+  if (difference !== null) {
+    const part = steps.indexOf(difference) / Math.max(1, steps.length - 1);
+    // A slider's knob is 16 px wide, and its middle is where the value is.
+    at("apart").style.left = `calc(${part} * (100% - 16px) + 7px)`;
+  }
 }
 
 function show(frame) {
@@ -93,21 +113,23 @@ function show(frame) {
   if (state.following && frame.followed && frame.source === state.body?.source) {
     [state.camera.x, state.camera.y] = frame.followed;
   }
-  state.marked = frame.followed;
+  if (frame.source === (state.body?.source ?? 0)) state.marked = frame.followed;
   legend(frame.legend);
   say("");
   clock();
   redraw();
   // The next may come once this one is drawn.
-  requestAnimationFrame(() => tell({ do: "ack", frame: frame.number }));
-  state.frames = (state.frames ?? 0) + 1;
+  if (frame.source === state.sources.length - 1) {
+    requestAnimationFrame(() => tell({ do: "ack", frame: frame.number }));
+    state.frames = (state.frames ?? 0) + 1;
+  }
 }
 
 function clock() {
-  const { recorded, steps, last_step, first_difference } = state.hello;
+  const { recorded, steps, last_step } = state.hello;
   const last = recorded ? steps[steps.length - 1] : last_step;
   at("clock").textContent = `${state.time.toFixed(2)} s · step ${count(state.step)} of ${count(last)}`;
-  at("clock").classList.toggle("difference", first_difference !== null && state.step >= first_difference);
+  at("clock").classList.toggle("difference", state.difference !== null && state.step >= state.difference);
   if (recorded && document.activeElement !== at("scrub")) {
     at("scrub").value = Math.max(0, steps.findLastIndex((step) => step <= state.step));
   }
@@ -155,7 +177,7 @@ function note({ text }) {
   say(text);
 }
 
-function legend({ title, steps, range }) {
+function legend({ title, scale, rows }) {
   const parts = [];
   const add = (name, text) => {
     const made = document.createElement(name);
@@ -163,19 +185,24 @@ function legend({ title, steps, range }) {
     parts.push(made);
     return made;
   };
-  add("span", title);
-  if (range) {
-    add("span", range.low);
-    add("b").style.background = `linear-gradient(to right, ${range.colors.map(css).join(", ")})`;
-    add("span", range.high);
+  add("strong", title);
+  if (scale) {
+    const [low, , high] = scale.marks;
+    const bar = add("span");
+    const colors = document.createElement("b");
+    colors.style.background = `linear-gradient(to right, ${scale.colors.map(css).join(", ")})`;
+    bar.append(low, colors, high);
   }
-  for (const [name, color] of steps ?? []) {
+  for (const [name, color, is_round] of rows) {
     const entry = add("span");
     const swatch = document.createElement("i");
     swatch.style.background = css(color);
+    if (is_round) swatch.style.borderRadius = "50%";
     entry.append(swatch, name);
   }
-  at("legend").replaceChildren(...parts);
+  const text = JSON.stringify([title, scale, rows]);
+  if (text !== state.legend) at("legend").replaceChildren(...parts);
+  state.legend = text;
 }
 
 // --- drawing --------------------------------------------------------------------------------------------------------------
@@ -299,6 +326,12 @@ function step(by) {
   tell({ do: "step", by });
 }
 
+function to_difference() {
+  if (state.difference === null) return;
+  if (state.playing) play();
+  tell({ do: "seek", step: state.difference });
+}
+
 function follow(on) {
   state.following = on;
   at("follow").setAttribute("aria-pressed", on);
@@ -347,7 +380,7 @@ at("color").onchange = redraw;
 at("speed").onchange = ({ target }) => tell({ do: "speed", times: Number(target.value) });
 at("scrub").oninput = ({ target }) => tell({ do: "seek", step: state.hello.steps[Number(target.value)] });
 at("scrub").onchange = ({ target }) => target.blur();
-at("difference").onclick = () => tell({ do: "seek", step: state.hello.first_difference });
+at("difference").onclick = to_difference;
 
 addEventListener("keydown", (event) => {
   if (!state.hello || event.ctrlKey || event.metaKey || event.altKey || ["SELECT", "INPUT"].includes(event.target.tagName)) return;
@@ -365,7 +398,7 @@ addEventListener("keydown", (event) => {
     ArrowLeft: () => (event.shiftKey ? move(-1, 0) : step(-1)),
     ArrowUp: () => event.shiftKey && move(0, 1),
     ArrowDown: () => event.shiftKey && move(0, -1),
-    n: () => state.hello.first_difference !== null && tell({ do: "seek", step: state.hello.first_difference }),
+    n: to_difference,
     Escape: () => tell({ do: "drop" }),
   }[event.key] ?? (state.hello.colors.includes(color) ? () => { at("color").value = color; redraw(); } : null);
   if (act) {
@@ -401,14 +434,17 @@ function short(number) {
 }
 
 function css([r, g, b]) {
-  return `rgb(${[r, g, b].map((part) => Math.round(255 * part)).join(" ")})`;
+  return `rgb(${r} ${g} ${b})`;
 }
 
-/// For tests: draws, and counts the pixels that are not paper.
+/// For tests: draws, and counts the pixels that are not paper, in the middle or in all of it.
 window.atoll = {
   state,
-  pixels() {
+  pixels(part = 1) {
     draw();
-    return boxes().map((box) => state.drawing.count(box, paper()));
+    return boxes().map(([x, y, width, height]) => {
+      const [w, h] = [Math.round(width * part), Math.round(height * part)];
+      return state.drawing.count([x + ((width - w) >> 1), y + ((height - h) >> 1), w, h], paper());
+    });
   },
 };

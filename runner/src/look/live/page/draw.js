@@ -20,14 +20,43 @@ void main() {
   uvec3 word = texelFetch(bodies, ivec2(body % ${ROW}, body / ${ROW}), 0).xyz;
   vec2 position = vec2(word.x & 0xffffu, word.x >> 16) / 65535.0;
   float angle = float(word.y & 0xffffu) / 65536.0 * 6.283185307179586;
-  int kind = int(word.y >> 16);
+  int kind = int(word.y >> 16) | int(word.z >> 24) << 16;
   outline = texelFetch(shapes, ivec2(kind % ${ROW}, kind / ${ROW}), 0).xyz * zoom;
   color = vec4(float(word.z & 0xffu), float((word.z >> 8) & 0xffu), float((word.z >> 16) & 0xffu), 255.0) / 255.0;
-  if ((word.z >> 24 & 2u) != 0u) color.a = 0.35;
   at = CORNERS[gl_VertexID % 6] * (outline.xy + outline.z + 1.0);
   float c = cos(angle), s = sin(angle);
   vec2 turned = vec2(c * at.x - s * at.y, s * at.x + c * at.y);
   gl_Position = vec4(position * place.xy + place.zw + turned / pixels, 0.0, 1.0);
+}`;
+
+const STATIC_VERTEX = `#version 300 es
+precision highp float;
+layout(location = 0) in vec4 middle;   // x, y from the middle of the view, in pixels; cosine, sine
+layout(location = 1) in vec3 shape;    // half width, half height, radius: in pixels
+uniform vec2 pixels;
+uniform vec3 ink;
+flat out vec3 outline;
+flat out vec4 color;
+out vec2 at;
+const vec2 CORNERS[6] = vec2[](vec2(-1,-1), vec2(1,-1), vec2(1,1), vec2(-1,-1), vec2(1,1), vec2(-1,1));
+void main() {
+  outline = shape;
+  color = vec4(ink, 1.0);
+  at = CORNERS[gl_VertexID] * (shape.xy + shape.z + 1.0);
+  vec2 turned = vec2(middle.z * at.x - middle.w * at.y, middle.w * at.x + middle.z * at.y);
+  gl_Position = vec4((middle.xy + turned) / pixels, 0.0, 1.0);
+}`;
+
+const STATIC_FRAGMENT = `#version 300 es
+precision highp float;
+flat in vec3 outline;
+flat in vec4 color;
+in vec2 at;
+out vec4 pixel;
+void main() {
+  vec2 beyond = abs(at) - outline.xy;
+  float distance = length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - outline.z;
+  pixel = color * clamp(0.5 - distance, 0.0, 1.0);
 }`;
 
 const BODY_FRAGMENT = `#version 300 es
@@ -126,6 +155,7 @@ export class Drawing {
     if (!this.gl) throw new Error("this browser has no WebGL2");
     const gl = this.gl;
     this.body = program(gl, BODY_VERTEX, BODY_FRAGMENT);
+    this.fixed = program(gl, STATIC_VERTEX, STATIC_FRAGMENT);
     this.image = program(gl, IMAGE_VERTEX, IMAGE_FRAGMENT);
     this.line = program(gl, LINE_VERTEX, LINE_FRAGMENT);
     this.nothing = gl.createVertexArray();
@@ -136,16 +166,26 @@ export class Drawing {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   }
 
-  /// What is needed for one source: `shapes` are half widths, half heights and radii, in m.
-  source(shapes) {
+  /// What is needed for one source: `shapes` are half widths, half heights and radii, in m; `statics` are x, y, cosine, sine, and
+  /// these.
+  source(shapes, statics, static_color) {
     const { gl } = this;
     const rows = Math.max(1, Math.ceil(shapes.length / ROW));
     const table = new Float32Array(4 * ROW * rows);
     shapes.forEach((shape, i) => table.set(shape, 4 * i));
     const made = {
       shapes: texture(gl, gl.NEAREST), bodies: texture(gl, gl.NEAREST), density: texture(gl, gl.LINEAR),
-      rows: 0, count: 0, rectangle: null, density_rectangle: null, lines: null,
+      rows: 0, count: 0, rectangle: null, density_rectangle: null, lines: null, statics, static_color,
+      fixed: { array: gl.createVertexArray(), buffer: gl.createBuffer(), values: new Float32Array(7 * statics.length) },
     };
+    gl.bindVertexArray(made.fixed.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, made.fixed.buffer);
+    for (const [location, size, offset] of [[0, 4, 0], [1, 3, 16]]) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 28, offset);
+      gl.vertexAttribDivisor(location, 1);
+    }
+    gl.bindVertexArray(null);
     gl.bindTexture(gl.TEXTURE_2D, made.shapes);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, table);
     return made;
@@ -180,12 +220,13 @@ export class Drawing {
   grid(source, [columns, rows], ranks, colors) {
     const { gl } = this;
     const lines = [];
-    const add = (x0, y0, x1, y1, [r, g, b], thickness) => lines.push(x0, y0, x1, y1, r, g, b, thickness);
-    const gray = [0.5, 0.53, 0.58];
+    const add = (x0, y0, x1, y1, [r, g, b], thickness) => lines.push(x0, y0, x1, y1, r / 255, g / 255, b / 255, thickness);
+    const gray = [128, 135, 148];
     for (let i = 0; i <= columns; i++) add(i, 0, i, rows, gray, 1);
     for (let i = 0; i <= rows; i++) add(0, i, columns, i, gray, 1);
     const rank = (x, y) => (x < 0 || y < 0 || x >= columns || y >= rows ? -1 : ranks[y * columns + x] ?? -1);
-    for (let y = 0; y <= rows && ranks; y++) {
+    const several = ranks.some((of) => of !== ranks[0]);
+    for (let y = 0; y <= rows && several; y++) {
       for (let x = 0; x <= columns; x++) {
         const here = rank(x, y), left = rank(x - 1, y), below = rank(x, y - 1);
         const color = (a, b) => colors[Math.max(a, b) % colors.length];
@@ -232,6 +273,7 @@ export class Drawing {
       if (at.pixels) gl.uniform2f(at.pixels, ...half);
       return at;
     };
+    this.draw_statics(source, camera, half);
     gl.bindVertexArray(this.nothing);
     if (source.density_rectangle) {
       use(this.image, source.density_rectangle);
@@ -257,6 +299,29 @@ export class Drawing {
       gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, source.lines.count);
       gl.bindVertexArray(null);
     }
+  }
+
+  /// What never moves, never thinner than a pixel.
+  draw_statics({ statics, static_color, fixed }, camera, half) {
+    const { gl } = this;
+    let count = 0;
+    const { zoom } = camera;
+    for (const [x, y, c, s, half_x, half_y, radius] of statics) {
+      const [px, py] = [(x - camera.x) * zoom, (y - camera.y) * zoom];
+      const reach = (Math.hypot(half_x, half_y) + radius) * zoom + 2;
+      if (Math.abs(px) > half[0] + reach || Math.abs(py) > half[1] + reach) continue;
+      const shape = radius ? [0, 0, Math.max(1, radius * zoom)] : [Math.max(0.5, half_x * zoom), Math.max(0.5, half_y * zoom), 0];
+      fixed.values.set([px, py, c, s, ...shape], 7 * count++);
+    }
+    if (!count) return;
+    const { linked, at } = this.fixed;
+    gl.useProgram(linked);
+    gl.uniform2f(at.pixels, ...half);
+    gl.uniform3f(at.ink, ...static_color.map((part) => part / 255));
+    gl.bindVertexArray(fixed.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, fixed.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, fixed.values.subarray(0, 7 * count), gl.STREAM_DRAW);
+    gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, count);
   }
 
   /// How many pixels of a box are not of a color.

@@ -20,7 +20,10 @@ impl Field {
     pub(crate) fn reset(&mut self, size: [u32; 2]) {
         let size = size.map(|length| length as usize);
         if self.size != size {
-            *self = Self { size, cells: vec![[0; 4]; size[0] * size[1]], rows: size[1]..0 };
+            let mut cells = std::mem::take(&mut self.cells);
+            cells.clear();
+            cells.resize(size[0] * size[1], [0; 4]);
+            *self = Self { size, cells, rows: size[1]..0 };
         } else if self.rows.start < self.rows.end {
             self.cells[self.rows.start * size[0]..self.rows.end * size[0]].fill([0; 4]);
             self.rows = size[1]..0;
@@ -50,8 +53,45 @@ impl Field {
         }
     }
 
+    /// As [`splat`](Self::splat), quicker where a body covers a pixel at most; the color is asked for only where it is seen. Where
+    /// a pixel is covered more than two hundred times over, its color is any.
+    #[inline]
+    pub(crate) fn dab(&mut self, [x, y]: [f64; 2], area: f64, color: impl FnOnce() -> Rgb) {
+        let (left, top) = (x - 0.5, y - 0.5);
+        let inside = left >= 0.0 && top >= 0.0 && left + 2.0 <= self.size[0] as f64 && top + 2.0 <= self.size[1] as f64;
+        if !inside || area > 1.0 {
+            let reach = 0.5 * area.sqrt().max(1.0);
+            let (columns, rows) = (self.size[0] as f64, self.size[1] as f64);
+            if x + reach > 0.0 && y + reach > 0.0 && x - reach < columns && y - reach < rows {
+                self.splat([x, y], area, color());
+            }
+            return;
+        }
+        let (column, row) = (left as usize, top as usize);
+        let [r, g, b] = color().0.map(u32::from);
+        let (right, low) = ((left - column as f64) as f32, (top - row as f64) as f32);
+        let whole = (PARTS * area) as f32;
+        self.rows = self.rows.start.min(row)..self.rows.end.max(row + 2);
+        for (at, high) in [(row, 1.0 - low), (row + 1, low)] {
+            let from = at * self.size[0] + column;
+            let cells = &mut self.cells[from..from + 2];
+            for (cell, wide) in cells.iter_mut().zip([1.0 - right, right]) {
+                // Rounded up: nothing is too small to be there.
+                let parts = (wide * high * whole + 0.999) as u32;
+                for (sum, value) in cell.iter_mut().zip([r, g, b, 1]) {
+                    *sum = sum.wrapping_add(value * parts);
+                }
+            }
+        }
+    }
+
+    /// Whether nothing was added.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
     /// Adds a form, as far as it is in what a canvas draws on.
-    pub(crate) fn cover(&mut self, canvas: &Canvas, form: &Form, color: Rgb) {
+    pub(in crate::look::picture) fn cover(&mut self, canvas: &Canvas, form: &Form, color: Rgb) {
         let [low, high] = form.bounds();
         let rows = canvas.span(1, low[1], high[1]);
         self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
@@ -75,8 +115,24 @@ impl Field {
         self.cells.iter().map(|cell| (f64::from(cell[3]) / PARTS) as f32).fold(0.0, f32::max)
     }
 
+    /// What there is as bytes, four for each pixel, rows from the top: red, green and blue, multiplied by how strongly they are drawn,
+    /// and that.
+    pub(crate) fn toned(&self, tone: &Tone) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.cells.len() * 4);
+        for &[r, g, b, area] in &self.cells {
+            let mut pixel = [0; 4];
+            if area > 0 {
+                let strength = tone.of(area as f32 / PARTS as f32);
+                let part = strength / area as f32;
+                pixel = [r as f32 * part, g as f32 * part, b as f32 * part, 255.0 * strength].map(|x| (x + 0.5) as u8);
+            }
+            bytes.extend_from_slice(&pixel);
+        }
+        bytes
+    }
+
     /// Draws what there is, each pixel in the mean of its colors.
-    pub(crate) fn draw(&self, canvas: &mut Canvas, tone: &Tone) {
+    pub(in crate::look::picture) fn draw(&self, canvas: &mut Canvas, tone: &Tone) {
         for row in canvas.span(1, self.rows.start as f64, self.rows.end as f64) {
             for column in canvas.span(0, 0.0, self.size[0] as f64) {
                 let [r, g, b, area] = self.cells[row * self.size[0] + column];

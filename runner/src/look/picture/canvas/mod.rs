@@ -5,10 +5,9 @@ mod form;
 mod image;
 mod letters;
 
-pub(super) use density::{Field, Tone};
+pub(crate) use density::{Field, Tone};
 pub(super) use form::Form;
-pub(crate) use image::Image;
-pub(super) use image::Rgb;
+pub(crate) use image::{Image, Rgb};
 pub(super) use letters::Letters;
 
 /// An image that is drawn on, within a rectangle of it.

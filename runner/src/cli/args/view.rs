@@ -1,0 +1,49 @@
+//! Options of `atoll view`, and of every verb that lets pages look.
+
+use super::run::RunArgs;
+use super::values::ValueArgs;
+use clap::Args;
+use std::net::IpAddr;
+use std::path::PathBuf;
+
+/// Options of `atoll view`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct ViewArgs {
+    /// A configuration, which is run to be looked at; or the folder of a run that was recorded, or of two to see side by side.
+    #[arg(required = true, num_args = 1..=2, value_name = "SOURCE")]
+    pub sources: Vec<PathBuf>,
+    /// What wins over the values of a configuration.
+    #[command(flatten)]
+    pub values: ValueArgs,
+    /// Columns and rows of tiles, such as 17x17, or auto; of a configuration.
+    #[arg(long, value_name = "CxR")]
+    pub tiles: Option<String>,
+    /// Serve the page at this port [default: any that is free].
+    #[arg(long, value_name = "P")]
+    pub port: Option<u16>,
+    /// Serve it at this address of this machine, so that others can look who know what is printed [default: 127.0.0.1].
+    #[arg(long, value_name = "ADDRESS")]
+    pub bind: Option<IpAddr>,
+    /// Open the page in a browser.
+    #[arg(long)]
+    pub open: bool,
+}
+
+impl ViewArgs {
+    /// The same as options of a run that stays to be looked at.
+    pub(crate) fn into_run(self) -> RunArgs {
+        let Self { mut sources, values, tiles, port, bind, open } = self;
+        RunArgs {
+            config: sources.pop(),
+            values,
+            tiles,
+            view: true,
+            port,
+            bind,
+            open,
+            lingers: true,
+            ..RunArgs::default()
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! Shows a run while it goes on: lets its ranks meet when a frame is due, asks them for their parts, and gives pages what comes
+//! of them.
+
+use super::desk::{Desk, Due, Pick};
+use super::figures::Course;
+use super::protocol::{Picture, Say};
+use super::question::{Found, Question, answer, portion};
+use super::sketch::{Paper, compose, rectangle};
+use super::{figures, scenery};
+use crate::folder::recording::RunFacts;
+use crate::look::frame::Setting;
+use crate::look::picture::{ColorBy, Range, View};
+use crate::plan::Plan;
+use crate::rank::{Held, Host, Next};
+use atoll_core::TileId;
+use bytemuck::Pod;
+use glam::DVec2;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// While time goes on, ranks draw for one part in so many of it, at most.
+const SHARE: u32 = 10;
+/// Between two times that ranks tell how it goes, at least.
+const TELL: Duration = Duration::from_millis(400);
+/// How it goes costs one part in so many, at most.
+const TELL_SHARE: u32 = 100;
+
+/// See the head of this file. There is one in every process of a run; only that of rank 0 has pages.
+#[derive(Debug)]
+pub(crate) struct Viewer {
+    setting: Setting,
+    ranks: u32,
+    last_step: u64,
+    lingers: bool,
+    desk: Option<Arc<Desk>>,
+    /// By rank.
+    papers: Vec<Mutex<Paper>>,
+    state: Mutex<State>,
+}
+
+/// What is known of a body that was looked for: which, after so many steps, the rank that has it, and what that tells.
+type Known = (Pick, u64, (u32, Found));
+
+/// What rank 0 keeps in mind.
+#[derive(Debug)]
+struct State {
+    /// What was asked last, and when.
+    asked: Option<(Asked, Instant)>,
+    /// Frames to be made.
+    due: VecDeque<Due>,
+    /// No frame is made before.
+    next_frame: Instant,
+    /// Whether there ever was one.
+    begun: bool,
+    /// Of speeds, and of spins.
+    ranges: [Range; 2],
+    /// What the ranges fit.
+    measured: Option<(ColorBy, u64)>,
+    /// The body that was looked for last, if it was found.
+    found: Option<Known>,
+    course: Course,
+    /// Nobody is asked how it goes before; and what it was like when somebody was.
+    next_course: Instant,
+    told: Option<(u64, bool)>,
+    /// When the next step is to be made, if not as soon as can be.
+    next_step: Instant,
+}
+
+#[derive(Debug)]
+enum Asked {
+    Measure(ColorBy, u64),
+    Look(Due),
+    Find(Pick, u64),
+    Figures(u64),
+}
+
+impl Viewer {
+    /// Of a plan. Its ranks meet also before the first step, and stay after the last, if it `lingers`.
+    pub(crate) fn new(plan: &Plan, desk: Option<Arc<Desk>>, lingers: bool, name: &str) -> Self {
+        let blueprint = plan.blueprint.clone();
+        let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
+        let hertz = facts.hertz().expect("every configuration has a frequency");
+        let (grid, kinds, statics) = (blueprint.grid, blueprint.kinds, blueprint.statics);
+        let rank_of = |tile| plan.assignment.rank_of(TileId(tile)) as u32;
+        let ranks_of_tiles = (0..grid.tiles() as u32).map(rank_of).collect();
+        let setting = Setting { grid, kinds, statics, hertz };
+        let last_step = plan.config.run.steps;
+        if let Some(desk) = &desk {
+            let source = scenery::source(name.to_owned(), &setting, ranks_of_tiles);
+            desk.greet(Say::Hello(scenery::hello(vec![source], false, Vec::new(), last_step)));
+        }
+        let now = Instant::now();
+        let state = State {
+            asked: None,
+            due: VecDeque::new(),
+            next_frame: now,
+            begun: false,
+            ranges: [Range::default(); 2],
+            measured: None,
+            found: None,
+            course: Course::default(),
+            next_course: now,
+            told: None,
+            next_step: now,
+        };
+        let ranks = plan.assignment.ranks();
+        let papers = (0..ranks).map(|_| Mutex::default()).collect();
+        Self { setting, ranks: ranks as u32, last_step, lingers, desk, papers, state: Mutex::new(state) }
+    }
+
+    fn give(&self, desk: &Desk, state: &mut State, due: &Due, answers: &[Vec<u8>]) {
+        let portions: Vec<_> = answers.iter().filter_map(|answer| portion(answer)).collect();
+        let (pixels, image) = compose(portions.iter().map(|(pixels, density, _)| (*pixels, *density)));
+        let dots: Vec<&[u8]> = portions.iter().map(|(_, _, dots)| *dots).collect();
+        let found = state.found.map(|(.., (_, found))| DVec2::from(found.place));
+        let picture = Picture {
+            source: 0,
+            number: due.number,
+            step: due.version,
+            time: due.version as f64 / self.setting.hertz,
+            rectangle: rectangle(&self.setting, &due.gaze),
+            density: due.gaze.part(pixels),
+            picked: found,
+            legend: &scenery::legend(due.gaze.color, &self.setting, self.ranks, state.range(due.gaze.color)),
+            pixels: &image,
+            dots: &dots,
+        };
+        desk.give(due, vec![picture.encode()]);
+        state.begun = true;
+    }
+
+    /// Tells pages of the body that was looked for.
+    fn tell_found(&self, desk: &Desk, pick: Pick, found: Option<(u32, Found)>) {
+        let body = found.map(|(rank, found)| scenery::picked(&found, 0, &self.setting, rank, true));
+        desk.found(pick, found.map(|(_, found)| Pick::Body(0, found.id)));
+        desk.tell(&Say::Body { body });
+    }
+}
+
+impl State {
+    fn range(&self, by: ColorBy) -> Range {
+        self.ranges[usize::from(by == ColorBy::Spin)]
+    }
+
+    /// What to ask next.
+    fn question(&mut self, desk: &Desk, steps: u64, is_still: bool) -> Option<Question> {
+        let now = Instant::now();
+        if self.due.is_empty() && (is_still || now >= self.next_frame) {
+            self.due.extend(desk.due(steps));
+        }
+        let (asked, question) = match (self.next_to_find(desk, steps), self.due.front()) {
+            (Some(pick), _) => {
+                let question = match pick {
+                    Pick::At(_, place, reach) => Question::Find(None, place, reach),
+                    Pick::Body(_, id) => Question::Find(Some(id), [0.0; 2], 0.0),
+                };
+                (Asked::Find(pick, steps), question)
+            }
+            (None, Some(due)) if due.gaze.color.is_measured() && self.measured != Some((due.gaze.color, steps)) => {
+                (Asked::Measure(due.gaze.color, steps), Question::Measure(due.gaze.color))
+            }
+            (None, Some(&due)) => {
+                self.due.pop_front();
+                let most = self.range(due.gaze.color).most;
+                (Asked::Look(Due { version: steps, ..due }), Question::Look { gaze: due.gaze, most })
+            }
+            (None, None) if self.is_to_tell(desk, steps) => (Asked::Figures(steps), Question::Figures),
+            (None, None) => return None,
+        };
+        self.asked = Some((asked, now));
+        Some(question)
+    }
+
+    /// The body to look for: one that somebody has just pointed at, or, when a frame is made, where one is now.
+    fn next_to_find(&mut self, desk: &Desk, steps: u64) -> Option<Pick> {
+        let picked = desk.picked();
+        let Some(pick) = picked else {
+            if self.found.take().is_some() {
+                desk.tell(&Say::Body { body: None });
+            }
+            return None;
+        };
+        let is_known = |(of, at, _): &Known| *of == pick && (*at == steps || self.due.is_empty());
+        (!self.found.as_ref().is_some_and(is_known)).then_some(pick)
+    }
+
+    /// Whether pages are to be told how it goes, and have not been told just that.
+    fn is_to_tell(&self, desk: &Desk, steps: u64) -> bool {
+        Instant::now() >= self.next_course && self.told != Some((steps, desk.pace().playing))
+    }
+}
+
+impl Host for Viewer {
+    fn calls(&self, steps: u64) -> bool {
+        let Some(desk) = self.desk.as_ref().filter(|desk| desk.is_wanted()) else { return false };
+        let (pace, state) = (desk.pace(), lock(&self.state));
+        !pace.playing
+            || pace.times > 0.0
+            || pace.by != 0
+            || state.is_to_tell(desk, steps)
+            || desk.picked() != state.found.map(|(pick, ..)| pick)
+            || Instant::now() >= state.next_frame && desk.rests(steps).is_some_and(|rest| rest.is_zero())
+    }
+
+    fn next(&self, steps: u64, patience: Duration) -> Next {
+        // Without pages nothing holds ranks up.
+        let Some(desk) = &self.desk else { return Next::GoOn };
+        let mut state = lock(&self.state);
+        let (wishes, pace) = (desk.wishes(), desk.pace());
+        let is_over = steps >= self.last_step;
+        let is_still = !pace.playing || is_over;
+        if let Some(question) = state.question(desk, steps, is_still) {
+            return Next::Ask(serde_json::to_vec(&question).expect("numbers and names"));
+        }
+        if is_over && !self.lingers {
+            return Next::GoOn;
+        }
+        let now = Instant::now();
+        let until = match (is_over, pace) {
+            (true, _) => None,
+            // The first page is to see it from the start.
+            _ if self.lingers && !state.begun => None,
+            (_, pace) if pace.by > 0 => {
+                desk.made_one();
+                return Next::GoOn;
+            }
+            (_, pace) if !pace.playing => None,
+            (_, pace) if pace.times == 0.0 => return Next::GoOn,
+            (_, pace) => {
+                let step = Duration::from_secs_f64((1.0 / (self.setting.hertz * pace.times)).min(1e6));
+                if now >= state.next_step {
+                    // What is late by a little is caught up with.
+                    state.next_step = state.next_step.max(now - 2 * step.min(TELL)) + step;
+                    return Next::GoOn;
+                }
+                state.next_step = state.next_step.min(now + step);
+                Some(state.next_step - now)
+            }
+        };
+        let course =
+            (state.told != Some((steps, pace.playing))).then(|| state.next_course.saturating_duration_since(now));
+        drop(state);
+        let waits = [until, desk.rests(steps), course].into_iter().flatten();
+        desk.wait(wishes, waits.fold(patience, Duration::min).max(Duration::from_micros(200)));
+        Next::Wait
+    }
+
+    fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8> {
+        match (serde_json::from_slice(question), self.papers.get(held.rank.index())) {
+            (Ok(question), Some(paper)) => answer(&question, &self.setting, held, &mut lock(paper)),
+            // It is of another version; that is found out before.
+            _ => Vec::new(),
+        }
+    }
+
+    fn hear(&self, answers: Vec<Vec<u8>>) {
+        let mut state = lock(&self.state);
+        let (Some(desk), Some((asked, since))) = (&self.desk, state.asked.take()) else { return };
+        match asked {
+            Asked::Measure(by, steps) => {
+                let mut values = all(&answers);
+                state.ranges[usize::from(by == ColorBy::Spin)].grow_to(&mut values);
+                state.measured = Some((by, steps));
+            }
+            Asked::Look(due) => {
+                self.give(desk, &mut state, &due, &answers);
+                state.next_frame = Instant::now() + (SHARE - 1) * since.elapsed();
+            }
+            Asked::Find(pick, steps) => {
+                let found = (0..).zip(&answers).filter_map(|(rank, answer)| Some((rank, *all(slice(answer)).first()?)));
+                let found = found.min_by(|(_, a): &(u32, Found), (_, b)| a.distance.total_cmp(&b.distance));
+                self.tell_found(desk, pick, found);
+                let known = found.map_or(pick, |(_, found)| Pick::Body(0, found.id));
+                state.found = found.map(|found| (known, steps, found));
+            }
+            Asked::Figures(steps) => {
+                let playing = desk.pace().playing;
+                let said = state.course.say(all::<figures::Part>(&answers), playing);
+                desk.tell(&said);
+                state.told = Some((steps, playing));
+                state.next_course = Instant::now() + TELL.max(TELL_SHARE * since.elapsed());
+            }
+        }
+    }
+
+    fn lingers(&self) -> bool {
+        self.lingers
+    }
+}
+
+impl super::protocol::Gaze {
+    /// The size of some of its pixels, and the rectangle that they cover.
+    pub(super) fn part(&self, [columns, rows]: super::sketch::Pixels) -> ([u32; 2], View) {
+        let pixel = (self.view.high - self.view.low) / DVec2::new(self.size[0].into(), self.size[1].into());
+        let from_left = |column: u32| self.view.low.x + pixel.x * f64::from(column);
+        let from_top = |row: u32| self.view.high.y - pixel.y * f64::from(row);
+        let low = DVec2::new(from_left(columns[0]), from_top(rows[1]));
+        let high = DVec2::new(from_left(columns[1]), from_top(rows[0]));
+        ([columns[1] - columns[0], rows[1] - rows[0]], View { low, high })
+    }
+}
+
+fn slice<T>(one: &T) -> &[T] {
+    std::slice::from_ref(one)
+}
+
+/// What came from all ranks, as one list.
+fn all<T: Pod>(answers: &[Vec<u8>]) -> Vec<T> {
+    let parts = answers.iter().flat_map(|answer| answer.chunks_exact(size_of::<T>()));
+    parts.map(bytemuck::pod_read_unaligned).collect()
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,297 @@
+//! Plays what runs have recorded, one or two of them on one clock.
+
+use super::desk::{Desk, Due, Pace, Pick};
+use super::protocol::{Picture, Say};
+use super::question::{Found, distance};
+use super::sketch::{Paper, Portion, Sketch, rectangle, turn_of_angle};
+use super::{figures, scenery};
+use crate::folder::recording::{RecordingError, Row};
+use crate::look::compare;
+use crate::look::frame::Frame;
+use crate::look::picture::{ColorBy, Range, Rgb, Tint};
+use crate::look::recorded::Recorded;
+use crate::rank::StopFlag;
+use atoll_core::{Body, GlobalId, KindId, Region, Rot};
+use glam::{DVec2, Vec2};
+use std::iter::Empty;
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How long nothing may happen before is looked whether to stop.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// A recording, and the record of it that is shown.
+#[derive(Debug)]
+struct Track {
+    recorded: Recorded,
+    frame: Frame,
+    ranges: [Range; 2],
+}
+
+/// Shows recordings to pages until somebody asks to stop.
+#[derive(Debug)]
+pub(crate) struct Player {
+    tracks: Vec<Track>,
+    desk: Arc<Desk>,
+    /// The steps that all of them have records of.
+    steps: Vec<u64>,
+    /// Where time is, in steps; between two records the earlier is shown.
+    time: f64,
+    /// What the frames hold.
+    shown: Option<u64>,
+    /// The body that pages were told of, and after which step.
+    told: Option<(Pick, u64)>,
+    found: Option<(usize, Found)>,
+    paper: Paper,
+}
+
+impl Player {
+    /// Of recordings, each with a name. None if they have no step in common.
+    pub(crate) fn new(recorded: Vec<(String, Recorded)>, desk: Arc<Desk>) -> Option<Self> {
+        let steps = |recorded: &Recorded| recorded.recording().steps().to_vec();
+        let others = recorded.iter().skip(1);
+        let mut common = steps(&recorded.first()?.1);
+        others.for_each(|(_, other)| common.retain(|step| other.recording().steps().binary_search(step).is_ok()));
+        let last = *common.last()?;
+        let mut tracks = Vec::new();
+        let mut sources = Vec::new();
+        for (name, recorded) in recorded {
+            sources.push(scenery::source(name, recorded.setting(), Vec::new()));
+            tracks.push(Track { recorded, frame: Frame::default(), ranges: [Range::default(); 2] });
+        }
+        desk.greet(Say::Hello(scenery::hello(sources, true, common.clone(), last)));
+        let time = common[0] as f64;
+        Some(Self { tracks, desk, steps: common, time, shown: None, told: None, found: None, paper: Paper::default() })
+    }
+
+    /// Shows them.
+    ///
+    /// # Errors
+    /// If a record cannot be read.
+    pub(crate) fn play(mut self, stop: &StopFlag) -> Result<(), RecordingError> {
+        thread::scope(|scope| {
+            let (desk, ended) = (Arc::clone(&self.desk), StopFlag::default());
+            if let [one, other] = &self.tracks[..] {
+                let folders = [one, other].map(|track| track.recorded.recording().folder().to_owned());
+                let (stop, ended) = (stop.clone(), ended.clone());
+                let find = move || {
+                    let is_over = || stop.is_requested() || ended.is_requested();
+                    // What cannot be read is complained of where it is shown.
+                    if let Ok(Some(step)) = compare::first_step_apart(&folders[0], &folders[1], is_over) {
+                        desk.greet(Say::Difference { step });
+                    }
+                };
+                // Without it, nothing is marked.
+                let _ = thread::Builder::new().name("differences".to_owned()).spawn_scoped(scope, find);
+            }
+            let played = self.go_on(stop);
+            ended.request();
+            played
+        })
+    }
+
+    fn go_on(&mut self, stop: &StopFlag) -> Result<(), RecordingError> {
+        let (mut last, mut was_playing) = (Instant::now(), None);
+        while !stop.is_requested() {
+            let (wishes, pace, now) = (self.desk.wishes(), self.desk.take_pace(), Instant::now());
+            let patience = self.advance(&pace, now - last);
+            last = now;
+            let due = self.desk.due(self.step());
+            if !due.is_empty() {
+                self.show(&due)?;
+            }
+            self.look_for_picked()?;
+            if was_playing != Some(pace.playing) || !due.is_empty() {
+                self.tell(pace.playing);
+                was_playing = Some(pace.playing);
+            }
+            let waits = [patience, self.desk.rests(self.step())].into_iter().flatten();
+            self.desk.wait(wishes, waits.fold(PATIENCE, Duration::min));
+        }
+        Ok(())
+    }
+
+    /// The index of the record that is shown.
+    fn index(&self) -> usize {
+        self.steps.partition_point(|step| *step as f64 <= self.time + 1e-6).max(1) - 1
+    }
+
+    fn step(&self) -> u64 {
+        self.steps[self.index()]
+    }
+
+    /// Lets time pass, and says how long it is until the next record, if time goes on.
+    fn advance(&mut self, pace: &Pace, passed: Duration) -> Option<Duration> {
+        let last = self.steps.len() - 1;
+        if let Some(step) = pace.seek {
+            self.time = (step as f64).clamp(self.steps[0] as f64, self.steps[last] as f64);
+        }
+        if pace.by != 0 {
+            let index = (self.index() as i64).saturating_add(pace.by).clamp(0, last as i64) as usize;
+            self.time = self.steps[index] as f64;
+        }
+        if !pace.playing || !self.desk.is_wanted() {
+            return None;
+        }
+        let hertz = self.tracks[0].recorded.setting().hertz;
+        if pace.times > 0.0 {
+            self.time += passed.as_secs_f64() * hertz * pace.times;
+        } else if pace.seek.is_none() && self.desk.rests(u64::MAX).is_some_and(|rest| rest.is_zero()) {
+            self.time = self.steps[(self.index() + 1).min(last)] as f64;
+        }
+        let Some(&next) = self.steps.get(self.index() + 1) else {
+            self.time = self.steps[last] as f64;
+            self.desk.pause();
+            return None;
+        };
+        let left = (next as f64 - self.time) / (hertz * if pace.times > 0.0 { pace.times } else { 1e3 });
+        Some(Duration::from_secs_f64(left.clamp(0.001, 60.0)))
+    }
+
+    /// Reads the records that are to be shown.
+    fn read(&mut self) -> Result<(), RecordingError> {
+        let step = self.step();
+        if self.shown != Some(step) {
+            for track in &mut self.tracks {
+                track.recorded.read(step, &mut track.frame)?;
+            }
+            self.shown = Some(step);
+        }
+        Ok(())
+    }
+
+    fn show(&mut self, due: &[Due]) -> Result<(), RecordingError> {
+        self.read()?;
+        self.look_for_picked()?;
+        for due in due {
+            let frames = (0..self.tracks.len()).map(|source| self.draw(source, due)).collect();
+            self.desk.give(due, frames);
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, source: usize, due: &Due) -> Vec<u8> {
+        let track = &mut self.tracks[source];
+        let by = due.gaze.color;
+        let range = &mut track.ranges[usize::from(by == ColorBy::Spin)];
+        range.grow(by, &track.frame);
+        let range = *range;
+        let (setting, frame) = (track.recorded.setting(), &track.frame);
+        let Portion { pixels, density, dots } = draw(&mut self.paper, setting, frame, due, range);
+        let ranks = frame.ranks.last().map_or(1, |(rank, _)| rank + 1);
+        let legend = scenery::legend(by, setting, ranks, range);
+        let place = |(_, found): (usize, Found)| DVec2::from(found.place);
+        let picture = Picture {
+            source: source as u32,
+            number: due.number,
+            step: frame.step,
+            time: frame.step as f64 / setting.hertz,
+            rectangle: rectangle(setting, &due.gaze),
+            density: due.gaze.part(if density.is_empty() { [[0; 2]; 2] } else { pixels }),
+            picked: self.found.filter(|(of, _)| *of == source).map(place),
+            legend: &legend,
+            pixels: &density,
+            dots: &[bytemuck::cast_slice(&dots)],
+        };
+        picture.encode()
+    }
+
+    /// Finds the body that somebody wants to know about, where it is now.
+    fn look_for_picked(&mut self) -> Result<(), RecordingError> {
+        let (picked, step) = (self.desk.picked(), self.step());
+        if picked.map(|pick| (pick, step)) == self.told {
+            return Ok(());
+        }
+        let Some(pick) = picked else {
+            (self.told, self.found) = (None, None);
+            self.desk.tell(&Say::Body { body: None });
+            return Ok(());
+        };
+        self.read()?;
+        let (Pick::At(source, ..) | Pick::Body(source, _)) = pick;
+        let found = self.tracks.get(source as usize).and_then(|track| track.find(pick));
+        let body = found.map(|(found, rank)| {
+            scenery::picked(&found, source, self.tracks[source as usize].recorded.setting(), rank, false)
+        });
+        self.desk.tell(&Say::Body { body });
+        let now = found.map(|(found, _)| Pick::Body(source, found.id));
+        self.desk.found(pick, now);
+        self.told = now.map(|pick| (pick, step));
+        self.found = found.map(|(found, _)| (source as usize, found));
+        Ok(())
+    }
+
+    /// Tells pages how it goes.
+    fn tell(&self, playing: bool) {
+        let hertz = self.tracks[0].recorded.setting().hertz;
+        let mut all = vec![("record", format!("{} of {}", self.index() + 1, self.steps.len()))];
+        if let (Some(first), Some(last)) = (self.steps.first(), self.steps.last()) {
+            all.push(("recorded", format!("{} s", figures::digits((last - first) as f64 / hertz))));
+        }
+        let bodies = |track: &Track| track.frame.bodies.len();
+        let counts: Vec<_> = self.tracks.iter().map(|track| crate::look::picture::grouped(bodies(track))).collect();
+        all.push(("bodies", counts.join(", ")));
+        self.desk.tell(&Say::Figures { playing, figures: all, phases: Vec::new(), busy: Vec::new() });
+    }
+}
+
+/// Draws a record.
+fn draw(paper: &mut Paper, setting: &crate::look::frame::Setting, frame: &Frame, due: &Due, range: Range) -> Portion {
+    let mut sketch = Sketch::new(paper, setting, &due.gaze, None::<Empty<Region>>);
+    let (by, tint) = (due.gaze.color, Tint::new(due.gaze.color, range));
+    let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
+    let mut from = 0;
+    for &(rank, to) in &frame.ranks {
+        let of_rank = Tint::numbered(rank);
+        for row in &frame.bodies[from..to] {
+            let place = DVec2::new(row.x, row.y);
+            let color = || match by {
+                ColorBy::Kind => kinds.get(row.kind as usize).copied().unwrap_or(Tint::asleep(None)),
+                ColorBy::Speed | ColorBy::Spin => tint.moving(row.vx, row.vy, row.omega),
+                ColorBy::Tile => Tint::tile(setting.grid.locate(place).0 as usize, setting.grid.columns()),
+                ColorBy::Rank => of_rank,
+                // No recording tells.
+                ColorBy::Contacts | ColorBy::Asleep => Tint::asleep(None),
+            };
+            sketch.add(place, row.kind, || turn_of_angle(row.angle), color);
+        }
+        from = to;
+    }
+    sketch.finish()
+}
+
+impl Track {
+    /// A body, and the rank that has it.
+    fn find(&self, pick: Pick) -> Option<(Found, u32)> {
+        let (setting, frame) = (self.recorded.setting(), &self.frame);
+        let distance = |row: &Row| match pick {
+            Pick::Body(_, id) => (row.id == id).then_some(f64::NEG_INFINITY),
+            Pick::At(_, place, reach) => {
+                let shape = &setting.kinds.get(row.kind as usize)?.shape;
+                let place = DVec2::from(place);
+                let near = reach + f64::from(shape.bounding_radius());
+                let is_near = (place - DVec2::new(row.x, row.y)).abs().max_element() <= near;
+                is_near.then(|| distance(shape, &body(row), place)).filter(|distance| *distance <= reach)
+            }
+        };
+        let near = frame.bodies.iter().enumerate().filter_map(|(i, row)| Some((distance(row)?, i)));
+        let (_, i) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let row = &frame.bodies[i];
+        let tile = setting.grid.locate(DVec2::new(row.x, row.y)).0;
+        let rank = frame.ranks.get(frame.ranks.partition_point(|(_, end)| *end <= i)).map_or(0, |(rank, _)| *rank);
+        Some((Found { tile, angle: row.angle, ..Found::of(&body(row)) }, rank))
+    }
+}
+
+/// A body as it was recorded.
+fn body(row: &Row) -> Body {
+    Body {
+        id: GlobalId(row.id),
+        kind: KindId(row.kind),
+        position: DVec2::new(row.x, row.y),
+        rotation: Rot::from_angle(row.angle),
+        velocity: Vec2::new(row.vx, row.vy),
+        angular_velocity: row.omega,
+    }
+}

@@ -1,0 +1,189 @@
+//! What rank 0 asks all ranks in a meeting, and what each answers of its world.
+
+use super::figures::Part;
+use super::protocol::{Dot, Gaze};
+use super::sketch::{Paper, Pixels, Sketch, turn};
+use crate::look::frame::Setting;
+use crate::look::picture::{ColorBy, Range, Rgb, Tint};
+use crate::rank::Held;
+use atoll_core::{Body, GlobalId, Shape, TileView, World};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// The scale of speeds and spins is made from so many bodies of a rank, at most.
+const SAMPLE: usize = 512;
+
+/// A question.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(super) enum Question {
+    /// What some bodies have of what these colors measure.
+    Measure(ColorBy),
+    /// What a page sees.
+    Look {
+        /// What it looks at.
+        gaze: Gaze,
+        /// What has the last color of the scale.
+        most: f32,
+    },
+    /// The body of that name, or else the nearest to a place, at most so far from it, in m.
+    Find(Option<u64>, [f64; 2], f64),
+    /// How it goes.
+    Figures,
+}
+
+/// A body that was looked for, as one rank knows it.
+#[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Found {
+    pub id: u64,
+    pub place: [f64; 2],
+    /// From the place that was asked for to its outline, in m; negative within.
+    pub distance: f64,
+    /// In m/s.
+    pub velocity: [f32; 2],
+    /// In rad, and in rad/s.
+    pub angle: f32,
+    pub spin: f32,
+    pub kind: u32,
+    pub tile: u32,
+    pub contacts: u32,
+    /// 0: no; 1: yes; 2: nobody may.
+    pub asleep: u32,
+}
+
+/// The head of an answer to [`Question::Look`]; densities follow, then dots.
+#[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Head {
+    pixels: Pixels,
+    density: u64,
+    dots: u64,
+}
+
+/// What a rank answers.
+pub(super) fn answer(question: &Question, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
+    match *question {
+        Question::Measure(by) => bytemuck::cast_slice(&measure(by, held.world)).to_vec(),
+        Question::Look { gaze, most } => look(&gaze, most, setting, held, paper),
+        Question::Find(id, place, reach) => {
+            let found = find(id, DVec2::from(place), reach, setting, held.world);
+            found.map_or(Vec::new(), |found| bytemuck::bytes_of(&found).to_vec())
+        }
+        Question::Figures => bytemuck::bytes_of(&Part::new(held)).to_vec(),
+    }
+}
+
+/// Speeds or spins of some bodies.
+fn measure(by: ColorBy, world: &World) -> Vec<f32> {
+    let bodies: usize = world.views().map(|tile| tile.bodies().len()).sum();
+    let every = bodies / SAMPLE + 1;
+    let sample = world.views().flat_map(|tile| tile.bodies().step_by(every));
+    sample.map(|body| by.measure(body.velocity.x, body.velocity.y, body.angular_velocity)).collect()
+}
+
+fn look(gaze: &Gaze, most: f32, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
+    let regions = held.world.views().map(|tile| setting.grid.region(tile.id()));
+    let mut sketch = Sketch::new(paper, setting, gaze, Some(regions));
+    let tint = Tint::new(gaze.color, Range { most });
+    let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
+    let rank = Tint::numbered(held.rank.0);
+    for tile in held.world.views() {
+        if !sketch.sees(&setting.grid.region(tile.id())) {
+            continue;
+        }
+        let of_tile = Tint::tile(tile.id().0 as usize, setting.grid.columns());
+        let counts = if gaze.color == ColorBy::Contacts { contacts(&tile) } else { Vec::new() };
+        let color = |i: usize, body: &Body| match gaze.color {
+            ColorBy::Kind => kinds[body.kind.0 as usize],
+            ColorBy::Speed | ColorBy::Spin => tint.moving(body.velocity.x, body.velocity.y, body.angular_velocity),
+            ColorBy::Tile => of_tile,
+            ColorBy::Rank => rank,
+            ColorBy::Contacts => Tint::contacts(counts[i]),
+            ColorBy::Asleep => Tint::asleep(Some(tile.asleep().get(i).copied().unwrap_or(false))),
+        };
+        for (i, body) in tile.bodies().enumerate() {
+            sketch.add(body.position, body.kind.0, || turn(body.rotation), || color(i, &body));
+        }
+    }
+    let portion = sketch.finish();
+    let dots: &[u8] = bytemuck::cast_slice(&portion.dots);
+    let head = Head { pixels: portion.pixels, density: portion.density.len() as u64, dots: portion.dots.len() as u64 };
+    [bytemuck::bytes_of(&head), &portion.density, dots].concat()
+}
+
+/// For each body of a tile how many press upon it.
+fn contacts(tile: &TileView<'_>) -> Vec<u16> {
+    let mut counts = vec![0_u16; tile.bodies().len()];
+    for contact in tile.contacts().filter(|contact| contact.normal_impulse > 0.0) {
+        for body in contact.owned.into_iter().flatten() {
+            counts[body] = counts[body].saturating_add(1);
+        }
+    }
+    counts
+}
+
+/// Reads an answer to [`Question::Look`]. None if it is none.
+pub(super) fn portion(answer: &[u8]) -> Option<(Pixels, &[u8], &[u8])> {
+    let (head, rest) = answer.split_at_checked(size_of::<Head>())?;
+    let head: Head = bytemuck::pod_read_unaligned(head);
+    let (density, dots) = rest.split_at_checked(usize::try_from(head.density).ok()?)?;
+    (dots.len() as u64 == head.dots * size_of::<Dot>() as u64).then_some((head.pixels, density, dots))
+}
+
+fn find(id: Option<u64>, place: DVec2, reach: f64, setting: &Setting, world: &World) -> Option<Found> {
+    let near = |tile: &TileView<'_>| {
+        let radius = setting.kinds.iter().map(|kind| f64::from(kind.shape.bounding_radius())).fold(0.0, f64::max);
+        let (region, far) = (setting.grid.region(tile.id()), DVec2::splat(reach + 2.0 * radius));
+        id.is_some() || ((region.min - far).cmple(place).all() && (region.max + far).cmpge(place).all())
+    };
+    let mut best: Option<(f64, TileView<'_>, usize, Body)> = None;
+    for tile in world.views().filter(near) {
+        for (i, body) in tile.bodies().enumerate() {
+            let distance = match id {
+                Some(id) if body.id == GlobalId(id) => f64::NEG_INFINITY,
+                Some(_) => continue,
+                None => distance(&setting.kinds[body.kind.0 as usize].shape, &body, place),
+            };
+            if distance <= reach && best.as_ref().is_none_or(|best| distance < best.0) {
+                best = Some((distance, tile, i, body));
+            }
+        }
+    }
+    let (distance, tile, i, body) = best?;
+    Some(Found {
+        distance,
+        tile: tile.id().0,
+        contacts: contacts(&tile)[i].into(),
+        asleep: tile.asleep().get(i).map_or(2, |&asleep| asleep.into()),
+        ..Found::of(&body)
+    })
+}
+
+impl Found {
+    /// What a body itself tells.
+    pub(super) fn of(body: &Body) -> Self {
+        Self {
+            id: body.id.0,
+            place: body.position.to_array(),
+            velocity: body.velocity.to_array(),
+            angle: body.rotation.angle(),
+            spin: body.angular_velocity,
+            kind: body.kind.0,
+            ..Self::default()
+        }
+    }
+}
+
+/// From a place to the outline of a body, in m; negative within.
+pub(super) fn distance(shape: &Shape, body: &Body, place: DVec2) -> f64 {
+    let from = place - body.position;
+    match *shape {
+        Shape::Circle { radius } => from.length() - f64::from(radius),
+        Shape::Box { half } => {
+            let (c, s) = (f64::from(body.rotation.c), f64::from(body.rotation.s));
+            let own = DVec2::new(c * from.x + s * from.y, c * from.y - s * from.x).abs() - half.as_dvec2();
+            own.max(DVec2::ZERO).length() + own.max_element().min(0.0)
+        }
+    }
+}
