@@ -55,7 +55,9 @@ pub struct StepReport {
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
     let _span = tracing::trace_span!("step", step = world.step).entered();
     world.begin_step();
-    let Verdict { stop: stopped, meet: meeting, .. } = migrate(world, halo)?;
+    let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
+    // Whoever asked to meet alone knows of it where another asked to stop.
+    let meeting = meet && !stopped;
     world.measures |= stopped;
     world.takes_figures |= stopped;
     match world.setup.params.exchange {

@@ -60,7 +60,7 @@ function hello(message) {
   }));
   options(at("color"), COLORS.filter((color) => message.colors.includes(color)).map((color) => [color, color]));
   const times = [0.1, 0.25, 0.5, 1, 2, 4, 8].map((times) => [times, `${times} ×`]);
-  options(at("speed"), message.recorded ? times : [[0, "unbounded"], ...times]);
+  options(at("speed"), message.recorded ? times : [[0, "as fast as can be"], ...times]);
   at("speed").value = message.recorded ? 1 : 0;
   for (const id of ["track", "back"]) at(id).hidden = !message.recorded;
   if (message.recorded) {
@@ -286,7 +286,8 @@ function fit() {
   const width = canvas.clientWidth * devicePixelRatio / state.sources.length, height = canvas.clientHeight * devicePixelRatio;
   state.camera = {
     x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2,
-    zoom: 0.94 * Math.min(width / (high[0] - low[0]), height / (high[1] - low[1])),
+    // Beside it is room for the scale and the legend.
+    zoom: Math.min(0.94 * width / (high[0] - low[0]), Math.max(0.5 * height, height - 120 * devicePixelRatio) / (high[1] - low[1])),
   };
   state.following = false;
   at("follow").setAttribute("aria-pressed", false);
