@@ -95,6 +95,7 @@ pub mod internals {
     pub use crate::folder::RunFolder;
     pub use crate::folder::recording::{Record, RecordingWriter, StageText, rank_folder};
     pub use crate::launch::run as run_plan;
+    pub use crate::look::live::overhear;
     pub use crate::plan::Plan;
     pub use crate::rank::{Held, Host, Next, PanicAt, Watcher};
 }

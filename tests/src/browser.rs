@@ -34,9 +34,11 @@ pub struct Browser {
 
 /// Where the browser is: the file that `ATOLL_BROWSER` names, or one of the usual names. None if there is none, which is said.
 pub fn find() -> Option<PathBuf> {
-    let named = std::env::var_os("ATOLL_BROWSER").map(PathBuf::from);
+    let named = std::env::var_os("ATOLL_BROWSER").filter(|name| !name.is_empty()).map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let usual = || std::env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file());
+    let usual = || {
+        std::env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file())
+    };
     let found = named.or_else(usual);
     if found.is_none() {
         eprintln!("LEFT OUT: there is no browser (Debian: chromium-headless-shell)");
@@ -74,7 +76,8 @@ impl Browser {
         let stream = TcpStream::connect(address).expect("it listens");
         stream.set_read_timeout(Some(LIMIT)).expect("time limits can be set");
         let config = WebSocketConfig::default().max_message_size(None).max_frame_size(None);
-        let (socket, _) = tungstenite::client::client_with_config(url.as_str(), stream, Some(config)).expect("it takes a socket");
+        let (socket, _) =
+            tungstenite::client::client_with_config(url.as_str(), stream, Some(config)).expect("it takes a socket");
         let mut browser = Self {
             child,
             socket,
@@ -84,9 +87,11 @@ impl Browser {
             requests: Vec::new(),
             _profile: profile,
         };
-        let target = browser.call("Target.createTarget", json!({ "url": "about:blank", "width": width, "height": height }));
+        let target =
+            browser.call("Target.createTarget", json!({ "url": "about:blank", "width": width, "height": height }));
         let target = json!({ "targetId": target["targetId"], "flatten": true });
-        browser.session = browser.call("Target.attachToTarget", target)["sessionId"].as_str().expect("a session").to_owned();
+        browser.session =
+            browser.call("Target.attachToTarget", target)["sessionId"].as_str().expect("a session").to_owned();
         for domain in ["Runtime", "Log", "Network", "Page"] {
             browser.call(&format!("{domain}.enable"), json!({}));
         }

@@ -4,6 +4,7 @@ pub mod browser;
 pub mod fuzz;
 #[cfg(feature = "mpi")]
 pub mod mpi;
+pub mod page;
 pub mod processes;
 pub mod program;
 pub mod ranks;

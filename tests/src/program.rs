@@ -220,6 +220,14 @@ impl Running {
     /// # Panics
     /// If the program ends without one, or none comes within [`LIMIT`].
     pub fn wait_for_line(&mut self, start: &str) {
+        self.line(start);
+    }
+
+    /// As [`wait_for_line`](Self::wait_for_line), and returns it.
+    ///
+    /// # Panics
+    /// As that.
+    pub fn line(&mut self, start: &str) -> String {
         let deadline = Instant::now() + LIMIT;
         loop {
             match self.stderr.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
@@ -227,7 +235,7 @@ impl Running {
                     let found = line.starts_with(start);
                     self.seen.push_str(&line);
                     if found {
-                        return;
+                        return line;
                     }
                 }
                 Err(error) => panic!("{}: no line {start:?}, {error}, after\n{}", self.name, self.seen),

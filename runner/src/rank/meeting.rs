@@ -147,3 +147,82 @@ impl<'a> Meetings<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::launch;
+    use crate::plan::Plan;
+    use crate::rank::StopFlag;
+    use crate::summary::Summary;
+    use std::sync::{Arc, Mutex};
+
+    /// Asks twice after every third step, waits once between, and once all steps are made.
+    #[derive(Debug, Default)]
+    struct Curious {
+        lingers: bool,
+        asked: Mutex<Vec<u64>>,
+        heard: Mutex<Vec<Vec<Vec<u8>>>>,
+        stop: StopFlag,
+    }
+
+    impl Host for Curious {
+        fn calls(&self, steps: u64) -> bool {
+            steps.is_multiple_of(3)
+        }
+
+        fn next(&self, steps: u64, patience: Duration) -> Next {
+            assert!(patience > Duration::ZERO);
+            let mut asked = self.asked.lock().unwrap();
+            asked.push(steps);
+            match asked.iter().filter(|asked| **asked == steps).count() {
+                1 | 3 => Next::Ask(steps.to_le_bytes().to_vec()),
+                2 => Next::Wait,
+                _ if steps == 10 => {
+                    self.stop.request();
+                    Next::Wait
+                }
+                _ => Next::GoOn,
+            }
+        }
+
+        fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8> {
+            assert_eq!(question, held.world.step_count().to_le_bytes());
+            vec![held.rank.0 as u8; held.rank.index() + 1]
+        }
+
+        fn hear(&self, answers: Vec<Vec<u8>>) {
+            self.heard.lock().unwrap().push(answers);
+        }
+
+        fn lingers(&self) -> bool {
+            self.lingers
+        }
+    }
+
+    fn run(host: Option<Arc<Curious>>) -> Summary {
+        let text = "[scene]\nkind = \"rooms\"\nbodies = 300\n[run]\nsteps = 10\nranks = 3\ntiles = [3, 3]\n";
+        let plan = Plan::new(&Config::from_toml_str("test", text, &[]).unwrap()).unwrap();
+        let stop = host.as_ref().map(|host| host.stop.clone()).unwrap_or_default();
+        let host = host.map(|host| host as Arc<dyn Host>);
+        launch::run(&plan, &Observer { host, stop, ..Observer::default() }).unwrap()
+    }
+
+    #[test]
+    fn ranks_meet_when_rank_0_calls_and_that_changes_nothing() {
+        let alone = run(None);
+        for (lingers, meetings) in [(false, vec![3, 6, 9]), (true, vec![0, 3, 6, 9, 10])] {
+            let host = Arc::new(Curious { lingers, ..Curious::default() });
+            let met = run(Some(Arc::clone(&host)));
+            assert_eq!((&met.state_hash, &met.contact_hash), (&alone.state_hash, &alone.contact_hash));
+            assert_eq!((met.steps, met.bytes_sent, met.interrupted), (10, alone.bytes_sent, false));
+            let mut asked = host.asked.lock().unwrap().clone();
+            asked.dedup();
+            assert_eq!(asked, meetings);
+            let heard = host.heard.lock().unwrap();
+            assert_eq!(heard.len(), 2 * meetings.len());
+            assert!(heard.iter().all(|answers| *answers == [vec![0], vec![1; 2], vec![2; 3]]));
+        }
+    }
+}

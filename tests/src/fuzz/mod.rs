@@ -7,6 +7,7 @@
 mod arguments;
 mod codec;
 mod config;
+mod page;
 mod segment;
 mod snapshot;
 mod transport;
@@ -14,6 +15,7 @@ mod transport;
 pub use arguments::{NoRun, arguments};
 pub use codec::{FRAME, FrameLayout, Letter, TILES, codec, codec_by, frame};
 pub use config::config;
+pub use page::page;
 pub use segment::{footer, segment, segment_file};
 pub use snapshot::{BLOCK, BlockLayout, block, fresh, seal, snapshot};
 pub use transport::transport;

@@ -10,6 +10,7 @@ mod command_lines;
 mod configurations;
 mod frames;
 mod memory;
+mod pages;
 mod random;
 mod saved_tiles;
 mod segments;

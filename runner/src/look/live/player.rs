@@ -1,13 +1,13 @@
 //! Plays what runs have recorded, one or two of them on one clock.
 
 use super::desk::{Desk, Due, Pace, Pick};
-use super::protocol::{Picture, Say};
+use super::protocol::{Gaze, Picture, Say};
 use super::question::{Found, distance};
 use super::sketch::{Paper, Portion, Sketch, rectangle, turn_of_angle};
 use super::{figures, scenery};
 use crate::folder::recording::{RecordingError, Row};
 use crate::look::compare;
-use crate::look::frame::Frame;
+use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Range, Rgb, Tint};
 use crate::look::recorded::Recorded;
 use crate::rank::StopFlag;
@@ -178,7 +178,7 @@ impl Player {
         range.grow(by, &track.frame);
         let range = *range;
         let (setting, frame) = (track.recorded.setting(), &track.frame);
-        let Portion { pixels, density, dots } = draw(&mut self.paper, setting, frame, due, range);
+        let Portion { pixels, density, dots } = draw(&mut self.paper, setting, frame, &due.gaze, range);
         let ranks = frame.ranks.last().map_or(1, |(rank, _)| rank + 1);
         let legend = scenery::legend(by, setting, ranks, range);
         let place = |(_, found): (usize, Found)| DVec2::from(found.place);
@@ -236,10 +236,16 @@ impl Player {
     }
 }
 
+/// Draws a frame that nobody sees.
+pub(super) fn draw_once(setting: &Setting, frame: &Frame, gaze: Gaze) {
+    let Portion { density, .. } = draw(&mut Paper::default(), setting, frame, &gaze, Range::default());
+    assert!(density.len() <= 4 * (gaze.size[0] * gaze.size[1]) as usize);
+}
+
 /// Draws a record.
-fn draw(paper: &mut Paper, setting: &crate::look::frame::Setting, frame: &Frame, due: &Due, range: Range) -> Portion {
-    let mut sketch = Sketch::new(paper, setting, &due.gaze, None::<Empty<Region>>);
-    let (by, tint) = (due.gaze.color, Tint::new(due.gaze.color, range));
+fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range: Range) -> Portion {
+    let mut sketch = Sketch::new(paper, setting, gaze, None::<Empty<Region>>);
+    let (by, tint) = (gaze.color, Tint::new(gaze.color, range));
     let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
     let mut from = 0;
     for &(rank, to) in &frame.ranks {

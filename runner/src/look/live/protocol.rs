@@ -25,7 +25,9 @@ use serde::{Deserialize, Serialize};
 const MAGIC: u32 = u32::from_le_bytes(*b"ATOL");
 
 /// The most pixels that a page may ask for on one side.
-const MOST_PIXELS: u32 = 8192;
+const MOST_SIDE: u32 = 8192;
+/// The most pixels that a page may ask for. `page/app.js` asks for no more.
+const MOST_PIXELS: u32 = 1 << 24;
 
 /// What a page wants.
 #[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
@@ -82,8 +84,9 @@ impl Wish {
         let sound = match &wish {
             Self::Look { view: [x0, y0, x1, y1], size, .. } => {
                 let area = (x1 - x0) * (y1 - y0);
-                let pixels = |side: &u32| (1..=MOST_PIXELS).contains(side);
-                x0 < x1 && y0 < y1 && area.is_finite() && area > 0.0 && size.iter().all(pixels)
+                let pixels = |side: &u32| (1..=MOST_SIDE).contains(side);
+                let has_area = x0 < x1 && y0 < y1 && area.is_finite() && area > 0.0;
+                has_area && size.iter().all(pixels) && size[0] * size[1] <= MOST_PIXELS
             }
             Self::Speed { times } => (0.0..=1e6).contains(times),
             Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),
@@ -261,6 +264,7 @@ mod tests {
             &look("[2,0,1,1]", "[640,480]"),
             &look("[0,0,1,1]", "[0,480]"),
             &look("[0,0,1,1]", "[640,100000]"),
+            &look("[0,0,1,1]", "[8192,8192]"),
             &look("[0,0,1]", "[640,480]"),
             r#"{"do":"speed","times":-1}"#,
             r#"{"do":"pick","source":0,"at":[1e999,0]}"#,

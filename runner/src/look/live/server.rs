@@ -6,7 +6,7 @@
 //! thread of its own, so that a slow or broken one holds up nobody.
 
 use super::desk::{Desk, PageId, Ready};
-use super::protocol::Wish;
+use super::protocol::{Gaze, Wish};
 use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -22,6 +22,9 @@ const MOST_CONNECTIONS: usize = 64;
 
 /// Bytes of a request, and of a message of a page.
 const MOST_BYTES: usize = 8192;
+
+/// Headers of a request.
+const MOST_HEADERS: usize = 64;
 
 /// In which a request must have come, and in which a browser must take some of what it is sent.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -202,7 +205,7 @@ fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
             0 => return Ok(None),
             read => bytes.extend_from_slice(&buffer[..read]),
         }
-        let mut headers = [httparse::EMPTY_HEADER; 64];
+        let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         match request.parse(&bytes) {
             Ok(httparse::Status::Complete(_)) => return Ok(understand(&request)),
@@ -258,7 +261,7 @@ fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: ";
     stream.write_all(format!("{head}{accept}\r\n\r\n").as_bytes())?;
     stream.set_read_timeout(None)?;
-    let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
+    let config = limits();
     let gone = Arc::new(AtomicBool::new(false));
     let reader = {
         let input = WebSocket::from_raw_socket(Deaf(stream.try_clone()?), Role::Server, Some(config));
@@ -288,7 +291,7 @@ fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io
 }
 
 /// Hears what a page wants until it goes, or says what makes no sense.
-fn listen(mut input: WebSocket<Deaf>, desk: &Desk, page: PageId) {
+fn listen(mut input: WebSocket<impl Read + Write>, desk: &Desk, page: PageId) {
     loop {
         match input.read() {
             Ok(Message::Text(text)) => match Wish::parse(&text) {
@@ -299,6 +302,24 @@ fn listen(mut input: WebSocket<Deaf>, desk: &Desk, page: PageId) {
             Ok(_) | Err(_) => return,
         }
     }
+}
+
+/// Hears bytes as if a page had sent them, and says whether they are the head of a request, and what the page looks at then.
+pub(super) fn overhear(bytes: &[u8]) -> (bool, Option<Gaze>) {
+    let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    let is_whole = matches!(request.parse(bytes), Ok(httparse::Status::Complete(_)));
+    let is_request = is_whole && understand(&request).is_some();
+    let desk = Desk::new(true, 0.0);
+    let page = desk.open().expect("it is the first");
+    let sent = io::Cursor::new(bytes.to_vec());
+    listen(WebSocket::from_raw_socket(sent, Role::Server, Some(limits())), &desk, page);
+    (is_request, desk.due(0).first().map(|due| due.gaze))
+}
+
+/// What a page may send at a time.
+fn limits() -> WebSocketConfig {
+    WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES))
 }
 
 /// The half of a stream that is read. What the library would answer by itself is not sent: another thread writes, and two

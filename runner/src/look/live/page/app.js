@@ -14,6 +14,9 @@ const KEYS = [
   ["Esc", "let go of a body"],
 ];
 
+/// Pixels of the canvas in one of the page: no more in all than the server draws.
+const ratio = () => Math.min(devicePixelRatio, Math.sqrt(2 ** 24 / (canvas.clientWidth * canvas.clientHeight)), 8192 / canvas.clientWidth);
+
 /// Everything there is to know, besides what the controls hold.
 const state = {
   drawing: null,
@@ -25,6 +28,8 @@ const state = {
   difference: null,
   following: false,
   step: 0,
+  frames: 0,
+  legend: "",
   due: false,
   asked: "",
 };
@@ -121,7 +126,7 @@ function show(frame) {
   // The next may come once this one is drawn.
   if (frame.source === state.sources.length - 1) {
     requestAnimationFrame(() => tell({ do: "ack", frame: frame.number }));
-    state.frames = (state.frames ?? 0) + 1;
+    state.frames += 1;
   }
 }
 
@@ -229,8 +234,7 @@ function draw() {
   state.due = false;
   const { drawing, hello } = state;
   if (!hello || !drawing) return;
-  const ratio = devicePixelRatio;
-  const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.floor(length * ratio()));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   drawing.clear(paper());
   boxes().forEach((box, i) => {
@@ -250,7 +254,7 @@ function mark() {
     const [, , width, height] = boxes()[0];
     const x = width * (body.source + 0.5) + (marked[0] - camera.x) * camera.zoom, y = height / 2 - (marked[1] - camera.y) * camera.zoom;
     at("mark").hidden = x < width * body.source || x > width * (body.source + 1);
-    Object.assign(at("mark").style, { left: `${x / devicePixelRatio}px`, top: `${y / devicePixelRatio}px` });
+    Object.assign(at("mark").style, { left: `${x / ratio()}px`, top: `${y / ratio()}px` });
   }
 }
 
@@ -270,11 +274,11 @@ function look() {
 
 /// A length of 1, 2 or 5 times a power of ten that takes about a sixth of the width.
 function scale() {
-  const most = canvas.clientWidth / 6 / (state.camera.zoom / devicePixelRatio);
+  const most = canvas.clientWidth / 6 / (state.camera.zoom / ratio());
   const power = 10 ** Math.floor(Math.log10(most));
   const length = power * [5, 2, 1].find((times) => times * power <= most);
   const bar = at("scale").firstElementChild;
-  bar.style.width = `${length * state.camera.zoom / devicePixelRatio}px`;
+  bar.style.width = `${length * state.camera.zoom / ratio()}px`;
   const [unit, times] = length >= 1000 ? ["km", 1e-3] : length >= 1 ? ["m", 1] : length >= 0.01 ? ["cm", 100] : ["mm", 1000];
   at("scale").lastElementChild.textContent = `${+(length * times).toPrecision(3)} ${unit}`;
 }
@@ -283,11 +287,11 @@ function fit() {
   const boundaries = state.hello.sources.map(({ domain }) => domain);
   const low = [0, 1].map((axis) => Math.min(...boundaries.map((domain) => domain[axis])));
   const high = [2, 3].map((axis) => Math.max(...boundaries.map((domain) => domain[axis])));
-  const width = canvas.clientWidth * devicePixelRatio / state.sources.length, height = canvas.clientHeight * devicePixelRatio;
+  const width = canvas.clientWidth * ratio() / state.sources.length, height = canvas.clientHeight * ratio();
   state.camera = {
     x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2,
     // Beside it is room for the scale and the legend.
-    zoom: Math.min(0.94 * width / (high[0] - low[0]), Math.max(0.5 * height, height - 120 * devicePixelRatio) / (high[1] - low[1])),
+    zoom: Math.min(0.94 * width / (high[0] - low[0]), Math.max(0.5 * height, height - 120 * ratio()) / (high[1] - low[1])),
   };
   state.following = false;
   at("follow").setAttribute("aria-pressed", false);
@@ -297,7 +301,7 @@ function fit() {
 /// The source under the pointer, and the place in the world.
 function place({ offsetX, offsetY }) {
   const [, , width, height] = boxes()[0];
-  const [x, y] = [offsetX * devicePixelRatio, offsetY * devicePixelRatio];
+  const [x, y] = [offsetX * ratio(), offsetY * ratio()];
   const source = Math.min(state.sources.length - 1, Math.floor(x / width));
   const { camera } = state;
   return { source, at: [camera.x + (x - source * width - width / 2) / camera.zoom, camera.y - (y - height / 2) / camera.zoom] };
@@ -350,8 +354,8 @@ canvas.addEventListener("pointermove", (event) => {
   const [dx, dy] = [event.clientX - dragged.x, event.clientY - dragged.y];
   dragged.far ||= Math.hypot(dx, dy) > 4;
   if (dragged.far) {
-    state.camera.x -= dx * devicePixelRatio / state.camera.zoom;
-    state.camera.y += dy * devicePixelRatio / state.camera.zoom;
+    state.camera.x -= dx * ratio() / state.camera.zoom;
+    state.camera.y += dy * ratio() / state.camera.zoom;
     Object.assign(dragged, { x: event.clientX, y: event.clientY });
     if (state.following) follow(false);
     redraw();
@@ -387,8 +391,8 @@ addEventListener("keydown", (event) => {
   if (!state.hello || event.ctrlKey || event.metaKey || event.altKey || ["SELECT", "INPUT"].includes(event.target.tagName)) return;
   const { camera } = state;
   const move = (x, y) => {
-    camera.x += x * 80 * devicePixelRatio / camera.zoom;
-    camera.y += y * 80 * devicePixelRatio / camera.zoom;
+    camera.x += x * 80 * ratio() / camera.zoom;
+    camera.y += y * 80 * ratio() / camera.zoom;
     follow(false);
   };
   const toggle = () => { at("tiles").checked = !at("tiles").checked; redraw(); };

@@ -1,0 +1,293 @@
+//! The page in a real browser.
+
+use atoll::recording::{Recording, Row};
+use atoll_tests::browser::{self, Browser};
+use atoll_tests::page::Served;
+use atoll_tests::program;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use tempfile::{TempDir, tempdir};
+
+/// A small world in which bodies are large enough to be pointed at.
+const WORLD: &str = "[scene]\nkind = \"rooms\"\nbodies = 600\n\n[run]\nsteps = 60\nranks = 2\ntiles = [3, 3]\n";
+
+/// It, recorded twice: once with another seed.
+static DESK: LazyLock<TempDir> = LazyLock::new(|| {
+    let desk = tempdir().unwrap();
+    std::fs::write(desk.path().join("world.toml"), WORLD).unwrap();
+    for (out, more) in [("a", ""), ("b", "--set restitution=0.9")] {
+        let line = format!("run world.toml --out {out} --record-every 2 --quiet {more}");
+        let ended = program::run(program::command().current_dir(desk.path()).args(line.split_whitespace()));
+        assert_eq!(ended.code, Some(0), "{ended}");
+    }
+    desk
+});
+
+fn serve(line: &str) -> Served {
+    Served::start(program::command().current_dir(DESK.path()).arg("view").args(line.split_whitespace()))
+}
+
+/// A browser that shows it, once it has drawn something.
+fn show(program: &Path, served: &Served) -> Browser {
+    let mut browser = Browser::start(program, [1100, 700]);
+    browser.open(&served.url);
+    browser.wait_for("window.atoll !== undefined && atoll.state.frames > 0");
+    browser
+}
+
+/// Asserts that nothing went wrong in the page, and that it has asked nobody else for anything.
+#[track_caller]
+fn assert_well(browser: &Browser, served: &Served) {
+    assert!(browser.errors.is_empty(), "{:?}", browser.errors);
+    let own = |url: &&String| {
+        ["http", "ws"].iter().any(|scheme| url.starts_with(&format!("{scheme}://{}/", served.address())))
+    };
+    let others: Vec<_> = browser.requests.iter().filter(|url| !own(url) && !url.starts_with("data:")).collect();
+    assert!(others.is_empty() && browser.requests.len() > 3, "{others:?}");
+}
+
+fn number(browser: &mut Browser, expression: &str) -> f64 {
+    browser.evaluate(expression).as_f64().unwrap_or_else(|| panic!("{expression} is no number"))
+}
+
+fn step(browser: &mut Browser) -> u64 {
+    number(browser, "atoll.state.step") as u64
+}
+
+fn rows(folder: &str, step: u64) -> Vec<Row> {
+    let mut rows = Vec::new();
+    Recording::open(&DESK.path().join(folder)).unwrap().read(step, &mut rows).unwrap();
+    rows
+}
+
+/// Where on the page a place of the world is.
+fn place(browser: &mut Browser, x: f64, y: f64) -> [f64; 2] {
+    let place = browser.evaluate(&format!(
+        "(() => {{ const c = document.getElementById('canvas'), m = atoll.state.camera, r = c.getBoundingClientRect(); \
+         return [r.x + r.width / 2 + ({x} - m.x) * m.zoom / (c.width / c.clientWidth), \
+                 r.y + r.height / 2 - ({y} - m.y) * m.zoom / (c.width / c.clientWidth)]; }})()"
+    ));
+    [0, 1].map(|i| place[i].as_f64().unwrap())
+}
+
+/// How many pixels in the middle of what is looked at are not paper: as the page draws them, and as `atoll render` does.
+fn drawn(browser: &mut Browser, source: &str, step: u64, color: &str) -> [f64; 2] {
+    browser.evaluate("document.getElementById('tiles').checked = false");
+    let page = number(browser, "atoll.pixels(0.7)[0]");
+    let view = browser.evaluate(
+        "(() => { const c = document.getElementById('canvas'), m = atoll.state.camera, w = c.width / 2 / m.zoom, h = c.height / 2 / m.zoom; \
+         return [c.width, c.height, m.x - w, m.y - h, m.x + w, m.y + h]; })()",
+    );
+    let view: Vec<String> = view.as_array().unwrap().iter().map(Value::to_string).collect();
+    let out = DESK.path().join(format!("{}.png", std::process::id()));
+    let mut command = program::command();
+    command.current_dir(DESK.path()).args(["render", source, "--quiet", "--color", color, "--step", &step.to_string()]);
+    command.arg("--size").arg(format!("{}x{}", view[0], view[1])).arg("--view").arg(view[2..].join(","));
+    let ended = program::run(command.arg("--out").arg(&out));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let png = data_encoding::BASE64.encode(&std::fs::read(&out).unwrap());
+    let picture = number(
+        browser,
+        &format!(
+            "(async () => {{ const image = new Image(); image.src = 'data:image/png;base64,{png}'; await image.decode(); \
+             const {{ width, height }} = image, w = Math.round(width * 0.7), h = Math.round(height * 0.7); \
+             const context = new OffscreenCanvas(width, height).getContext('2d'); context.drawImage(image, 0, 0); \
+             const {{ data }} = context.getImageData((width - w) >> 1, height - h - ((height - h) >> 1), w, h); let count = 0; \
+             for (let i = 0; i < data.length; i += 4) count += 765 - data[i] - data[i + 1] - data[i + 2] > 24; return count; }})()"
+        ),
+    );
+    [page, picture]
+}
+
+#[track_caller]
+fn assert_alike([page, picture]: [f64; 2]) {
+    assert!(page > 500.0 && (page / picture - 1.0).abs() < 0.03, "{page} on the page, {picture} in the picture");
+}
+
+/// Clicks on a body and says which is picked.
+fn pick(browser: &mut Browser, row: &Row) -> String {
+    let at = place(browser, row.x, row.y);
+    browser.click(at);
+    browser.wait_for("atoll.state.body !== null");
+    browser.evaluate("document.getElementById('body-id').textContent").as_str().unwrap().to_owned()
+}
+
+/// A body with room around it, in the middle of the world.
+fn lonely(rows: &[Row]) -> &Row {
+    let far = |row: &&Row| {
+        rows.iter().filter(|other| other.id != row.id).all(|other| (other.x - row.x).hypot(other.y - row.y) > 0.8)
+    };
+    let middle = |row: &Row| (row.x - 0.5 * middle_of(rows)[0]).hypot(row.y - 0.5 * middle_of(rows)[1]);
+    rows.iter().filter(far).min_by(|a, b| middle(a).total_cmp(&middle(b))).expect("somebody is alone")
+}
+
+fn middle_of(rows: &[Row]) -> [f64; 2] {
+    let sum = rows.iter().fold([0.0; 2], |[x, y], row| [x + row.x, y + row.y]);
+    sum.map(|sum| 2.0 * sum / rows.len() as f64)
+}
+
+#[test]
+fn a_recording_is_drawn_played_scrubbed_zoomed_and_its_bodies_picked() {
+    let Some(program) = browser::find() else { return };
+    let served = serve("a");
+    let mut browser = show(&program, &served);
+    browser.wait_for("atoll.state.step > 4");
+    browser.press(" ");
+    browser.wait_for("document.getElementById('play').textContent === 'Play'");
+    // Further than where it was, and to the end.
+    for to in [20, 40, 60] {
+        browser.evaluate(&format!(
+            "(() => {{ const bar = document.getElementById('scrub'); bar.value = {}; bar.dispatchEvent(new Event('input')); }})()",
+            to / 2
+        ));
+        browser.wait_for(&format!("atoll.state.step === {to}"));
+    }
+    assert_alike(drawn(&mut browser, "a", 60, "kind"));
+    browser.screenshot("recording");
+    for (key, expected) in [("ArrowLeft", 58), ("ArrowLeft", 56), ("ArrowRight", 58)] {
+        browser.press(key);
+        browser.wait_for(&format!("atoll.state.step === {expected}"));
+    }
+    // Nearer, around one that is alone.
+    let rows = rows("a", 58);
+    let row = lonely(&rows);
+    let at = place(&mut browser, row.x, row.y);
+    let zoom = number(&mut browser, "atoll.state.camera.zoom");
+    browser.wheel(at, -600.0);
+    browser.wait_for(&format!("atoll.state.camera.zoom > {}", 3.0 * zoom));
+    let now = place(&mut browser, row.x, row.y);
+    assert!((now[0] - at[0]).hypot(now[1] - at[1]) < 0.5, "it is zoomed to the cursor: {at:?} {now:?}");
+    assert_eq!(pick(&mut browser, row), row.id.to_string());
+    browser.press("2");
+    browser.wait_for("atoll.state.legend.includes('speed')");
+    assert_alike(drawn(&mut browser, "a", 58, "speed"));
+    browser.screenshot("recording_near");
+    browser.press("Escape");
+    browser.wait_for("document.getElementById('body').hidden");
+    assert_well(&browser, &served);
+    served.interrupt();
+    assert_eq!(served.end().code, Some(0));
+}
+
+#[test]
+fn a_run_is_paused_stepped_and_its_bodies_followed() {
+    let Some(program) = browser::find() else { return };
+    let served = serve("world.toml --steps 100000");
+    let mut browser = show(&program, &served);
+    browser.press(" ");
+    browser.wait_for("document.getElementById('play').textContent === 'Play'");
+    let mut last = step(&mut browser);
+    // It stands still once what was on the way is there.
+    loop {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        let now = step(&mut browser);
+        if now == last {
+            break;
+        }
+        last = now;
+    }
+    for _ in 0..2 {
+        browser.press("ArrowRight");
+        last += 1;
+        browser.wait_for(&format!("atoll.state.step === {last}"));
+    }
+    // The same bits, recorded.
+    let ended = program::run(program::command().current_dir(DESK.path()).args([
+        "run",
+        "world.toml",
+        "--quiet",
+        "--overwrite",
+        "--out",
+        "c",
+        "--record-every",
+        &last.to_string(),
+        "--steps",
+        &last.to_string(),
+    ]));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_alike(drawn(&mut browser, "c", last, "kind"));
+    let rows = rows("c", last);
+    let row = lonely(&rows);
+    assert_eq!(pick(&mut browser, row), row.id.to_string());
+    browser.screenshot("live");
+    browser.evaluate("document.getElementById('follow').click()");
+    browser.press(" ");
+    browser.wait_for(&format!("atoll.state.step > {}", last + 5));
+    browser.press(" ");
+    browser.wait_for("document.getElementById('play').textContent === 'Play'");
+    browser.wait_for(
+        "Math.hypot(atoll.state.camera.x - atoll.state.marked[0], atoll.state.camera.y - atoll.state.marked[1]) < 1e-6",
+    );
+    for (key, color) in [("6", "contacts"), ("7", "state"), ("5", "rank"), ("4", "tile"), ("3", "spin")] {
+        browser.press(key);
+        browser.wait_for(&format!("atoll.state.legend.includes('{color}')"));
+    }
+    browser.wait_for("document.querySelectorAll('.strip').length === 2");
+    browser.press("f");
+    browser.screenshot("live_followed");
+    assert_well(&browser, &served);
+    served.interrupt();
+    let ended = served.end();
+    assert_eq!(ended.code, Some(130), "{ended}");
+    browser.wait_for("document.getElementById('message').textContent.startsWith('The run is over')");
+}
+
+#[test]
+fn two_recordings_are_side_by_side_and_where_they_part_is_marked() {
+    let Some(program) = browser::find() else { return };
+    let compared = program::diff(&folder("a"), &folder("b"), &["--json", folder("d.json").to_str().unwrap()]);
+    assert_eq!(compared.code, Some(1), "{compared}");
+    let first = program::summary(&folder("d.json"))["first_difference"]["step"].as_u64().unwrap();
+    let served = serve("a b");
+    let mut browser = show(&program, &served);
+    browser.wait_for("!document.getElementById('difference').disabled");
+    browser.press("n");
+    browser.wait_for(&format!("atoll.state.step === {first}"));
+    assert_eq!(browser.evaluate("document.getElementById('clock').classList.contains('difference')"), json!(true));
+    let steps = browser.evaluate("[...atoll.pixels()].every((count) => count > 500)");
+    assert_eq!(steps, json!(true));
+    browser.press("ArrowLeft");
+    browser.wait_for("!document.getElementById('clock').classList.contains('difference')");
+    browser.screenshot("two");
+    // In the right one.
+    let rows = rows("b", first - 2);
+    let row = lonely(&rows);
+    let [x, y] = place(&mut browser, row.x, row.y);
+    let quarter = number(&mut browser, "document.getElementById('canvas').clientWidth / 4");
+    browser.click([x + quarter, y]);
+    browser.wait_for("atoll.state.body !== null && atoll.state.body.source === 1");
+    assert_eq!(browser.evaluate("atoll.state.body.id"), json!(row.id.to_string()));
+    assert_well(&browser, &served);
+}
+
+fn folder(name: &str) -> PathBuf {
+    DESK.path().join(name)
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_in_one_line() {
+    for (line, expected) in [
+        ("a --ranks 2", "--ranks: what is recorded stays as it is; name a configuration to run it anew"),
+        ("a --tiles 2x2", "--tiles: what is recorded stays as it is; name a configuration to run it anew"),
+        ("a world.toml", "world.toml: two sources are folders of runs that were recorded; name two of these"),
+        ("nowhere.toml", "nowhere.toml"),
+        (".", "holds no recording"),
+        ("a --bind 192.0.2.1", "--bind 192.0.2.1: "),
+        ("a b c", "see atoll view --help"),
+        ("", "the following required arguments were not provided"),
+    ] {
+        let ended = program::run(program::command().current_dir(DESK.path()).arg("view").args(line.split_whitespace()));
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{line}: {ended}");
+        assert!(ended.stderr.contains(expected), "{line}: {ended}");
+    }
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    for verb in ["view", "run"] {
+        let view = if verb == "run" { "--view" } else { "--ranks=1" };
+        let mut command = program::command();
+        let ended = program::run(command.current_dir(DESK.path()).args([verb, "world.toml", view, "--port", &port]));
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+        assert!(ended.stderr.contains(&format!("--port {port}: Address already in use")), "{ended}");
+    }
+}

@@ -1,0 +1,101 @@
+//! A run that is looked at is the run that is not.
+
+use atoll_tests::page::{Page, Served};
+use atoll_tests::program::{self, run_to_summary};
+use atoll_tests::ways::Way;
+use serde_json::{Value, json};
+use std::net::TcpListener;
+use std::time::Duration;
+use tempfile::tempdir;
+
+/// So many that a page is there before they are made.
+const STEPS: u32 = if cfg!(debug_assertions) { 120 } else { 2400 };
+
+/// A run of so many steps.
+fn small(steps: u32) -> Vec<String> {
+    format!("--bodies 3000 --tiles 4x4 --steps {steps}").split(' ').map(str::to_owned).collect()
+}
+
+fn hashes(summary: &Value) -> [&Value; 3] {
+    ["state_hash", "contact_hash", "steps"].map(|key| &summary[key])
+}
+
+pub(crate) fn domain(hello: &Value) -> [f64; 4] {
+    let domain = &hello["sources"][0]["domain"];
+    [0, 1, 2, 3].map(|i| domain[i].as_f64().unwrap())
+}
+
+#[test]
+fn a_run_under_the_eyes_of_a_restless_page_comes_to_the_same_hashes() {
+    let folder = tempdir().unwrap();
+    let config = "configs/quickstart.toml";
+    let alone = run_to_summary(Way::Channel.command(2, config).args(small(STEPS)), &folder.path().join("alone.json"));
+    for way in Way::all() {
+        let ranks = if way == Way::Local { 1 } else { 2 };
+        let json = folder.path().join("watched.json");
+        let mut command = way.command(ranks, config);
+        let served = Served::start(command.args(small(STEPS)).args(["--view", "--json"]).arg(&json));
+        let mut page = Page::open(&served);
+        let hello = page.hello();
+        assert_eq!((&hello["recorded"], &hello["last_step"]), (&json!(false), &json!(STEPS)), "{way}");
+        page.fidget(domain(&hello), Duration::from_secs(60));
+        let ended = served.end();
+        assert_eq!(ended.code, Some(0), "{way}: {ended}");
+        assert!(page.frames > 5, "{way}: {} frames", page.frames);
+        let watched = program::summary(&json);
+        assert_eq!(hashes(&watched), hashes(&alone), "{way}");
+        // What is sent for the page is not what steps send.
+        if way == Way::Channel {
+            assert_eq!(watched["bytes_sent"], alone["bytes_sent"]);
+        }
+    }
+}
+
+#[test]
+fn what_is_viewed_waits_for_the_first_page_and_stays_until_it_is_interrupted() {
+    let served =
+        Served::start(program::command().args(["view", "configs/quickstart.toml", "--ranks", "2"]).args(small(120)));
+    std::thread::sleep(Duration::from_millis(300));
+    let mut page = Page::open(&served);
+    let hello = page.hello();
+    page.look(domain(&hello), [320, 240], "kind");
+    assert_eq!(page.frame().unwrap().0, 0, "it begins when somebody looks");
+    while page.frame().unwrap().0 < 120 {}
+    // One who comes late sees the end.
+    let mut late = Page::open(&served);
+    late.look(domain(&hello), [320, 240], "speed");
+    assert_eq!(late.frame().unwrap().0, 120);
+    let address = served.address().to_owned();
+    served.interrupt();
+    let ended = served.end();
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert!(ended.stdout.contains("120 steps in "), "{ended}");
+    assert_eq!(page.frame(), None);
+    TcpListener::bind(address).expect("the port is free again");
+}
+
+#[test]
+fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
+    let folder = tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = program::command();
+    command
+        .args(["run", "configs/quickstart.toml", "--ranks", "2", "--view", "--checkpoint-every", "1000", "--out"])
+        .arg(&out);
+    let served = Served::start(command.args(small(4_000_000_000)));
+    let mut page = Page::open(&served);
+    let hello = page.hello();
+    page.wish(&json!({ "do": "pause" }));
+    page.look(domain(&hello), [320, 240], "kind");
+    let (step, _) = page.frame().unwrap();
+    page.wish(&json!({ "do": "step", "by": 3 }));
+    while page.frame().unwrap().0 < step + 3 {}
+    served.interrupt();
+    let ended = served.end();
+    assert_eq!(ended.code, Some(130), "{ended}");
+    let summary = program::summary(&out.join("summary.json"));
+    // The step under way when it was asked to stop.
+    assert!((step + 3..=step + 5).contains(&(summary["steps"].as_u64().unwrap() as u32)), "{step} {summary:#}");
+    let resumed = program::run(program::command().args(["run", "--steps", "60", "--resume"]).arg(&out));
+    assert_eq!(resumed.code, Some(0), "{resumed}");
+}
