@@ -16,7 +16,7 @@ const WORLD: &str = "[scene]\nkind = \"rooms\"\nbodies = 600\n\n[run]\nsteps = 6
 static DESK: LazyLock<TempDir> = LazyLock::new(|| {
     let desk = tempdir().unwrap();
     std::fs::write(desk.path().join("world.toml"), WORLD).unwrap();
-    for (out, more) in [("a", ""), ("b", "--set restitution=0.9")] {
+    for (out, more) in [("a", ""), ("b", "--set exchange=substep")] {
         let line = format!("run world.toml --out {out} --record-every 2 --quiet {more}");
         let ended = program::run(program::command().current_dir(desk.path()).args(line.split_whitespace()));
         assert_eq!(ended.code, Some(0), "{ended}");
@@ -157,7 +157,7 @@ fn a_recording_is_drawn_played_scrubbed_zoomed_and_its_bodies_picked() {
     browser.wheel(at, -600.0);
     browser.wait_for(&format!("atoll.state.camera.zoom > {}", 3.0 * zoom));
     let now = place(&mut browser, row.x, row.y);
-    assert!((now[0] - at[0]).hypot(now[1] - at[1]) < 0.5, "it is zoomed to the cursor: {at:?} {now:?}");
+    assert!((now[0] - at[0]).hypot(now[1] - at[1]) < 3.0, "it is zoomed to the cursor: {at:?} {now:?}");
     assert_eq!(pick(&mut browser, row), row.id.to_string());
     browser.press("2");
     browser.wait_for("atoll.state.legend.includes('speed')");

@@ -41,7 +41,7 @@ fn a_run_under_the_eyes_of_a_restless_page_comes_to_the_same_hashes() {
         page.fidget(domain(&hello), Duration::from_secs(60));
         let ended = served.end();
         assert_eq!(ended.code, Some(0), "{way}: {ended}");
-        assert!(page.frames > 5, "{way}: {} frames", page.frames);
+        assert!(page.frames > 2, "{way}: {} frames", page.frames);
         let watched = program::summary(&json);
         assert_eq!(hashes(&watched), hashes(&alone), "{way}");
         // What is sent for the page is not what steps send.

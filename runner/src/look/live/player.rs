@@ -131,7 +131,8 @@ impl Player {
             let index = (self.index() as i64).saturating_add(pace.by).clamp(0, last as i64) as usize;
             self.time = self.steps[index] as f64;
         }
-        if !pace.playing || !self.desk.is_wanted() {
+        // Nobody is to miss the beginning.
+        if !pace.playing || !self.desk.is_wanted() || self.shown.is_none() {
             return None;
         }
         let hertz = self.tracks[0].recorded.setting().hertz;

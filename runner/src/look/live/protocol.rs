@@ -177,6 +177,8 @@ pub(crate) struct Source {
 pub(crate) struct PickedBody {
     /// In which of the worlds it is.
     pub source: u32,
+    /// Where it is, in m.
+    pub at: [f64; 2],
     /// Its name, as text: not every number of 64 bits is one in a page.
     pub id: String,
     /// Names and values.

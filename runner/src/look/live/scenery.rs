@@ -4,7 +4,7 @@ use super::protocol::{Hello, PickedBody, Source};
 use super::question::Found;
 use crate::look::frame::Setting;
 use crate::look::live::figures::digits;
-use crate::look::picture::{ColorBy, Layers, Legend, Range, STATIC, Sign, Tint};
+use crate::look::picture::{ColorBy, Layers, Legend, Range, STATIC, Sign, Tint, short};
 use atoll_core::Shape;
 use serde_json::{Value, json};
 
@@ -64,11 +64,10 @@ pub(super) fn legend(by: ColorBy, setting: &Setting, ranks: u32, range: Range) -
 
 /// What a page is told of a body.
 pub(super) fn picked(found: &Found, source: u32, setting: &Setting, rank: u32, is_live: bool) -> PickedBody {
+    let meters = |half: f32| short(2.0 * f64::from(half));
     let shape = setting.kinds.get(found.kind as usize).map(|kind| match kind.shape {
-        Shape::Circle { radius } => format!("circle, {} m wide", digits(2.0 * f64::from(radius))),
-        Shape::Box { half } => {
-            format!("box, {} × {} m", digits(2.0 * f64::from(half.x)), digits(2.0 * f64::from(half.y)))
-        }
+        Shape::Circle { radius } => format!("circle, {} m", meters(radius)),
+        Shape::Box { half } => format!("box, {} × {} m", meters(half.x), meters(half.y)),
     });
     let [x, y] = found.place;
     let [vx, vy] = found.velocity.map(f64::from);
@@ -87,5 +86,5 @@ pub(super) fn picked(found: &Found, source: u32, setting: &Setting, rank: u32, i
         figures.extend(state.map(|state| ("state", (*state).to_owned())));
     }
     figures.extend([("tile", found.tile.to_string()), ("rank", rank.to_string())]);
-    PickedBody { source, id: found.id.to_string(), figures }
+    PickedBody { source, at: found.place, id: found.id.to_string(), figures }
 }

@@ -208,7 +208,10 @@ fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
         let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         match request.parse(&bytes) {
-            Ok(httparse::Status::Complete(_)) => return Ok(understand(&request)),
+            // Nobody may say more before there is an answer.
+            Ok(httparse::Status::Complete(length)) => {
+                return Ok(understand(&request).filter(|_| length == bytes.len()));
+            }
             Ok(httparse::Status::Partial) => {}
             Err(_) => return Ok(None),
         }

@@ -97,7 +97,7 @@ fn shape(number: u32, shape: &Shape) -> (Sign, String) {
 }
 
 /// A number with as few digits as it takes, up to four behind the point.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

@@ -16,7 +16,7 @@ mod view;
 pub(crate) use bodies::DRAWN;
 pub(crate) use canvas::{Field, Image, Rgb, Tone};
 pub(crate) use colors::STATIC;
-pub(crate) use legend::{Legend, Sign, grouped};
+pub(crate) use legend::{Legend, Sign, grouped, short};
 pub(crate) use paint::{ColorBy, Range, Tint};
 pub(crate) use view::{View, whole_view};
 

@@ -118,7 +118,7 @@ function show(frame) {
   if (state.following && frame.followed && frame.source === state.body?.source) {
     [state.camera.x, state.camera.y] = frame.followed;
   }
-  if (frame.source === (state.body?.source ?? 0)) state.marked = frame.followed;
+  if (frame.followed) state.marked = frame.followed;
   legend(frame.legend);
   say("");
   clock();
@@ -171,6 +171,7 @@ function body({ body }) {
     state.following = false;
     state.marked = null;
   } else {
+    state.marked = body.at;
     at("body-id").textContent = body.id;
     list(at("body-figures"), body.figures);
   }
