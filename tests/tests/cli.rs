@@ -345,13 +345,14 @@ fn the_summary_has_all_its_keys() {
         };
         value.as_object().is_some_and(|phases| !phases.is_empty() && phases.values().all(times))
     };
-    let keys: [(&str, Holds); 31] = [
+    let keys: [(&str, Holds); 32] = [
         ("bodies", &|value| *value == 400),
         ("steps", &|value| *value == 5),
         ("ranks", &|value| *value == 2),
         ("threads", &|value| *value == 2),
         ("tiles", &|value| *value == serde_json::json!([3, 3])),
         ("transport", &|value| *value == "channel"),
+        ("machine", &|value| value.as_str().is_some_and(|machine| machine.contains(std::env::consts::ARCH))),
         ("wall_s", &positive),
         ("ms_per_step", &positive),
         ("state_hash", &hash),

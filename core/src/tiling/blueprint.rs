@@ -24,6 +24,16 @@ pub struct Blueprint {
     pub statics: Vec<StaticBody>,
 }
 
+impl Blueprint {
+    /// Whether worlds can be made of it; takes memory for its kinds and statics alone, however many tiles there are.
+    ///
+    /// # Errors
+    /// If a parameter, a kind or a static is out of range.
+    pub fn check(&self) -> Result<(), SetupError> {
+        Setup::new(self).map(drop)
+    }
+}
+
 /// The largest bounding radius of a dynamic body, in meters.
 pub(crate) fn largest_radius(kinds: &[Kind]) -> f32 {
     kinds.iter().map(|kind| kind.shape.bounding_radius()).fold(0.0, |most, radius| math::max(radius, most))

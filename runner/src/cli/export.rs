@@ -5,6 +5,7 @@ use super::output::{self, Kept};
 use super::progress::{Progress, Show};
 use crate::error::{Exit, RunError};
 use crate::look::recorded::Recorded;
+use crate::look::source::records;
 use crate::look::vtk;
 use std::io::{self, IsTerminal};
 
@@ -14,11 +15,12 @@ use std::io::{self, IsTerminal};
 /// If there is no recording to read, or it cannot be written.
 pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     let recorded = Recorded::open(&args.run)?;
+    let shown = records(&recorded, args.every)?;
     Kept { runs: vec![&args.run], configuration: None }.check([("--vtk", Some(args.vtk.as_path()))])?;
     // On a terminal only: a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;
-    let exported = vtk::export(&recorded, &args.vtk, args.every.get() as usize, |done, of| {
+    let exported = vtk::export(&recorded, &args.vtk, shown, |done, of| {
         progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
     });
     if let Some(progress) = progress {
@@ -26,8 +28,9 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     }
     let vtk::Written { collection, steps, bodies, bytes } = exported?;
     let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
+    let records = if steps.len() == 1 { "record" } else { "records" };
     output::show(&format!(
-        "{} records of {bodies} bodies, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
+        "{} {records} of {bodies} bodies, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
         steps.len(),
         recorded.setting().statics.len(),
         bytes as f64 * 1e-6,

@@ -11,7 +11,7 @@ use crate::look::film::{Film, FilmKind, remove_unfinished};
 use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
 use crate::look::recorded::Recorded;
-use crate::look::source::{End, Live, Shown, show_recorded};
+use crate::look::source::{End, Live, Shown, records, show_recorded, what_is_recorded};
 use crate::plan::Plan;
 use crate::rank::{Listener, Observer};
 use atoll_core::GlobalId;
@@ -157,34 +157,43 @@ impl Source {
 
     /// The steps to show.
     fn shown(&self, args: &RenderArgs, kind: FilmKind) -> Result<Shown, RunError> {
-        let (last, between, every) = match self {
-            Self::Recorded(recorded) => {
-                let (recording, every) = (recorded.recording(), recorded.recording().facts().record_every);
-                (recording.steps().last().copied().unwrap_or_default(), every, every)
-            }
+        if !kind.is_film() {
+            return self.step(args.step).map(Shown::only);
+        }
+        match self {
+            Self::Recorded(recorded) => records(recorded, args.every),
             Self::Live(live) => {
                 let real_time = live.setting().hertz / f64::from(args.fps.unwrap_or(FPS));
-                (live.plan().config.run.steps, 1, real_time.round().max(1.0) as u64)
+                let every = args.every.unwrap_or(real_time.round().max(1.0) as u64);
+                let last = live.plan().config.run.steps;
+                Ok(Shown { first: 0, every, last: last - last % every })
             }
-        };
-        let recorded = format!("what is recorded is every {between} steps, up to {last}");
-        if !kind.is_film() {
-            return match (args.step.unwrap_or(last), self) {
-                (step, Self::Recorded(_)) if step > last || !step.is_multiple_of(between) => {
-                    Err(unsuitable(format!("--step {step}"), format!("{recorded}; give one of these")))
-                }
-                (step, Self::Live(_)) if step > last => {
-                    let reason = format!("the run makes {last} steps; give --steps {step} as well");
-                    Err(unsuitable(format!("--step {step}"), reason))
-                }
-                (step, _) => Ok(Shown::only(step)),
-            };
         }
-        let every = args.every.unwrap_or(every);
-        if !every.is_multiple_of(between) {
-            return Err(unsuitable(format!("--every {every}"), format!("{recorded}; give a multiple of {between}")));
+    }
+
+    /// The step to show in a single picture.
+    fn step(&self, asked: Option<u64>) -> Result<u64, RunError> {
+        let refused = |step, reason| Err(unsuitable(format!("--step {step}"), reason));
+        match self {
+            Self::Recorded(recorded) => {
+                let steps = recorded.recording().steps();
+                match asked {
+                    Some(step) if steps.binary_search(&step).is_err() => {
+                        refused(step, format!("{}; give one of these", what_is_recorded(recorded)))
+                    }
+                    _ => Ok(asked.or(steps.last().copied()).unwrap_or_default()),
+                }
+            }
+            Self::Live(live) => {
+                let last = live.plan().config.run.steps;
+                match asked {
+                    Some(step) if step > last => {
+                        refused(step, format!("the run makes {last} steps; give --steps {step} as well"))
+                    }
+                    _ => Ok(asked.unwrap_or(last)),
+                }
+            }
         }
-        Ok(Shown { first: 0, every, last: last - last % every })
     }
 
     /// Whether there is a body to follow.

@@ -13,7 +13,7 @@ use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
-use atoll_core::{Blueprint, TileGrid, World};
+use atoll_core::{Blueprint, TileGrid};
 use std::path::PathBuf;
 
 /// A configuration, checked and resolved.
@@ -162,8 +162,7 @@ impl Plan {
         let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
         let params = config.params.clone();
         let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
-        // An empty world costs nothing and checks the blueprint for all of them.
-        World::new(&blueprint, &[])?;
+        blueprint.check()?;
         memory::check(&blueprint, scene.bodies(), config, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;

@@ -1,5 +1,6 @@
 //! What became of a run: the figures of all ranks joined. Its fields are the JSON file; [`table`] is for people.
 
+mod machine;
 mod table;
 pub(crate) mod timings;
 pub(crate) mod trace;
@@ -51,6 +52,8 @@ pub struct Summary {
     pub tiles: [u32; 2],
     /// What carried bytes between ranks.
     pub transport: &'static str,
+    /// The machine of rank 0, in words.
+    pub machine: String,
     /// Until the first step, in seconds.
     pub build_s: f64,
     /// All steps, in seconds.
@@ -142,6 +145,7 @@ impl Summary {
             threads,
             tiles: plan.tiles,
             transport: plan.transport.name(),
+            machine: machine::words(),
             build_s: all.build_nanos as f64 * 1e-9,
             wall_s,
             ms_per_step: wall_s * 1e3 / made.max(1) as f64,

@@ -64,7 +64,7 @@ fn segment(random: &mut SplitMix64, genuine: &[u8]) -> Vec<u8> {
 
 /// Puts other digits into what a footer says in words, which is read only if all around is as it was.
 fn rewrite(random: &mut SplitMix64, footer: &mut [u8]) {
-    let names: [&[u8]; 8] = [
+    let names: [&[u8]; 9] = [
         b"atoll.steps",
         b"atoll.rank",
         b"atoll.ranks",
@@ -72,6 +72,7 @@ fn rewrite(random: &mut SplitMix64, footer: &mut [u8]) {
         b"atoll.seed",
         b"\"box\":",
         b"\"circle\":",
+        b"\"restitution\":",
         b"\"ids\":",
     ];
     let name = one_of(random, &names);

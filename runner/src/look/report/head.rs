@@ -141,7 +141,7 @@ fn facts(sources: &[Source]) -> String {
     fn whole(source: &Source, key: &str) -> Option<String> {
         source.number(key).map(|number| Whole(number as u64).to_string())
     }
-    let rows: [(&str, Fact); 19] = [
+    let rows: [(&str, Fact); 20] = [
         ("Scene", |source| Some(source.config.scene.kind.name().to_owned())),
         ("Seed", |source| Some(source.config.scene.seed.to_string())),
         ("Bodies", |source| Some(Whole(source.config.scene.bodies).to_string())),
@@ -156,6 +156,7 @@ fn facts(sources: &[Source]) -> String {
             let transport = source.word("transport").unwrap_or(source.config.transport().name());
             Some(format!("{ranks} ({}), {threads} each", Text(transport)))
         }),
+        ("Machine", |source| Some(Text(source.word("machine")?).to_string())),
         ("Went on after step", |source| whole(source, "resumed_at").filter(|step| step != "0")),
         ("Version", |source| Some(Text(source.word("version")?).to_string())),
         ("Bodies lost, escaped", |source| {

@@ -37,7 +37,7 @@ const CHARTS: [Chart; 8] = [
         "overlap",
         "Overlap",
         "m",
-        "How deep bodies lie in each other where they overlap.",
+        "How deep bodies lay in each other, as the step found them; closing figures are measured anew.",
         Scale::FromZero,
         &[("max_overlap", "most", "s5"), ("mean_overlap", "mean", "s0")],
     ),

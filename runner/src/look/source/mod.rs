@@ -7,7 +7,7 @@ mod recorded;
 mod tests;
 
 pub(crate) use live::Live;
-pub(crate) use recorded::show_recorded;
+pub(crate) use recorded::{records, show_recorded, what_is_recorded};
 
 use super::frame::Frame;
 use crate::error::RunError;

@@ -9,6 +9,30 @@ use atoll_transport::Rank;
 use std::sync::mpsc;
 use std::thread;
 
+/// Records that are so many steps apart from the first to the last that is complete; by default all of them.
+///
+/// # Errors
+/// If not all of them were recorded.
+pub(crate) fn records(recorded: &Recorded, every: Option<u64>) -> Result<Shown, RunError> {
+    let (recording, between) = (recorded.recording(), recorded.recording().facts().record_every);
+    let last = recording.steps().last().copied().unwrap_or_default();
+    let every = every.unwrap_or(between);
+    if every == 0 || !every.is_multiple_of(between) {
+        let reason = format!("{}; give a multiple of {between}", what_is_recorded(recorded));
+        return Err(RunError::Unsuitable { option: format!("--every {every}"), reason });
+    }
+    Ok(Shown { first: 0, every, last: last - last % every })
+}
+
+/// The steps that can be shown, as a reason why others cannot.
+pub(crate) fn what_is_recorded(recorded: &Recorded) -> String {
+    let (recording, between) = (recorded.recording(), recorded.recording().facts().record_every);
+    format!(
+        "what is recorded is every {between} steps, up to {}",
+        recording.steps().last().copied().unwrap_or_default()
+    )
+}
+
 /// Lets `show` see these records, all of which must be there, until somebody asks to `stop`.
 ///
 /// # Errors

@@ -19,6 +19,7 @@ mod tests;
 
 use super::frame::{Frame, Setting};
 use super::recorded::Recorded;
+use super::source::Shown;
 use crate::error::RunError;
 use cells::{write_bodies, write_statics};
 use std::fmt::Write as _;
@@ -45,7 +46,7 @@ pub(crate) struct Written {
     pub bytes: u64,
 }
 
-/// Writes one of every so many records to a folder, which must be new or empty. Of records there is never more than one in
+/// Writes these records, all of which must be there, to a folder, which must be new or empty. Of records there is never more than one in
 /// memory. `written` is told how many are done, and of how many.
 ///
 /// # Errors
@@ -53,13 +54,13 @@ pub(crate) struct Written {
 pub(crate) fn export(
     recorded: &Recorded,
     out: &Path,
-    every: usize,
+    shown: Shown,
     mut written: impl FnMut(usize, usize),
 ) -> Result<Written, RunError> {
     let mut target = Target::new(out)?;
     let setting = recorded.setting();
     target.write(STATICS, |file| write_statics(setting, file))?;
-    let steps: Vec<u64> = recorded.recording().steps().iter().copied().step_by(every).collect();
+    let steps: Vec<u64> = shown.steps().collect();
     let mut frame = Frame::default();
     for (done, &step) in (1..).zip(&steps) {
         recorded.read(step, &mut frame)?;

@@ -1,5 +1,6 @@
 use super::*;
 use crate::folder::recording::testing::{bodies, facts, record, stage};
+use crate::look::source::records;
 use atoll_core::Shape;
 use glam::DVec2;
 use std::fs;
@@ -52,7 +53,8 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
     let (folder, recorded) = recorded();
     let out = folder.path().join("new/out");
     let mut told = Vec::new();
-    let written = export(&recorded, &out, 2, |done, of| told.push((done, of))).unwrap();
+    let written =
+        export(&recorded, &out, records(&recorded, Some(10)).unwrap(), |done, of| told.push((done, of))).unwrap();
     assert_eq!((written.steps.as_slice(), written.bodies, told), (&[0, 10][..], 20, vec![(1, 2), (2, 2)]));
     assert_eq!(written.collection, out.join("run.pvd"));
     let steps = ["bodies-0000000000", "bodies-0000000000.pvtu", "bodies-0000000010", "bodies-0000000010.pvtu"];
@@ -121,7 +123,7 @@ fn what_fails_leaves_nothing() {
     let full = folder.path().join("full");
     fs::create_dir(&full).unwrap();
     fs::write(full.join("thesis.tex"), "").unwrap();
-    let told = |out: &Path| export(&recorded, out, 1, |_, _| {}).unwrap_err();
+    let told = |out: &Path| export(&recorded, out, records(&recorded, None).unwrap(), |_, _| {}).unwrap_err();
     let error = told(&full);
     assert!(error.to_string().ends_with("full: it is not empty; name a new folder"), "{error}");
     let error = told(&full.join("thesis.tex"));
