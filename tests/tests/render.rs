@@ -164,7 +164,7 @@ fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
     }
     refused(&WORLD, "a.png", &["--step", "13"], "--step 13: the run makes 12 steps; give --steps 13 as well");
     refused(&WORLD, "a.png", &["--follow", "99999"], "--follow 99999: there is no body of that name");
-    refused(&WORLD, "a.png", &["--view", "0,0,0,5"], "must be X0,Y0,X1,Y1 in m, finite");
+    refused(&WORLD, "a.png", &["--view", "0,0,0,5"], "must be X0,Y0,X1,Y1 in m, X0 less than X1");
     refused(&WORLD, "a.png", &["--ranks", "0"], "--ranks");
 
     let segment = everything_in(&run).into_iter().find(|path| path.extension().is_some_and(|end| end == "parquet"));

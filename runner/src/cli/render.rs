@@ -216,8 +216,8 @@ impl Source {
 
 /// The part of the world that a frame shows.
 fn view(args: &RenderArgs, setting: &Setting, frame: &Frame) -> Result<View, RunError> {
-    if let Some([low, high]) = args.view {
-        return Ok(View { low, high });
+    if let Some(view) = args.view {
+        return Ok(view);
     }
     let Some(id) = args.follow else { return Ok(whole_view(setting)) };
     let body = frame.bodies.iter().find(|body| body.id == id).ok_or_else(|| {

@@ -1,10 +1,9 @@
 //! Options of `atoll render`.
 
 use super::values::ValueArgs;
-use crate::look::picture::ColorBy;
+use crate::look::picture::{ColorBy, View};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use glam::DVec2;
 use std::path::PathBuf;
 
 /// What colors may tell.
@@ -40,7 +39,7 @@ pub struct RenderArgs {
     pub(crate) size: [u32; 2],
     /// The part of the world to show: its low and its high corner, in m [default: all of it].
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = view, allow_hyphen_values = true, conflicts_with = "follow")]
-    pub(crate) view: Option<[DVec2; 2]>,
+    pub(crate) view: Option<View>,
     /// Keep the body of that name in the middle.
     #[arg(long, value_name = "ID")]
     pub follow: Option<u64>,
@@ -89,18 +88,17 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     })
 }
 
-fn view(text: &str) -> Result<[DVec2; 2], &'static str> {
+fn view(text: &str) -> Result<View, &'static str> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    let corners = match numbers.as_deref() {
-        Some(&[x0, y0, x1, y1]) => Some([DVec2::new(x0, y0), DVec2::new(x1, y1)]),
-        _ => None,
-    };
+    let view = numbers.and_then(|numbers| <[f64; 4]>::try_from(numbers).ok()).map(View::from);
     // Wide enough that numbers tell its pixels apart.
-    let has_area = |[low, high]: &[DVec2; 2]| {
-        let (size, far) = (*high - *low, low.abs().max(high.abs()));
-        size.is_finite() && size.cmpgt(far * 1e-9).all()
+    let is_told_apart = |view: &View| {
+        let (size, far) = (view.high - view.low, view.low.abs().max(view.high.abs()));
+        size.cmpgt(far * 1e-9).all()
     };
-    corners.filter(has_area).ok_or("must be X0,Y0,X1,Y1 in m, finite, X0 less than X1 and Y0 less than Y1")
+    view.filter(View::is_sound)
+        .filter(is_told_apart)
+        .ok_or("must be X0,Y0,X1,Y1 in m, X0 less than X1 and Y0 less than Y1, each side from 1e-6 to 1e13 m")
 }
 
 fn width(text: &str) -> Result<f64, &'static str> {
@@ -128,7 +126,7 @@ mod tests {
         assert_eq!((args.size, args.color, args.step, args.fps), ([1280, 720], ColorBy::Kind, None, None));
         let args = parse("c.toml --out a --size 16x16384 --view -5,-1e3,5,2 --color asleep --tiles --ranks 2").unwrap();
         assert_eq!((args.size, args.color, args.tiles), ([16, 16384], ColorBy::Asleep, true));
-        assert_eq!(args.view, Some([DVec2::new(-5.0, -1000.0), DVec2::new(5.0, 2.0)]));
+        assert_eq!(args.view, Some(View::from([-5.0, -1000.0, 5.0, 2.0])));
         assert_eq!((args.values.first(), args.values.overrides().unwrap().len()), (Some("--ranks"), 1));
         let args = parse("c.toml --out a --follow 7 --width 0.5 --every 3 --fps 60").unwrap();
         assert_eq!((args.follow, args.width, args.every, args.fps), (Some(7), Some(0.5), Some(3), Some(60)));
@@ -137,7 +135,7 @@ mod tests {
     #[test]
     fn what_cannot_be_shown_is_refused_in_one_line() {
         let size = "write WxH, such as 1920x1080, each from 16 to 16384, and at most 67108864 pixels in all; see";
-        let view = "must be X0,Y0,X1,Y1 in m, finite, X0 less than X1 and Y0 less than Y1; see";
+        let view = "must be X0,Y0,X1,Y1 in m, X0 less than X1 and Y0 less than Y1, each side from 1e-6 to 1e13 m; see";
         for (options, expected) in [
             ("--size 0x720", size),
             ("--size 1280", size),
@@ -146,6 +144,7 @@ mod tests {
             ("--view 0,0,0,1", view),
             ("--view 1,0,0,1", view),
             ("--view 0,0,1", view),
+            ("--view 0,0,1e-320,1e-320", view),
             ("--view 0,0,inf,1", view),
             ("--view nan,0,1,1", view),
             ("--view 1e9,0,1000000000.001,1", view),

@@ -82,11 +82,9 @@ impl Wish {
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let wish = serde_json::from_str(text).ok()?;
         let sound = match &wish {
-            Self::Look { view: [x0, y0, x1, y1], size, .. } => {
-                let area = (x1 - x0) * (y1 - y0);
+            Self::Look { view, size, .. } => {
                 let pixels = |side: &u32| (1..=MOST_SIDE).contains(side);
-                let has_area = x0 < x1 && y0 < y1 && area.is_finite() && area > 0.0;
-                has_area && size.iter().all(pixels) && size[0] * size[1] <= MOST_PIXELS
+                View::from(*view).is_sound() && size.iter().all(pixels) && size[0] * size[1] <= MOST_PIXELS
             }
             Self::Speed { times } => (0.0..=1e6).contains(times),
             Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),

@@ -4,6 +4,7 @@ use crate::look::frame::Setting;
 use atoll_core::{Shape, StaticBody};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// What stands around the domain is shown for so much of the longer side of the domain, and no more.
 const AROUND: f64 = 0.03;
@@ -18,6 +19,17 @@ pub(crate) struct View {
     pub low: DVec2,
     /// Its high corner.
     pub high: DVec2,
+}
+
+/// Sides that a view can have, in m.
+const SIDES: RangeInclusive<f64> = 1e-6..=1e13;
+
+impl View {
+    /// Whether it is a rectangle, neither so small nor so large that its scale is no longer a number to calculate with.
+    pub(crate) fn is_sound(&self) -> bool {
+        let has_side = |low: f64, high: f64| low.abs() <= 1e15 && SIDES.contains(&(high - low));
+        has_side(self.low.x, self.high.x) && has_side(self.low.y, self.high.y)
+    }
 }
 
 impl From<[f64; 4]> for View {

@@ -311,7 +311,7 @@ function place({ offsetX, offsetY }) {
 function zoom(times, around) {
   const { camera } = state;
   // Nobody wants to see less than a micrometer or more than what doubles can tell apart.
-  const next = Math.min(1e9, Math.max(1e-9, camera.zoom * times));
+  const next = Math.min(1e6, Math.max(1e-6, camera.zoom * times));
   const [x, y] = around ?? [camera.x, camera.y];
   camera.x = x + (camera.x - x) * camera.zoom / next;
   camera.y = y + (camera.y - y) * camera.zoom / next;
