@@ -8,6 +8,11 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
+# Tests interrupt programs. What a shell starts in the background ignores that, and so would all that is started here.
+if [[ -z ${ATOLL_SIGNALS:-} ]] && env --default-signal=INT true 2>/dev/null; then
+    ATOLL_SIGNALS=heeded exec env --default-signal=HUP,INT,QUIT,TERM "$PWD/test.sh" "$@"
+fi
+
 left_out=()
 
 # Says what is done, does it, and says how long that took.
