@@ -4,6 +4,7 @@ use crate::program::LIMIT;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread;
@@ -61,6 +62,7 @@ impl Browser {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
+            .process_group(0)
             .spawn()
             .unwrap_or_else(|error| panic!("{}: {error}", program.display()));
         let mut lines = BufReader::new(child.stderr.take().expect("it is piped")).lines();
@@ -196,6 +198,9 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
+        // Debian's is a script that starts it, and each has processes of its own: all that are of its group.
+        let all = format!("kill -KILL -{}", self.child.id());
+        let _ = Command::new("sh").args(["-c", &all]).stderr(Stdio::null()).status();
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
