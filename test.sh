@@ -109,7 +109,7 @@ if [[ -n ${CI:-} ]]; then
 fi
 
 provide
-has_browser || leave_out 'the page of atoll report in a browser: no chromium-headless-shell'
+has_browser || leave_out 'the pages of atoll report and atoll view in a browser: no chromium-headless-shell'
 [[ -n ${ATOLL_PYTHON:-} ]] || step provide_python || leave_out 'the examples in Python: their packages cannot be had'
 features=()
 if has_libclang; then

@@ -60,7 +60,8 @@ pub fn atoll(profile: Profile) -> &'static Path {
 fn build(profile: Profile) -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.current_dir(root()).args(["build", "--package", "atoll", "--bin", "atoll"]);
+    // Of the workspace, as tests are: so what they are made of is compiled already.
+    command.current_dir(root()).args(["build", "--workspace", "--bin", "atoll"]);
     // Cargo itself tells where the program is, whatever configuration or environment say about that.
     command.args(["--quiet", "--message-format", "json-render-diagnostics"]);
     if profile == Profile::Release {
@@ -69,7 +70,7 @@ fn build(profile: Profile) -> PathBuf {
     for (feature, wanted) in [("iceoryx2", cfg!(feature = "iceoryx2")), ("mpi", cfg!(feature = "mpi"))] {
         // The other profile is there to be compared with, in one process.
         if wanted && profile == Profile::CURRENT {
-            command.args(["--features", feature]);
+            command.args(["--features", &format!("atoll-tests/{feature}")]);
         }
     }
     if let Some(folder) = target_folder() {
