@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, lints, documentation, tests in both build profiles, and, as it is compiled for speed, the
-# transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network namespaces; and results on
-# another architecture, aarch64. Stops at the first failure. Takes less than half an hour on two cores.
+# Checks everything: formatting, lints, documentation, tests in both build profiles (those of programs and files in one), and, as
+# it is compiled for speed, the transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network
+# namespaces; and results on another architecture, aarch64. Stops at the first failure. Takes less than half an hour on two cores.
 #
 # Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu, and packages of Python in target/python;
 # elsewhere it leaves out what it cannot check, and the end says so.
@@ -135,11 +135,14 @@ if ((${#features[@]})); then
     step_with clippy cargo clippy --workspace -- --deny warnings
 fi
 step env RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps ${features[@]+"${features[@]}"}
-# The program as Rust alone builds it, first: tests compare it with the one that has assertions.
-step cargo build --release
-step cargo test --workspace
-# Documentation has had its tests; what is compiled for speed is tested again, with every transport.
+# As it is compiled for speed, everything, with every transport.
 step cargo test --release --workspace --lib --bins --tests ${features[@]+"${features[@]}"}
+# With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates. What programs do
+# around that is the same in both profiles.
+calculates=(alternatives borders golden hostile invariance library physics reported sleep snapshots strategies)
+step env ATOLL_OTHER_PROGRAM="$(realpath "${CARGO_TARGET_DIR:-target}")/release/atoll" \
+    cargo test --workspace --lib "${calculates[@]/#/--test=}"
+step cargo test --workspace --doc
 
 # What threads and processes share, in every order in which they may meet (crew.rs, seat/loom.rs).
 step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/loom" \
