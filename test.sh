@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks everything: formatting, lints, documentation, tests in both build profiles (those of programs and files in one), and, as
 # it is compiled for speed, the transports whose ranks are processes, for real: iceoryx2, Open MPI, MPICH, and a cluster of network
-# namespaces; and results on another architecture, aarch64. Stops at the first failure. Takes less than half an hour on two cores.
+# namespaces; and results on another architecture, aarch64. Stops at the first failure. Takes about half an hour on two cores.
 #
 # Needs Rust. What else it needs it installs where it is root on Debian or Ubuntu, and packages of Python in target/python;
 # elsewhere it leaves out what it cannot check, and the end says so.
@@ -14,6 +14,7 @@ if [[ -z ${ATOLL_SIGNALS:-} ]] && env --default-signal=INT true 2>/dev/null; the
 fi
 
 left_out=()
+target="${CARGO_TARGET_DIR:-target}"
 
 # Says what is done, does it, and says how long that took.
 step() {
@@ -93,7 +94,7 @@ provide() {
 
 # A Python with what the examples in docs/recordings.md need, in an environment of its own, which is kept.
 provide_python() {
-    local folder="${CARGO_TARGET_DIR:-target}/python" requirements=tests/python-requirements.txt
+    local folder="$target/python" requirements=tests/python-requirements.txt
     if ! cmp -s "$requirements" "$folder/python-requirements.txt" || ! "$folder/bin/python" -c 'import duckdb'; then
         python3 -m venv --clear "$folder" &&
             "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$requirements" &&
@@ -140,20 +141,20 @@ step cargo test --release --workspace --lib --bins --tests ${features[@]+"${feat
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates. What programs do
 # around that is the same in both profiles.
 calculates=(alternatives borders golden hostile invariance library physics reported sleep snapshots strategies)
-step env ATOLL_OTHER_PROGRAM="$(realpath "${CARGO_TARGET_DIR:-target}")/release/atoll" \
+step env ATOLL_OTHER_PROGRAM="$(realpath "$target")/release/atoll" \
     cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 
 # What threads and processes share, in every order in which they may meet (crew.rs, seat/loom.rs).
-step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/loom" \
+step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="$target/loom" \
     cargo test --release -p atoll-core -p atoll-transport --lib loom
 
 if [[ ${features[*]} == *mpi* ]]; then
     if has mpicc.mpich; then
         # The same again over MPICH, in a folder of its own, as two MPIs cannot share what is built upon them; the rest is copied.
-        mpich="${CARGO_TARGET_DIR:-target}/mpich"
+        mpich="$target/mpich"
         if [[ ! -d $mpich ]]; then
-            mkdir "$mpich" && cp -a "${CARGO_TARGET_DIR:-target}/release" "$mpich"
+            mkdir "$mpich" && cp -a "$target/release" "$mpich"
             # By this file tests know where they were compiled (https://bford.info/cachedir/).
             printf 'Signature: 8a477f597d28d172789f06886806bc55\n' >"$mpich/CACHEDIR.TAG"
             # It would not notice that it is for another library.
@@ -164,7 +165,7 @@ if [[ ${features[*]} == *mpi* ]]; then
     else
         leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
     fi
-    step_unless_77 'the cluster' tests/cluster.sh "${CARGO_TARGET_DIR:-target}/release/atoll"
+    step_unless_77 'the cluster' tests/cluster.sh "$target/release/atoll"
 fi
 step_unless_77 aarch64 tests/aarch64.sh
 

@@ -154,10 +154,13 @@ fn a_recording_is_drawn_played_scrubbed_zoomed_and_its_bodies_picked() {
     let row = lonely(&rows);
     let at = place(&mut browser, row.x, row.y);
     let zoom = number(&mut browser, "atoll.state.camera.zoom");
-    browser.wheel(at, -600.0);
+    // A page knows of whole pixels.
+    let cursor = at.map(f64::round);
+    browser.wheel(cursor, -600.0);
     browser.wait_for(&format!("atoll.state.camera.zoom > {}", 3.0 * zoom));
-    let now = place(&mut browser, row.x, row.y);
-    assert!((now[0] - at[0]).hypot(now[1] - at[1]) < 3.0, "it is zoomed to the cursor: {at:?} {now:?}");
+    let (now, nearer) = (place(&mut browser, row.x, row.y), number(&mut browser, "atoll.state.camera.zoom") / zoom);
+    let then = [0, 1].map(|i| cursor[i] + nearer * (at[i] - cursor[i]));
+    assert!((now[0] - then[0]).hypot(now[1] - then[1]) < 0.5, "it is zoomed to the cursor: {then:?} {now:?}");
     assert_eq!(pick(&mut browser, row), row.id.to_string());
     browser.press("2");
     browser.wait_for("atoll.state.legend.includes('speed')");

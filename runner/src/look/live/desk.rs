@@ -163,8 +163,8 @@ impl Desk {
         *wishes += 1;
         let Some(page) = pages.get_mut(&page) else { return };
         match wish {
-            Wish::Look { view: [x0, y0, x1, y1], size, color } => {
-                page.gaze = Some(Gaze { view: [x0, y0, x1, y1].into(), size, color });
+            Wish::Look { view, size, color } => {
+                page.gaze = Some(Gaze { view, size, color });
                 page.moved = true;
             }
             Wish::Ack { frame } => page.free |= frame == page.given,
@@ -344,7 +344,7 @@ mod tests {
     const NOW: Duration = Duration::ZERO;
 
     fn look(x: f64) -> Wish {
-        Wish::Look { view: [x, 0.0, x + 1.0, 1.0], size: [4, 4], color: ColorBy::Kind }
+        Wish::Look { view: [x, 0.0, x + 1.0, 1.0].into(), size: [4, 4], color: ColorBy::Kind }
     }
 
     /// Long enough for the next frame.

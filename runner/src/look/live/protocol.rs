@@ -36,7 +36,7 @@ pub(crate) enum Wish {
     /// To see this from now on.
     Look {
         /// Low x, low y, high x, high y, in m.
-        view: [f64; 4],
+        view: View,
         /// Width and height in pixels.
         size: [u32; 2],
         /// What the colors tell.
@@ -84,7 +84,7 @@ impl Wish {
         let sound = match &wish {
             Self::Look { view, size, .. } => {
                 let pixels = |side: &u32| (1..=MOST_SIDE).contains(side);
-                View::from(*view).is_sound() && size.iter().all(pixels) && size[0] * size[1] <= MOST_PIXELS
+                view.is_sound() && size.iter().all(pixels) && size[0] * size[1] <= MOST_PIXELS
             }
             Self::Speed { times } => (0.0..=1e6).contains(times),
             Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),
@@ -232,12 +232,11 @@ impl Picture<'_> {
         let mut bytes = Vec::with_capacity(120 + self.legend.len() + padding + self.pixels.len() + 12 * bodies);
         let words = |bytes: &mut Vec<u8>, words: &[u32]| words.iter().for_each(|word| bytes.extend(word.to_le_bytes()));
         let doubles = |bytes: &mut Vec<u8>, of: &[f64]| of.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-        let corners = |view: &View| [view.low.x, view.low.y, view.high.x, view.high.y];
         words(&mut bytes, &[MAGIC, self.source, self.number, self.step as u32]);
         doubles(&mut bytes, &[self.time]);
-        doubles(&mut bytes, &corners(&self.rectangle));
+        doubles(&mut bytes, &<[f64; 4]>::from(self.rectangle));
         words(&mut bytes, &self.density.0);
-        doubles(&mut bytes, &corners(&self.density.1));
+        doubles(&mut bytes, &<[f64; 4]>::from(self.density.1));
         doubles(&mut bytes, &self.picked.unwrap_or(DVec2::NAN).to_array());
         words(&mut bytes, &[bodies as u32, (self.legend.len() + padding) as u32]);
         bytes.extend_from_slice(self.legend.as_bytes());
@@ -256,7 +255,7 @@ mod tests {
     fn wishes_that_make_no_sense_are_none() {
         let look = |view: &str, size: &str| format!(r#"{{"do":"look","view":{view},"size":{size},"color":"speed"}}"#);
         let wish = Wish::parse(&look("[0,-1,2.5,1]", "[640,480]")).unwrap();
-        assert_eq!(wish, Wish::Look { view: [0.0, -1.0, 2.5, 1.0], size: [640, 480], color: ColorBy::Speed });
+        assert_eq!(wish, Wish::Look { view: [0.0, -1.0, 2.5, 1.0].into(), size: [640, 480], color: ColorBy::Speed });
         assert_eq!(Wish::parse(r#"{"do":"step","by":-1}"#), Some(Wish::Step { by: -1 }));
         for text in [
             &look("[0,0,0,1]", "[640,480]"),

@@ -46,8 +46,8 @@ pub(crate) struct Written {
     pub bytes: u64,
 }
 
-/// Writes these records, all of which must be there, to a folder, which must be new or empty. Of records there is never more than one in
-/// memory. `written` is told how many are done, and of how many.
+/// Writes these records, all of which must be there, to a folder, which must be new or empty. Of records there is never more
+/// than one in memory. `written` is told how many are done, and of how many.
 ///
 /// # Errors
 /// If the folder cannot be had, a record cannot be read, or a file cannot be written. What was written is removed then.
