@@ -136,8 +136,8 @@ if ((${#features[@]})); then
     step_with clippy cargo clippy --workspace -- --deny warnings
 fi
 step env RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps ${features[@]+"${features[@]}"}
-# As it is compiled for speed, everything, with every transport.
-step cargo test --release --workspace --lib --bins --tests ${features[@]+"${features[@]}"}
+# As it is compiled for speed, everything, with every transport; of the runner what its program does, as the next says.
+step cargo test --release --workspace --exclude atoll --lib --bins --tests ${features[@]+"${features[@]}"}
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates. What programs do
 # around that is the same in both profiles.
 calculates=(alternatives borders golden hostile invariance library physics reported sleep snapshots strategies)
@@ -145,9 +145,8 @@ step env ATOLL_OTHER_PROGRAM="$(realpath "$target")/release/atoll" \
     cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 
-# What threads and processes share, in every order in which they may meet (crew.rs, seat/loom.rs).
-step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="$target/loom" \
-    cargo test --release -p atoll-core -p atoll-transport --lib loom
+# What threads and processes share, in every order in which they may meet (tests/loom).
+step env RUSTFLAGS='--cfg loom' CARGO_TARGET_DIR="$target/loom" cargo test --release -p atoll-loom
 
 if [[ ${features[*]} == *mpi* ]]; then
     if has mpicc.mpich; then

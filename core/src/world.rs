@@ -1,6 +1,6 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
-use crate::exchange::halo::Halo;
+use crate::exchange::halo::{Carry, NotCarried};
 use crate::exchange::mail::{Inbox, Mailbag, Outbox};
 use crate::exchange::verdict::Verdict;
 use crate::model::body::Body;
@@ -285,7 +285,7 @@ impl World {
     }
 
     /// One sync point. What all ranks together have to say comes back.
-    pub(crate) fn exchange<H: Halo>(&mut self, halo: &mut H) -> Result<Verdict, StepError<H::Error>> {
+    pub(crate) fn exchange(&mut self, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
         let _span = tracing::trace_span!("exchange", sync = self.sync).entered();
         let mut watch = Stopwatch::start();
         self.outbox.verdict = self.verdict;
@@ -296,7 +296,7 @@ impl World {
         }
         self.inbox.begin(self.step, self.sync);
         self.sync += 1;
-        halo.exchange(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
+        halo(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
         self.inbox.end(&mut self.outbox);
         watch.lap(Phase::Exchange, &mut self.timings);
         Ok(self.inbox.verdict)

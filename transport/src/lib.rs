@@ -91,7 +91,7 @@ pub mod mpi;
 mod origin;
 mod patience;
 mod rank;
-#[cfg(any(feature = "iceoryx2", all(loom, test)))]
+#[cfg(feature = "iceoryx2")]
 mod seat;
 mod stats;
 

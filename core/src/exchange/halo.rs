@@ -1,6 +1,7 @@
 //! The one thing physics asks of the outside.
 
 use super::mail::{Inbox, Outbox};
+use crate::model::error::StepError;
 use crate::model::id::TileId;
 use thiserror::Error;
 
@@ -15,6 +16,28 @@ pub trait Halo {
 
     /// One sync point.
     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Self::Error>;
+}
+
+/// A sync point of a halo whose type is not told: so the step is compiled once, and not for every halo again.
+pub(crate) type Carry<'a> = dyn FnMut(&mut Outbox, &mut Inbox) -> Result<(), NotCarried> + 'a;
+
+/// A sync point has failed; [`through`] knows why.
+#[derive(Debug)]
+pub(crate) struct NotCarried;
+
+/// Does what needs a halo.
+pub(crate) fn through<H: Halo, R>(
+    halo: &mut H,
+    act: impl FnOnce(&mut Carry<'_>) -> Result<R, StepError<NotCarried>>,
+) -> Result<R, StepError<H::Error>> {
+    let mut failure = None;
+    let done = act(&mut |outbox, inbox| {
+        halo.exchange(outbox, inbox).map_err(|error| {
+            failure = Some(error);
+            NotCarried
+        })
+    });
+    done.map_err(|error| error.map_halo(|NotCarried| failure.expect("it has just been kept")))
 }
 
 /// The halo of a world that holds every tile of its grid: each message is delivered on the spot.

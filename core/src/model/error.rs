@@ -167,3 +167,15 @@ pub enum StepError<E> {
         tile: TileId,
     },
 }
+
+impl<E> StepError<E> {
+    /// The same, of another halo.
+    pub(crate) fn map_halo<F>(self, map: impl FnOnce(E) -> F) -> StepError<F> {
+        match self {
+            Self::Halo(error) => StepError::Halo(map(error)),
+            Self::NonFinite { step, id } => StepError::NonFinite { step, id },
+            Self::FloatMode { step } => StepError::FloatMode { step },
+            Self::Protocol { step, tile } => StepError::Protocol { step, tile },
+        }
+    }
+}

@@ -3,7 +3,7 @@
 pub(crate) mod phase;
 pub(crate) mod stage;
 
-use crate::exchange::halo::Halo;
+use crate::exchange::halo::{Carry, Halo, NotCarried, through};
 use crate::exchange::migrate;
 use crate::exchange::verdict::Verdict;
 use crate::model::error::StepError;
@@ -53,6 +53,10 @@ pub struct StepReport {
 /// # Errors
 /// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
+    through(halo, |carry| make_step(world, carry))
+}
+
+fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, StepError<NotCarried>> {
     let _span = tracing::trace_span!("step", step = world.step).entered();
     world.begin_step();
     let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
@@ -118,7 +122,11 @@ pub fn measure<H: Halo>(world: &World, halo: &mut H) -> Result<Vec<TileFacts>, S
 ///
 /// # Errors
 /// As [`step`]; a failure of the last step is reported here.
-pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
+pub fn finish<H: Halo>(world: World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
+    through(halo, |carry| close(world, carry))
+}
+
+fn close(mut world: World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepError<NotCarried>> {
     world.begin_step();
     migrate(&mut world, halo)?;
     Ok(world.each_tile(|bench| {
@@ -131,7 +139,7 @@ pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>,
 }
 
 /// The first sync point: migrants, then ghosts. What all ranks together have to say comes back.
-fn migrate<H: Halo>(world: &mut World, halo: &mut H) -> Result<Verdict, StepError<H::Error>> {
+fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
     if !world.has_failed() {
         world.each_tile(|bench| {
             bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
@@ -236,7 +244,7 @@ fn average(bench: &mut Bench<'_>) {
 }
 
 /// Completes the report of a step, and the step.
-fn report<E>(world: &mut World, mut report: StepReport) -> Result<StepReport, StepError<E>> {
+fn report(world: &mut World, mut report: StepReport) -> Result<StepReport, StepError<NotCarried>> {
     let (mut leaps, mut not_finite): (u64, Option<GlobalId>) = (0, None);
     for tile in world.tiles_of_step() {
         let counts = &tile.counts;

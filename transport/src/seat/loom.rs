@@ -2,7 +2,7 @@
 //! to the words that they share, and lets each look see every value that the memory model allows:
 //!
 //! ```sh
-//! RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p atoll-transport --lib loom
+//! RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p atoll-loom seat
 //! ```
 //!
 //! Here nobody wakes after a while, so a thread that sleeps through what it waits for is a deadlock, which loom reports.

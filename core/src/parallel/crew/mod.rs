@@ -17,7 +17,7 @@
 //! member misses what another wrote:
 //!
 //! ```sh
-//! RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p atoll-core --lib loom
+//! RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p atoll-loom crew
 //! ```
 
 use std::cell::Cell;
