@@ -46,6 +46,8 @@ pub(crate) struct Due {
     pub number: u32,
     /// What there is to see now.
     pub version: u64,
+    /// Whether the page has seen that coarsely.
+    pub glimpsed: bool,
 }
 
 /// The body that somebody wants to know about: it is picked for all pages.
@@ -95,6 +97,8 @@ struct Page {
     moved: bool,
     /// What there was to see on the last frame.
     seen: Option<u64>,
+    /// Whether that was coarse.
+    coarse: bool,
     last: Option<Instant>,
     frames: Vec<Vec<u8>>,
     texts: Vec<String>,
@@ -164,7 +168,7 @@ impl Desk {
         let Some(page) = pages.get_mut(&page) else { return };
         match wish {
             Wish::Look { view, size, color } => {
-                page.gaze = Some(Gaze { view, size, color });
+                page.gaze = Some(Gaze { view, size, color, coarseness: 1 });
                 page.moved = true;
             }
             Wish::Ack { frame } => page.free |= frame == page.given,
@@ -239,7 +243,8 @@ impl Desk {
         let now = Instant::now();
         let due = |(&page, of): (&PageId, &Page)| {
             let gaze = of.gaze.filter(|_| of.wants(version) && of.rests(now).is_zero())?;
-            Some(Due { page, gaze, number: of.given.wrapping_add(1), version })
+            let glimpsed = of.seen == Some(version) && !of.moved;
+            Some(Due { page, gaze, number: of.given.wrapping_add(1), version, glimpsed })
         };
         self.lock().pages.iter().filter_map(due).collect()
     }
@@ -256,9 +261,10 @@ impl Desk {
         if let Some(page) = inner.pages.get_mut(&due.page) {
             page.frames = frames;
             page.seen = Some(due.version);
+            page.coarse = due.gaze.coarseness > 1;
             page.given = due.number;
             page.free = false;
-            page.moved &= page.gaze != Some(due.gaze);
+            page.moved &= page.gaze != Some(Gaze { coarseness: 1, ..due.gaze });
             page.last = Some(Instant::now());
         }
         drop(inner);
@@ -321,9 +327,9 @@ impl Desk {
 }
 
 impl Page {
-    /// Whether it has room for a frame with this to see, and has not seen it.
+    /// Whether it has room for a frame with this to see, and has not seen it as well as can be.
     fn wants(&self, version: u64) -> bool {
-        self.gaze.is_some() && self.free && (self.moved || self.seen != Some(version))
+        self.gaze.is_some() && self.free && (self.moved || self.coarse || self.seen != Some(version))
     }
 
     /// How long it is to rest after its last frame.
@@ -374,6 +380,24 @@ mod tests {
         desk.close(page);
         assert!(desk.due(1).is_empty() && !desk.is_wanted());
         assert_eq!(desk.next(page, NOW), Ready::Closed);
+    }
+
+    #[test]
+    fn what_a_page_has_seen_coarsely_it_gets_again() {
+        let desk = Desk::new(true, 0.0);
+        let page = desk.open().unwrap();
+        desk.hear(page, look(0.0));
+        let give = |coarseness: u32| {
+            let [due] = desk.due(7)[..] else { panic!("a frame is due") };
+            desk.give(&Due { gaze: Gaze { coarseness, ..due.gaze }, ..due }, vec![vec![1]]);
+            desk.hear(page, Wish::Ack { frame: due.number });
+            rest();
+            due.glimpsed
+        };
+        assert_eq!([give(4), give(1)], [false, true]);
+        assert!(desk.due(7).is_empty(), "now it is as fine as can be");
+        desk.hear(page, look(1.0));
+        assert_eq!([give(2), give(2), give(1)], [false, true, true]);
     }
 
     #[test]

@@ -3,13 +3,13 @@
 
 use super::desk::{Desk, Due, Pick};
 use super::figures::Course;
-use super::protocol::{Picture, Say};
+use super::protocol::{Gaze, Picture, Say};
 use super::question::{Found, Question, answer, portion};
 use super::sketch::{Paper, compose, rectangle};
 use super::{figures, scenery};
 use crate::folder::recording::RunFacts;
 use crate::look::frame::Setting;
-use crate::look::picture::{ColorBy, Range, View};
+use crate::look::picture::{ColorBy, Range};
 use crate::plan::Plan;
 use crate::rank::{Held, Host, Next};
 use atoll_core::TileId;
@@ -20,7 +20,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// While time goes on, ranks draw for one part in so many of it, at most.
-const SHARE: u32 = 10;
+const SHARE: u32 = 16;
+/// While time goes on, a frame that takes longer is followed by a coarser one, up to [`COARSEST`].
+const QUICK: Duration = Duration::from_millis(4);
+/// See [`QUICK`].
+const COARSEST: u32 = 4;
 /// Between two times that ranks tell how it goes, at least.
 const TELL: Duration = Duration::from_millis(400);
 /// How it goes costs one part in so many, at most.
@@ -51,6 +55,8 @@ struct State {
     due: VecDeque<Due>,
     /// No frame is made before.
     next_frame: Instant,
+    /// What such a frame is drawn with while time goes on.
+    coarseness: u32,
     /// Whether there ever was one.
     begun: bool,
     /// Of speeds, and of spins.
@@ -95,6 +101,7 @@ impl Viewer {
             asked: None,
             due: VecDeque::new(),
             next_frame: now,
+            coarseness: 1,
             begun: false,
             ranges: [Range::default(); 2],
             measured: None,
@@ -109,10 +116,13 @@ impl Viewer {
         Self { setting, ranks: ranks as u32, last_step, lingers, desk, papers, state: Mutex::new(state) }
     }
 
-    fn give(&self, desk: &Desk, state: &mut State, due: &Due, answers: &[Vec<u8>]) {
-        let portions: Vec<_> = answers.iter().filter_map(|answer| portion(answer)).collect();
-        let (pixels, image) = compose(portions.iter().map(|(pixels, density, _)| (*pixels, *density)));
-        let dots: Vec<&[u8]> = portions.iter().map(|(_, _, dots)| *dots).collect();
+    /// Gives a page its frame. Returns what that cost, on the slowest rank: ranks that wait for each other in a meeting need not do
+    /// so after it.
+    fn give(&self, desk: &Desk, state: &mut State, due: &Due, answers: &[Vec<u8>]) -> Duration {
+        let begun = Instant::now();
+        let parts: Vec<_> = answers.iter().filter_map(|answer| portion(answer)).collect();
+        let (pixels, image) = compose(parts.iter().map(|part| (part.pixels, part.density)));
+        let dots: Vec<&[u8]> = parts.iter().map(|part| part.dots).collect();
         let found = state.found.map(|(.., (_, found))| DVec2::from(found.place));
         let picture = Picture {
             source: 0,
@@ -128,6 +138,7 @@ impl Viewer {
         };
         desk.give(due, vec![picture.encode()]);
         state.begun = true;
+        parts.iter().map(|part| part.took).max().unwrap_or_default() + begun.elapsed()
     }
 
     /// Tells pages of the body that was looked for.
@@ -163,7 +174,9 @@ impl State {
             (None, Some(&due)) => {
                 self.due.pop_front();
                 let most = self.range(due.gaze.color).most;
-                (Asked::Look(Due { version: steps, ..due }), Question::Look { gaze: due.gaze, most })
+                let coarseness = if is_still || due.glimpsed { 1 } else { self.coarseness };
+                let gaze = Gaze { coarseness, ..due.gaze };
+                (Asked::Look(Due { version: steps, gaze, ..due }), Question::Look { gaze, most })
             }
             (None, None) if self.is_to_tell(desk, steps) => (Asked::Figures(steps), Question::Figures),
             (None, None) => return None,
@@ -264,8 +277,9 @@ impl Host for Viewer {
                 state.measured = Some((by, steps));
             }
             Asked::Look(due) => {
-                self.give(desk, &mut state, &due, &answers);
-                state.next_frame = Instant::now() + (SHARE - 1) * since.elapsed();
+                let took = self.give(desk, &mut state, &due, &answers);
+                state.next_frame = Instant::now() + (SHARE - 1) * took;
+                state.coarseness = suited(due.gaze.coarseness, took);
             }
             Asked::Find(pick, steps) => {
                 let found = (0..).zip(&answers).filter_map(|(rank, answer)| Some((rank, *all(slice(answer)).first()?)));
@@ -289,15 +303,14 @@ impl Host for Viewer {
     }
 }
 
-impl super::protocol::Gaze {
-    /// The size of some of its pixels, and the rectangle that they cover.
-    pub(super) fn part(&self, [columns, rows]: super::sketch::Pixels) -> ([u32; 2], View) {
-        let pixel = (self.view.high - self.view.low) / DVec2::new(self.size[0].into(), self.size[1].into());
-        let from_left = |column: u32| self.view.low.x + pixel.x * f64::from(column);
-        let from_top = |row: u32| self.view.high.y - pixel.y * f64::from(row);
-        let low = DVec2::new(from_left(columns[0]), from_top(rows[1]));
-        let high = DVec2::new(from_left(columns[1]), from_top(rows[0]));
-        ([columns[1] - columns[0], rows[1] - rows[0]], View { low, high })
+/// How coarse the next frame is to be after one that took so long. Twice as coarse is up to four times as quick.
+fn suited(coarseness: u32, took: Duration) -> u32 {
+    if took > QUICK {
+        (2 * coarseness).min(COARSEST)
+    } else if 5 * took < QUICK {
+        (coarseness / 2).max(1)
+    } else {
+        coarseness
     }
 }
 

@@ -103,6 +103,8 @@ pub(crate) struct Gaze {
     pub size: [u32; 2],
     /// What the colors tell.
     pub color: ColorBy,
+    /// What is too small to be drawn as what it is, is drawn in pixels so many times as wide and high.
+    pub coarseness: u32,
 }
 
 /// What the server has to say.

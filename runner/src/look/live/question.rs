@@ -10,6 +10,7 @@ use atoll_core::{Body, GlobalId, Shape, TileView, World};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
 
 /// The scale of speeds and spins is made from so many bodies of a rank, at most.
 const SAMPLE: usize = 512;
@@ -56,6 +57,8 @@ pub(super) struct Found {
 #[derive(Clone, Copy, PartialEq, Default, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct Head {
+    /// How long drawing took, in ns.
+    took: u64,
     pixels: Pixels,
     density: u64,
     dots: u64,
@@ -83,6 +86,7 @@ fn measure(by: ColorBy, world: &World) -> Vec<f32> {
 }
 
 fn look(gaze: &Gaze, most: f32, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
+    let begun = Instant::now();
     let regions = held.world.views().map(|tile| setting.grid.region(tile.id()));
     let mut sketch = Sketch::new(paper, setting, gaze, Some(regions));
     let tint = Tint::new(gaze.color, Range { most });
@@ -94,22 +98,33 @@ fn look(gaze: &Gaze, most: f32, setting: &Setting, held: &Held<'_>, paper: &mut 
         }
         let of_tile = Tint::tile(tile.id().0 as usize, setting.grid.columns());
         let counts = if gaze.color == ColorBy::Contacts { contacts(&tile) } else { Vec::new() };
-        let color = |i: usize, body: &Body| match gaze.color {
-            ColorBy::Kind => kinds[body.kind.0 as usize],
-            ColorBy::Speed | ColorBy::Spin => tint.moving(body.velocity.x, body.velocity.y, body.angular_velocity),
-            ColorBy::Tile => of_tile,
-            ColorBy::Rank => rank,
-            ColorBy::Contacts => Tint::contacts(counts[i]),
-            ColorBy::Asleep => Tint::asleep(Some(tile.asleep().get(i).copied().unwrap_or(false))),
-        };
-        for (i, body) in tile.bodies().enumerate() {
-            sketch.add(body.position, body.kind.0, || turn(body.rotation), || color(i, &body));
+        let asleep = tile.asleep();
+        // One loop for each, that each is quick.
+        match gaze.color {
+            ColorBy::Kind => draw(&mut sketch, &tile, |_, body| kinds[body.kind.0 as usize]),
+            ColorBy::Speed | ColorBy::Spin => {
+                draw(&mut sketch, &tile, |_, body| tint.moving(body.velocity.x, body.velocity.y, body.angular_velocity))
+            }
+            ColorBy::Tile => draw(&mut sketch, &tile, |_, _| of_tile),
+            ColorBy::Rank => draw(&mut sketch, &tile, |_, _| rank),
+            ColorBy::Contacts => draw(&mut sketch, &tile, |i, _| Tint::contacts(counts[i])),
+            ColorBy::Asleep => {
+                draw(&mut sketch, &tile, |i, _| Tint::asleep(Some(asleep.get(i).copied().unwrap_or(false))))
+            }
         }
     }
     let portion = sketch.finish();
     let dots: &[u8] = bytemuck::cast_slice(&portion.dots);
-    let head = Head { pixels: portion.pixels, density: portion.density.len() as u64, dots: portion.dots.len() as u64 };
+    let [density, bodies] = [portion.density.len(), portion.dots.len()].map(|count| count as u64);
+    let head = Head { took: begun.elapsed().as_nanos() as u64, pixels: portion.pixels, density, dots: bodies };
     [bytemuck::bytes_of(&head), &portion.density, dots].concat()
+}
+
+/// Draws the bodies of a tile, each in the color that it has.
+fn draw(sketch: &mut Sketch<'_>, tile: &TileView<'_>, color: impl Fn(usize, &Body) -> Rgb) {
+    for (i, body) in tile.bodies().enumerate() {
+        sketch.add(body.position, body.kind.0, || turn(body.rotation), || color(i, &body));
+    }
 }
 
 /// For each body of a tile how many press upon it.
@@ -123,12 +138,26 @@ fn contacts(tile: &TileView<'_>) -> Vec<u16> {
     counts
 }
 
+/// A part of a frame, as a rank has answered it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answered<'a> {
+    /// How long drawing it took.
+    pub took: Duration,
+    /// What part of the image of densities it has.
+    pub pixels: Pixels,
+    /// That, four bytes for each pixel, or nothing if there are none.
+    pub density: &'a [u8],
+    /// Its bodies, as [`Dot`]s.
+    pub dots: &'a [u8],
+}
+
 /// Reads an answer to [`Question::Look`]. None if it is none.
-pub(super) fn portion(answer: &[u8]) -> Option<(Pixels, &[u8], &[u8])> {
+pub(super) fn portion(answer: &[u8]) -> Option<Answered<'_>> {
     let (head, rest) = answer.split_at_checked(size_of::<Head>())?;
     let head: Head = bytemuck::pod_read_unaligned(head);
     let (density, dots) = rest.split_at_checked(usize::try_from(head.density).ok()?)?;
-    (dots.len() as u64 == head.dots * size_of::<Dot>() as u64).then_some((head.pixels, density, dots))
+    let part = Answered { took: Duration::from_nanos(head.took), pixels: head.pixels, density, dots };
+    (dots.len() as u64 == head.dots * size_of::<Dot>() as u64).then_some(part)
 }
 
 fn find(id: Option<u64>, place: DVec2, reach: f64, setting: &Setting, world: &World) -> Option<Found> {

@@ -28,11 +28,15 @@ pub(super) struct Paper {
 /// A sketch under way.
 #[derive(Debug)]
 pub(super) struct Sketch<'a> {
-    field: &'a mut Field,
+    paper: &'a mut Paper,
+    /// That of the paper, while it is drawn on: papers of ranks may lie beside each other, and who writes there has his neighbours wait.
+    field: Field,
+    /// Whether its densities are to be there soon rather than smooth.
+    coarse: bool,
     /// Of each kind.
     sizes: Vec<Size>,
     tone: Tone,
-    /// Pixels of a meter.
+    /// Pixels of a meter in the image of densities.
     scale: f64,
     /// What is drawn of the whole image.
     pixels: Pixels,
@@ -63,8 +67,22 @@ pub(super) fn rectangle(setting: &Setting, gaze: &Gaze) -> View {
     View { low: gaze.view.low - grown, high: gaze.view.high + grown }
 }
 
+/// Pixels of a meter.
 fn scale(gaze: &Gaze) -> f64 {
     f64::from(gaze.size[0]) / (gaze.view.high.x - gaze.view.low.x)
+}
+
+impl Gaze {
+    /// The size of some pixels of an image of densities, and the rectangle that they cover.
+    pub(super) fn part(&self, [columns, rows]: Pixels) -> ([u32; 2], View) {
+        let size = DVec2::from(self.size.map(f64::from));
+        let pixel = (self.view.high - self.view.low) / size * f64::from(self.coarseness);
+        let from_left = |column: u32| self.view.low.x + pixel.x * f64::from(column);
+        let from_top = |row: u32| self.view.high.y - pixel.y * f64::from(row);
+        let low = DVec2::new(from_left(columns[0]), from_top(rows[1]));
+        let high = DVec2::new(from_left(columns[1]), from_top(rows[0]));
+        ([columns[1] - columns[0], rows[1] - rows[0]], View { low, high })
+    }
 }
 
 impl<'a> Sketch<'a> {
@@ -75,7 +93,8 @@ impl<'a> Sketch<'a> {
         gaze: &Gaze,
         regions: Option<impl Iterator<Item = Region>>,
     ) -> Self {
-        let scale = scale(gaze);
+        let scale = scale(gaze) / f64::from(gaze.coarseness);
+        let drawn = DRAWN / f64::from(gaze.coarseness);
         let width = |radius: f32| f64::from(radius) * 2.0 * scale;
         let mut widest = 0.0_f64;
         let mut size = |shape: &atoll_core::Shape| {
@@ -83,7 +102,7 @@ impl<'a> Sketch<'a> {
                 atoll_core::Shape::Circle { radius } => width(radius),
                 atoll_core::Shape::Box { half } => width(half.max_element()),
             };
-            if longest > DRAWN {
+            if longest > drawn {
                 return Size::Large;
             }
             widest = widest.max(longest);
@@ -94,10 +113,13 @@ impl<'a> Sketch<'a> {
         let has_small = sizes.iter().any(|size| matches!(size, Size::Small(_)));
         let pixels = if has_small { pixels(gaze, scale, regions) } else { [[0; 2]; 2] };
         let [columns, rows] = pixels;
-        paper.field.reset([columns[1] - columns[0], rows[1] - rows[0]]);
+        let mut field = std::mem::take(&mut paper.field);
+        field.reset([columns[1] - columns[0], rows[1] - rows[0]]);
         let corner = DVec2::new(f64::from(columns[0]), -f64::from(rows[0])) / scale;
         Self {
-            field: &mut paper.field,
+            paper,
+            field,
+            coarse: gaze.coarseness > 1,
             sizes,
             // As pictures of runs are drawn.
             tone: Tone::new(0.5 + 0.25 * widest),
@@ -121,7 +143,12 @@ impl<'a> Sketch<'a> {
         match self.sizes.get(kind as usize) {
             Some(&Size::Small(area)) => {
                 let from = (position - self.origin) * self.scale;
-                self.field.dab([from.x, -from.y], area, color);
+                let place = [from.x, -from.y];
+                if self.coarse {
+                    self.field.dot(place, area, color);
+                } else {
+                    self.field.dab(place, area, color);
+                }
             }
             Some(Size::Large) => {
                 let place = (position - self.rectangle.low) * self.per_meter;
@@ -138,28 +165,30 @@ impl<'a> Sketch<'a> {
     /// What was drawn.
     pub(super) fn finish(self) -> Portion {
         let density = if self.field.is_empty() { Vec::new() } else { self.field.toned(&self.tone) };
+        self.paper.field = self.field;
         Portion { pixels: self.pixels, density, dots: self.dots }
     }
 }
 
 /// The pixels that may have something of what lies in some regions.
 fn pixels(gaze: &Gaze, scale: f64, regions: Option<impl Iterator<Item = Region>>) -> Pixels {
-    let all = [[0, gaze.size[0]], [0, gaze.size[1]]];
+    let size = gaze.size.map(|length| length.div_ceil(gaze.coarseness));
+    let all = [[0, size[0]], [0, size[1]]];
     let Some(regions) = regions else { return all };
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for region in regions {
         (low, high) = (low.min(region.min), high.max(region.max));
     }
     // What is small covers at most two pixels more; bodies may have left their tiles by a little.
-    let near = 3.0 + 0.02 * f64::from(gaze.size[0].max(gaze.size[1]));
+    let near = 3.0 + 0.02 * f64::from(size[0].max(size[1]));
     let span = |from: f64, to: f64, most: u32| {
         let [from, to] = [from - near, to + near].map(|edge| edge.clamp(0.0, f64::from(most)) as u32);
         [from, (to + 1).clamp(from, most)]
     };
     let View { low: least, high: most } = gaze.view;
     [
-        span((low.x - least.x) * scale, (high.x - least.x) * scale, gaze.size[0]),
-        span((most.y - high.y) * scale, (most.y - low.y) * scale, gaze.size[1]),
+        span((low.x - least.x) * scale, (high.x - least.x) * scale, size[0]),
+        span((most.y - high.y) * scale, (most.y - low.y) * scale, size[1]),
     ]
 }
 
@@ -234,6 +263,41 @@ mod tests {
             assert!(apart.min(apart.wrapping_neg()) <= 2, "{angle}: {fast} {exact}");
         }
         assert_eq!([0.0, -0.0, 1e9].map(turn_of_angle)[..2], [0, 0]);
+    }
+
+    #[test]
+    fn coarse_densities_lie_where_fine_ones_do() {
+        let setting = Setting {
+            grid: atoll_core::TileGrid::new(DVec2::ZERO, DVec2::splat(100.0), 1, 1).unwrap(),
+            kinds: vec![atoll_core::Kind {
+                shape: atoll_core::Shape::Circle { radius: 0.05 },
+                material: atoll_core::Material::default(),
+            }],
+            statics: Vec::new(),
+            hertz: 60.0,
+        };
+        let view = View { low: DVec2::new(10.0, 20.0), high: DVec2::new(81.0, 67.0) };
+        let place = DVec2::new(33.3, 44.4);
+        for coarseness in [1, 2, 4] {
+            // Not to be divided by four.
+            let gaze = Gaze { view, size: [71, 47], color: crate::look::picture::ColorBy::Kind, coarseness };
+            let mut paper = Paper::default();
+            let mut sketch = Sketch::new(&mut paper, &setting, &gaze, None::<std::iter::Empty<Region>>);
+            sketch.add(place, 0, || 0, || Rgb([255, 0, 0]));
+            let portion = sketch.finish();
+            let ([columns, rows], covered) = gaze.part(portion.pixels);
+            assert_eq!(portion.density.len(), 4 * (columns * rows) as usize);
+            let pixel = (covered.high - covered.low) / DVec2::new(columns.into(), rows.into());
+            assert!((pixel - f64::from(coarseness)).abs().max_element() < 1e-9);
+            let (mut mean, mut sum) = (DVec2::ZERO, 0.0);
+            for (i, density) in portion.density.as_chunks::<4>().0.iter().enumerate() {
+                let (column, row) = (i % columns as usize, i / columns as usize);
+                let center = DVec2::new(column as f64 + 0.5, rows as f64 - row as f64 - 0.5) * pixel + covered.low;
+                mean += center * f64::from(density[3]);
+                sum += f64::from(density[3]);
+            }
+            assert!((mean / sum - place).abs().max_element() <= 0.5 * pixel.x, "{} {place}", mean / sum);
+        }
     }
 
     #[test]

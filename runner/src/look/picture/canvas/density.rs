@@ -85,6 +85,21 @@ impl Field {
         }
     }
 
+    /// As [`dab`](Self::dab), quicker still: all of a body is where its center is.
+    #[inline]
+    pub(crate) fn dot(&mut self, [x, y]: [f64; 2], area: f64, color: impl FnOnce() -> Rgb) {
+        if x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64 {
+            let (column, row) = (x as u32 as usize, y as u32 as usize);
+            let parts = (PARTS * area + 0.999) as u32;
+            let [r, g, b] = color().0.map(u32::from);
+            self.rows = self.rows.start.min(row)..self.rows.end.max(row + 1);
+            let cell = &mut self.cells[row * self.size[0] + column];
+            for (sum, value) in cell.iter_mut().zip([r, g, b, 1]) {
+                *sum = sum.wrapping_add(value * parts);
+            }
+        }
+    }
+
     /// Whether nothing was added.
     pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty()
