@@ -100,8 +100,10 @@ provide_python() {
             "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$requirements" &&
             cp "$requirements" "$folder" || return
     fi
-    ATOLL_PYTHON=$(realpath "$folder")/bin/python
-    export ATOLL_PYTHON
+}
+
+await_python() {
+    wait "$python_job"
 }
 
 # Where nobody will look into the programs, less is compiled into them: lines for backtraces in one profile, nothing in the other.
@@ -113,7 +115,11 @@ fi
 
 provide
 has_browser || leave_out 'the pages of atoll report and atoll view in a browser: no chromium-headless-shell'
-[[ -n ${ATOLL_PYTHON:-} ]] || step provide_python || leave_out 'the examples in Python: their packages cannot be had'
+# They come over the network, while others use the processors.
+if [[ -z ${ATOLL_PYTHON:-} ]]; then
+    provide_python &
+    python_job=$!
+fi
 features=()
 if has_libclang; then
     features+=(--features atoll-tests/iceoryx2)
@@ -137,6 +143,14 @@ if ((${#features[@]})); then
     step_with clippy cargo clippy --workspace -- --deny warnings
 fi
 step env RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps ${features[@]+"${features[@]}"}
+if [[ -n ${python_job:-} ]]; then
+    if step await_python; then
+        ATOLL_PYTHON=$(realpath "$target/python")/bin/python
+        export ATOLL_PYTHON
+    else
+        leave_out 'the examples in Python: their packages cannot be had'
+    fi
+fi
 # As it is compiled for speed, everything, with every transport; of the runner what its program does, as the next says.
 step cargo test --release --workspace --exclude atoll --lib --bins --tests ${features[@]+"${features[@]}"}
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
