@@ -13,13 +13,24 @@ if [[ -z ${ATOLL_SIGNALS:-} ]] && env --default-signal=INT true 2>/dev/null; the
     ATOLL_SIGNALS=heeded exec env --default-signal=HUP,INT,QUIT,TERM "$PWD/test.sh" "$@"
 fi
 
+# What runs beside others ends with them, and the last line names what failed.
+doing=
+ended() {
+    local code=$?
+    # shellcheck disable=SC2046
+    kill $(jobs -p) 2>/dev/null || true
+    ((code == 0)) || printf '\n==> failed with exit code %d after %d s: %s\n' "$code" "$SECONDS" "$doing"
+}
+trap ended EXIT
+
 left_out=()
 target="${CARGO_TARGET_DIR:-target}"
 
 # Says what is done, does it, and says how long that took.
 step() {
     local start=$SECONDS
-    printf '\n==> %s\n' "$*"
+    doing="$*"
+    printf '\n==> %s\n' "$doing"
     "$@" || return
     printf '==> done in %d s\n' "$((SECONDS - start))"
 }
@@ -106,6 +117,20 @@ await_python() {
     wait "$python_job"
 }
 
+# Started while others run, many of whose tests mostly wait, and after all that these need: it takes what they leave.
+begin_aarch64() {
+    # Under qemu it counts how well it is compiled.
+    env -u CARGO_PROFILE_RELEASE_CODEGEN_UNITS nice tests/aarch64.sh >"$target/aarch64.log" 2>&1 &
+    aarch64_job=$!
+}
+
+await_aarch64() {
+    local code=0
+    wait "$aarch64_job" || code=$?
+    cat "$target/aarch64.log"
+    return "$code"
+}
+
 # Where nobody will look into the programs, less is compiled into them: lines for backtraces in one profile, nothing in the other.
 # Nor will anybody change a little and compile again, or measure: in many units a crate is compiled sooner, and computes the same.
 if [[ -n ${CI:-} ]]; then
@@ -153,11 +178,11 @@ if [[ -n ${python_job:-} ]]; then
 fi
 # As it is compiled for speed, everything, with every transport; of the runner what its program does, as the next says.
 step cargo test --release --workspace --exclude atoll --lib --bins --tests ${features[@]+"${features[@]}"}
+begin_aarch64
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
 # that there is for that (golden). What programs do around that is the same in both profiles.
-calculates=(borders golden hostile library physics reported sleep snapshots strategies)
-step env ATOLL_OTHER_PROGRAM="$(realpath "$target")/release/atoll" \
-    cargo test --workspace --lib "${calculates[@]/#/--test=}"
+calculates=(borders collisions fast golden hostile library physics reported sleep snapshots strategies)
+step cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 
 # What threads and processes share, in every order in which they may meet (tests/loom).
@@ -179,10 +204,12 @@ if [[ ${features[*]} == *mpi* ]]; then
     else
         leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
     fi
+fi
+step_unless_77 aarch64 await_aarch64
+if [[ ${features[*]} == *mpi* ]]; then
+    # Alone, as it counts on an answer within seconds.
     step_unless_77 'the cluster' tests/cluster.sh "$target/release/atoll"
 fi
-# Under qemu it counts how well it is compiled.
-step_unless_77 aarch64 env -u CARGO_PROFILE_RELEASE_CODEGEN_UNITS tests/aarch64.sh
 
 printf '\nAll passed in %d s\n' "$SECONDS"
 if ((${#left_out[@]})); then

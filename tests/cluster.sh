@@ -115,7 +115,7 @@ for exchange in alltoallv sparse; do
     remove_hosts
     make_hosts
     : >"$work/said" # now, and not when the run comes to it: it holds steps of the run before
-    on_the_cluster configs/quickstart.toml --steps 4000000000 --tiles 5x5 --peer-timeout 2 --set mpi_exchange="$exchange" \
+    on_the_cluster configs/quickstart.toml --steps 4000000000 --tiles 5x5 --peer-timeout 5 --set mpi_exchange="$exchange" \
         >"$work/said" 2>&1 &
     run=$!
     for ((i = 0; i < 600; i++)); do

@@ -57,13 +57,7 @@ pub fn atoll(profile: Profile) -> &'static Path {
     built.get_or_init(|| build(profile))
 }
 
-/// Names the program of the other profile, where somebody has built it already.
-const OTHER_PROGRAM: &str = "ATOLL_OTHER_PROGRAM";
-
 fn build(profile: Profile) -> PathBuf {
-    if let Some(program) = std::env::var_os(OTHER_PROGRAM).filter(|_| profile == Profile::OTHER) {
-        return PathBuf::from(program);
-    }
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     // Of the workspace, as tests are: so what they are made of is compiled already.
