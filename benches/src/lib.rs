@@ -10,11 +10,14 @@
 //! | `exchange` | What does an exchange cost over each transport, and what do two ranks bring? |
 //! | `output` | What do recording and snapshots cost a run, and how long does it take to compare two recordings? |
 //! | `peers` | How do Box2D and rapier2d do on the same scene? With `--features peers` only. |
+//! | `fidelity` | How near do Atoll, Box2D and rapier2d come to theory? With `--features peers` only. |
 //!
 //! They print a table to stderr and one line of JSON per row to stdout, so that
 //! `cargo run --release -p atoll-benches --bin step > row.json` shows the one and keeps the other.
 
 pub mod exchange;
+#[cfg(feature = "peers")]
+pub mod fidelity;
 #[cfg(feature = "peers")]
 pub mod peers;
 

@@ -116,7 +116,7 @@ impl World {
     /// The same bodies at the same step, in a world that remembers no contacts: to look at.
     pub(crate) fn copy_bodies(&self) -> Self {
         let tiles = self.tiles.iter().map(|tile| tile.copy_bodies(&self.setup)).collect();
-        let verdict = Verdict { stop: false, meet: false, ..self.verdict };
+        let verdict = Verdict { stop: false, meet: false, far: false, ..self.verdict };
         Self { step: self.step, verdict, ..Self::of(Arc::clone(&self.setup), tiles) }
     }
 
@@ -274,7 +274,7 @@ impl World {
         if let Some(id) = not_finite {
             self.verdict = self.verdict.merge(Verdict { failure: Some((self.step, id)), ..Verdict::default() });
         }
-        self.verdict.meet = false;
+        (self.verdict.meet, self.verdict.far) = (false, false);
         self.measures = false;
         self.step += 1;
     }
@@ -282,6 +282,11 @@ impl World {
     /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.
     pub(crate) fn has_failed(&self) -> bool {
         self.verdict.failure.is_some()
+    }
+
+    /// Lets all ranks hear with the next sync point whether a body of a tile that had something to do goes far.
+    pub(crate) fn tell_of_far_bodies(&mut self) {
+        self.verdict.far = self.busy.iter().any(|&place| self.tiles[place as usize].counts.far);
     }
 
     /// One sync point. What all ranks together have to say comes back.

@@ -123,7 +123,7 @@ struct Clusters {
 }
 
 impl Clusters {
-    const SEEDS: u64 = 8;
+    const SEEDS: u64 = 32;
 
     fn run(way: Way) -> Self {
         let mut all = Self::default();
@@ -145,12 +145,12 @@ impl Clusters {
         all
     }
 
-    fn check(way: Way, allowed_drift: f64, drift: impl Fn(&Self) -> f64) {
+    fn check(way: Way, (allowed_drift, more_energy): (f64, f64), drift: impl Fn(&Self) -> f64) {
         let (cut, whole) = (Self::run(way), Self::run((Cut::Whole, way.1)));
         let (energy, extent) = (cut.kinetic_energy / whole.kinetic_energy, cut.extent / whole.extent);
         println!("{way:?}: energy {energy:.3}, extent {extent:.3} of those on one tile, {cut:?}");
         assert!(drift(&cut) < allowed_drift, "{way:?}: momentum drifted by {} of the sum of |p|", drift(&cut));
-        assert!((energy - 1.0).abs() < 0.3, "{way:?}: {energy} times the kinetic energy on one tile");
+        assert!((energy - 1.0).abs() < more_energy, "{way:?}: {energy} times the kinetic energy on one tile");
         assert!((extent - 1.0).abs() < 0.2, "{way:?}: {extent} times the extent on one tile");
         assert!(cut.on_the_border >= 5 * Self::SEEDS, "{way:?}: the border is elsewhere, {cut:?}");
     }
@@ -159,7 +159,7 @@ impl Clusters {
 #[test]
 fn a_cluster_upon_a_border_collides_as_on_one_tile() {
     for cut in [Cut::Columns, Cut::Rows, Cut::Corner] {
-        Clusters::check((cut, Exchange::Substep), 1e-5, |clusters| clusters.worst_drift);
+        Clusters::check((cut, Exchange::Substep), (1e-5, 0.08), |clusters| clusters.worst_drift);
     }
 }
 
@@ -167,7 +167,7 @@ fn a_cluster_upon_a_border_collides_as_on_one_tile() {
 #[test]
 fn with_one_exchange_a_step_a_cluster_upon_a_border_nearly_does() {
     for cut in [Cut::Columns, Cut::Rows] {
-        Clusters::check((cut, Exchange::Step), 5e-2, |clusters| clusters.mean_drift);
+        Clusters::check((cut, Exchange::Step), (5e-2, 0.25), |clusters| clusters.mean_drift);
     }
 }
 
@@ -184,7 +184,31 @@ fn a_stack_over_a_border_sinks_no_deeper_than_one_beside_it() {
         let depth = sunk(&sim, before);
         println!("{way:?}: sinks {depth:.4} m");
         let alone = *alone.get_or_insert(depth);
-        assert!((depth - alone).abs() < 0.002, "{way:?}: sinks {depth} m, on one tile {alone} m");
+        assert!((depth / alone - 1.0).abs() < 0.05, "{way:?}: sinks {depth} m, on one tile {alone} m");
+    }
+}
+
+/// A stack over four borders with a top so heavy that what it presses with must come down to the floor within the step.
+#[test]
+fn a_stack_under_a_heavy_top_rests_over_its_borders() {
+    for (density, most) in [(10.0, 1e-4), (100.0, 1e-2)] {
+        for grid in [(1, 1), (2, 2), (3, 3), (4, 8)] {
+            let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+            scene.half = DVec2::splat(10.0);
+            let material = Material::default();
+            scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, material);
+            let unit = Shape::rectangle(1.0, 1.0);
+            let kinds = [1.0, density].map(|density| scene.kind(unit, Material { density, ..material }));
+            for k in 0..10 {
+                scene.body(kinds[k / 9], DVec2::new(0.0, 0.5 + k as f64), Vec2::ZERO);
+            }
+            let mut sim = scene.start_on(grid, Exchange::Substep);
+            sim.run(600);
+            let mass: f64 = sim.bodies().iter().map(|body| sim.mass(body)).sum();
+            let energy = sim.kinetic_energy() / mass;
+            println!("{grid:?}, top {density} times as dense: {energy:.1e} J/kg");
+            assert!(energy < most, "{grid:?}, top {density} times as dense: {energy} J/kg");
+        }
     }
 }
 

@@ -23,6 +23,7 @@ type Overrides = &'static [(&'static str, &'static str)];
 
 /// Every configuration, small.
 const CONFIGS: &[(&str, Overrides)] = &[
+    ("large_pyramid", &[("bodies", "820"), ("base", "40"), ("steps", "60")]),
     ("normal", &[("bodies", "4000"), ("steps", "120")]),
     ("pile", &[("bodies", "1500"), ("steps", "120")]),
     ("pyramids", &[("bodies", "1100"), ("steps", "100")]),
@@ -31,6 +32,7 @@ const CONFIGS: &[(&str, Overrides)] = &[
     ("single_island", &[("bodies", "2500"), ("steps", "60")]),
     ("skewed", &[("bodies", "4000"), ("steps", "120")]),
     ("slope", &[("bodies", "20"), ("steps", "120"), ("tiles", "2x2")]),
+    ("smash", &[("bodies", "2000"), ("steps", "120")]),
     ("sparse", &[("bodies", "4000"), ("steps", "100")]),
     ("stack", &[("steps", "120"), ("tiles", "2x2")]),
 ];

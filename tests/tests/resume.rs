@@ -20,7 +20,7 @@ const OPTIONS: [&str; 6] = ["--quiet", "--record-every", "20", "--checkpoint-eve
 
 /// How often each kind of death is tried, and over how many steps: `ATOLL_KILLS=20x3000` for one.
 fn kills() -> (u64, String) {
-    let text = std::env::var("ATOLL_KILLS").unwrap_or("1x400".to_owned());
+    let text = std::env::var("ATOLL_KILLS").unwrap_or("2x400".to_owned());
     let (times, steps) = text.split_once('x').expect("ATOLL_KILLS is TIMESxSTEPS");
     (times.parse().expect("ATOLL_KILLS is TIMESxSTEPS"), steps.to_owned())
 }
@@ -87,7 +87,7 @@ fn killed_runs_go_on_elsewhere() {
             // Where nothing is there yet, this begins; so the very same command may be given again.
             let running = Running::start(command.arg("--resume").arg(&killed));
             sleep(Duration::from_secs_f64(duration * noise(100 * w + time, 1)));
-            if (w + time) % 2 == 0 {
+            if time % 2 == 0 {
                 processes::kill_all(&running);
             } else {
                 // Its ranks, if they are processes, find out by themselves, and the next run waits for that.

@@ -1,6 +1,6 @@
 //! The scene in Atoll: all tiles in this process, messages delivered on the spot.
 
-use super::case::Case;
+use super::given::Given;
 use super::{Failure, Simulation};
 use ::atoll_core::{Body, Kind, Loopback, World};
 
@@ -22,10 +22,10 @@ impl Simulated {
     ///
     /// # Errors
     /// If the scene makes no world.
-    pub fn new(case: &Case) -> Result<Self, Failure> {
-        let blueprint = &case.plan.blueprint;
+    pub fn new(given: &impl Given) -> Result<Self, Failure> {
+        let blueprint = given.blueprint();
         let mut world = World::whole(blueprint).map_err(Failure::refused)?;
-        for body in case.plan.scene.iter() {
+        for body in given.bodies() {
             world.add(body).map_err(Failure::refused)?;
         }
         Ok(Self { world, kinds: blueprint.kinds.clone() })

@@ -1,8 +1,7 @@
 //! The scene in Box2D v3, through its C interface.
 
-use super::case::Case;
+use super::given::{Corners, Given};
 use super::{Failure, Simulation};
-use ::atoll::scene::Scene;
 use ::atoll_core::{Body, Kind, Material, Params, Rot, Shape, StaticBody};
 use boxdd_sys::ffi;
 use std::ffi::{CStr, c_char, c_int};
@@ -52,28 +51,20 @@ pub fn has_assertions() -> bool {
 
 /// A scene in Box2D, a world for each room.
 #[derive(Debug)]
-pub struct Worlds<'a> {
+pub struct Worlds<'a, W> {
     worlds: Vec<ffi::b2WorldId>,
-    scene: &'a Scene,
+    given: &'a W,
     /// In the order of the ids, whatever the world.
     bodies: Vec<ffi::b2BodyId>,
     dt: f32,
     substeps: c_int,
 }
 
-/// Low and high corner of a room.
-type Corners = [[f64; 2]; 2];
-
-fn home(scene: &Scene, index: u64) -> Corners {
-    let (low, high) = scene.home(index);
-    [low.to_array(), high.to_array()]
-}
-
 /// The rooms, with the number of their bodies.
-fn rooms(scene: &Scene) -> Vec<(Corners, usize)> {
+fn rooms(given: &impl Given) -> Vec<(Corners, usize)> {
     let mut rooms: Vec<(Corners, usize)> = Vec::new();
-    for index in 0..scene.bodies() {
-        let corners = home(scene, index);
+    for (index, _) in (0..).zip(given.bodies()) {
+        let corners = given.home(index);
         match rooms.iter_mut().find(|(room, _)| *room == corners) {
             Some((_, bodies)) => *bodies += 1,
             None => rooms.push((corners, 1)),
@@ -88,45 +79,44 @@ fn stands_in(room: &Corners, fixed: &StaticBody) -> bool {
     (0..2).all(|axis| (room[0][axis]..=room[1][axis]).contains(&place[axis]))
 }
 
-impl<'a> Worlds<'a> {
+impl<'a, W: Given> Worlds<'a, W> {
     /// Builds them.
     ///
     /// # Errors
     /// If Box2D can hold no such world, or was not built for speed.
-    pub fn new(case: &'a Case) -> Result<Self, Failure> {
-        let (scene, blueprint) = (&case.plan.scene, &case.plan.blueprint);
+    pub fn new(given: &'a W) -> Result<Self, Failure> {
+        let (blueprint, threads) = (given.blueprint(), given.threads());
         let params = &blueprint.params;
         if has_assertions() && !cfg!(debug_assertions) {
             return Err(Failure::refused("Box2D was built with its assertions: add -DNDEBUG to your CFLAGS"));
         }
-        let rooms = rooms(scene);
+        let rooms = rooms(given);
         if let Some((_, bodies)) = rooms.iter().find(|(_, bodies)| *bodies > MOST_BODIES) {
             return Err(Failure::refused(format!(
                 "{bodies} bodies in one world: Box2D {} goes wrong above {MOST_BODIES}; ask for fewer --bodies",
                 version()
             )));
         }
-        if case.threads > MOST_THREADS {
-            let message =
-                format!("{} threads: Box2D uses at most {MOST_THREADS}; ask for fewer --threads", case.threads);
+        if threads > MOST_THREADS {
+            let message = format!("{threads} threads: Box2D uses at most {MOST_THREADS}; ask for fewer --threads");
             return Err(Failure::refused(message));
         }
         let mut worlds = Self {
             worlds: Vec::new(),
-            scene,
-            bodies: Vec::with_capacity(scene.bodies() as usize),
+            given,
+            bodies: Vec::with_capacity(rooms.iter().map(|(_, bodies)| bodies).sum()),
             dt: params.dt,
             substeps: params.substeps as c_int,
         };
         for (room, _) in &rooms {
-            let world = create_world(params, case.threads)?;
+            let world = create_world(params, threads)?;
             worlds.worlds.push(world);
-            for fixed in scene.statics().iter().filter(|fixed| rooms.len() == 1 || stands_in(room, fixed)) {
+            for fixed in blueprint.statics.iter().filter(|fixed| rooms.len() == 1 || stands_in(room, fixed)) {
                 create_static(world, fixed);
             }
         }
-        for (index, body) in (0..).zip(scene.iter()) {
-            let corners = home(scene, index);
+        for (index, body) in (0..).zip(given.bodies()) {
+            let corners = given.home(index);
             let room = rooms.iter().position(|(room, _)| *room == corners).expect("every home is a room");
             let kind = &blueprint.kinds[body.kind.0 as usize];
             worlds.bodies.push(create_dynamic(worlds.worlds[room], &body, kind, params));
@@ -212,7 +202,7 @@ fn create_shape(body: ffi::b2BodyId, kind: &Kind) {
     }
 }
 
-impl Simulation for Worlds<'_> {
+impl<W: Given> Simulation for Worlds<'_, W> {
     fn step(&mut self) -> Result<(), String> {
         for &world in &self.worlds {
             // SAFETY: the world is ours and lives until the drop; nothing else touches it meanwhile.
@@ -245,11 +235,11 @@ impl Simulation for Worlds<'_> {
                 ..start
             }
         };
-        self.scene.iter().zip(&self.bodies).map(state).collect()
+        self.given.bodies().zip(&self.bodies).map(state).collect()
     }
 }
 
-impl Drop for Worlds<'_> {
+impl<W> Drop for Worlds<'_, W> {
     fn drop(&mut self) {
         let _one_at_a_time = CREATION.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         for &world in &self.worlds {

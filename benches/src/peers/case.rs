@@ -1,8 +1,10 @@
 //! What is compared: a scene of the configurations, of a size, for a number of steps.
 
 use super::Failure;
+use super::given::{Corners, Given};
 use ::atoll::Config;
 use ::atoll::internals::Plan;
+use ::atoll_core::{Blueprint, Body};
 use clap::ValueEnum;
 use std::fmt;
 
@@ -17,11 +19,21 @@ pub enum SceneName {
     Pile,
     /// Pyramids of boxes.
     Pyramids,
+    /// One large pyramid.
+    #[value(name = "large_pyramid")]
+    LargePyramid,
+    /// A wall of boxes, and a large one that flies into it.
+    Smash,
 }
 
 impl SceneName {
     fn steps(self) -> u64 {
-        if self == Self::Pile { 600 } else { 200 }
+        match self {
+            Self::Pile => 600,
+            Self::LargePyramid => 500,
+            Self::Smash => 300,
+            _ => 200,
+        }
     }
 
     /// Where not the configuration's.
@@ -37,6 +49,8 @@ impl fmt::Display for SceneName {
             Self::Skewed => "skewed",
             Self::Pile => "pile",
             Self::Pyramids => "pyramids",
+            Self::LargePyramid => "large_pyramid",
+            Self::Smash => "smash",
         })
     }
 }
@@ -87,12 +101,23 @@ impl Case {
         let plan = Plan::new(&config).map_err(Failure::refused)?;
         Ok(Self { scene, steps: wishes.steps.unwrap_or_else(|| scene.steps()), threads, plan })
     }
+}
 
-    /// Sum of the masses of the dynamic bodies, in kg.
-    pub fn mass(&self) -> f64 {
-        let kinds = &self.plan.blueprint.kinds;
-        let masses: Vec<f64> =
-            kinds.iter().map(|kind| f64::from(kind.material.density) * f64::from(kind.shape.area())).collect();
-        self.plan.scene.iter().map(|body| masses[body.kind.0 as usize]).sum()
+impl Given for Case {
+    fn blueprint(&self) -> &Blueprint {
+        &self.plan.blueprint
+    }
+
+    fn bodies(&self) -> impl Iterator<Item = Body> {
+        self.plan.scene.iter()
+    }
+
+    fn home(&self, index: u64) -> Corners {
+        let (low, high) = self.plan.scene.home(index);
+        [low.to_array(), high.to_array()]
+    }
+
+    fn threads(&self) -> usize {
+        self.threads
     }
 }

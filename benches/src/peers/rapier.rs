@@ -1,8 +1,7 @@
 //! The scene in rapier2d.
 
 use super::Simulation;
-use super::case::Case;
-use ::atoll::scene::Scene;
+use super::given::Given;
 use ::atoll_core::{Body, Kind, Params, Rot, Shape};
 use rapier2d::dynamics::SpringCoefficients;
 use rapier2d::prelude::{
@@ -16,22 +15,22 @@ pub fn version() -> String {
 }
 
 /// A scene in one world of rapier2d.
-pub struct Simulated<'a> {
+pub struct Simulated<'a, W> {
     world: PhysicsWorld,
-    scene: &'a Scene,
+    given: &'a W,
     /// In the order of the ids.
     handles: Vec<RigidBodyHandle>,
 }
 
-impl<'a> Simulated<'a> {
+impl<'a, W: Given> Simulated<'a, W> {
     /// Builds it; steps use the rayon pool they are called in.
-    pub fn new(case: &'a Case) -> Self {
-        let (scene, blueprint) = (&case.plan.scene, &case.plan.blueprint);
+    pub fn new(given: &'a W) -> Self {
+        let blueprint = given.blueprint();
         let params = &blueprint.params;
         let gravity = Vector::new(params.gravity.x, params.gravity.y);
         let integration_parameters = integration_parameters(params);
         let mut world = PhysicsWorld { gravity, integration_parameters, ..PhysicsWorld::default() };
-        for fixed in scene.statics() {
+        for fixed in &blueprint.statics {
             let body = RigidBodyBuilder::fixed()
                 .translation(Vector::new(fixed.position.x as f32, fixed.position.y as f32))
                 .rotation(fixed.rotation.angle());
@@ -49,8 +48,8 @@ impl<'a> Simulated<'a> {
                 .ccd_enabled(false);
             world.insert(dynamic, collider(&blueprint.kinds[body.kind.0 as usize])).0
         };
-        let handles = scene.iter().map(place).collect();
-        Self { world, scene, handles }
+        let handles = given.bodies().map(place).collect();
+        Self { world, given, handles }
     }
 }
 
@@ -81,7 +80,7 @@ fn collider(kind: &Kind) -> ColliderBuilder {
         .restitution_combine_rule(CoefficientCombineRule::Max)
 }
 
-impl Simulation for Simulated<'_> {
+impl<W: Given> Simulation for Simulated<'_, W> {
     fn step(&mut self) -> Result<(), String> {
         self.world.step();
         Ok(())
@@ -103,6 +102,6 @@ impl Simulation for Simulated<'_> {
                 ..start
             }
         };
-        self.scene.iter().zip(&self.handles).map(state).collect()
+        self.given.bodies().zip(&self.handles).map(state).collect()
     }
 }

@@ -1,4 +1,5 @@
 use super::case::{SceneName, Wishes};
+use super::given::Given as _;
 use super::*;
 
 const ENGINES: [Engine; 3] = [Engine::Atoll, Engine::Box2d, Engine::Rapier];

@@ -1,6 +1,8 @@
 //! Who touches whom, and how: pairs of near bodies, and their manifolds with the impulses of the step before.
 
 pub(crate) mod broad_phase;
+mod eight_pairs;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
 pub(crate) mod proxies;
+mod touch;

@@ -1,19 +1,15 @@
 //! Narrow phase: from pairs to contacts, in canonical order, each with the impulses it had.
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::{Manifold, collide};
+use crate::collide::eight_pairs::{EightPairs, Outlook};
 use crate::collide::proxies::Proxies;
-use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot};
-use crate::model::math::{Rot, dot, turn};
-use crate::model::shape::KindRow;
+use crate::collide::touch::{is_slow, recycle, touch};
+use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
+use crate::parallel::lanes::{Kernel, LANES, Lanes};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::Vec2;
 use std::ops::Range;
-
-/// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
-const RECYCLE_COSINE: f32 = 0.98;
 
 /// Candidates, and pairs, in a piece of work, at least.
 const GRAIN: usize = 2048;
@@ -35,6 +31,32 @@ impl Contacts {
         self.bodies.clear();
     }
 
+    /// Adds the contact of a pair, if there is one; of a slow one there may be an outlook.
+    #[inline(always)]
+    fn find(&mut self, tile: &Tile, setup: &Setup, named: Named<'_>, slow: Option<(&Outlook, usize)>) {
+        let Named { key, bodies, known } = named;
+        if let (Some(known), Some((outlook, lane))) = (known, slow) {
+            if outlook.rolls(lane) {
+                let separation = outlook.roll(lane, self.cache.push(key, *known));
+                return self.push_bodies(bodies, separation);
+            }
+            if let Some(separation) = recycle(tile, bodies, known, setup) {
+                self.cache.push(key, *known);
+                return self.push_bodies(bodies, separation);
+            }
+        }
+        if let Some((contact, separation)) = touch(tile, bodies, known, setup) {
+            self.cache.push(key, contact);
+            self.push_bodies(bodies, separation);
+        }
+    }
+
+    #[inline(always)]
+    fn push_bodies(&mut self, bodies: Pair, separation: [f32; 2]) {
+        self.bodies.push(bodies);
+        self.separation.push(separation);
+    }
+
     fn append(&mut self, other: &mut Self) {
         self.cache.append(&mut other.cache);
         self.separation.append(&mut other.separation);
@@ -44,7 +66,7 @@ impl Contacts {
     /// Contacts, and border contacts, of which body A is owned: so that each is counted by one tile.
     pub(crate) fn count(&self, owned: usize) -> (u64, u64) {
         let (mut all, mut border) = (0, 0);
-        for (&[a, _], &key) in self.bodies.iter().zip(&self.cache.keys) {
+        for (&[a, _], &key) in self.bodies.iter().zip(&self.cache.keys[..self.cache.own()]) {
             let is_border = key.is_border();
             let counts = !is_border || (a as usize) < owned;
             all += u64::from(counts);
@@ -59,7 +81,7 @@ impl Contacts {
 pub(crate) struct NarrowPhase {
     near: Vec<Pair>,
     sorted: Vec<Pair>,
-    /// Per owned body where its pairs begin in `sorted`.
+    /// Per body that may be a pair's first where its pairs begin in `sorted`.
     start: Vec<u32>,
     /// What each of several threads finds.
     parts: Vec<Contacts>,
@@ -77,17 +99,17 @@ impl NarrowPhase {
         contacts: &mut Contacts,
     ) {
         self.cull(tile, proxies, candidates, team);
-        self.sort(tile.owned);
+        self.sort(proxies.pairing);
         contacts.clear();
         let sorted = &self.sorted[..];
         let pieces = team.pieces(sorted.len(), GRAIN);
         if pieces == 1 {
-            return find_among(sorted, tile, setup, contacts);
+            return setup.lanes.run(FindAmong { sorted, tile, setup, contacts });
         }
         self.parts.resize_with(pieces, Contacts::default);
         let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
         team.for_each(parts, |(range, part): (Range<usize>, &mut Contacts)| {
-            find_among(&sorted[range], tile, setup, part);
+            setup.lanes.run(FindAmong { sorted: &sorted[range], tile, setup, contacts: part });
         });
         self.parts.iter_mut().for_each(|part| contacts.append(part));
     }
@@ -99,14 +121,14 @@ impl NarrowPhase {
             cull(tile, proxies, &candidates[range], near)
         });
         self.start.clear();
-        self.start.resize(tile.owned + 2, 0);
+        self.start.resize(proxies.pairing + 2, 0);
         for pair in &self.near {
             self.start[pair[0] as usize + 2] += 1;
         }
     }
 
     /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
-    fn sort(&mut self, owned: usize) {
+    fn sort(&mut self, firsts: usize) {
         let mut sum = 0;
         for start in &mut self.start {
             sum += *start;
@@ -119,7 +141,7 @@ impl NarrowPhase {
             self.sorted[*place as usize] = pair;
             *place += 1;
         }
-        for body in 0..owned {
+        for body in 0..firsts {
             let (first, end) = (self.start[body] as usize, self.start[body + 1] as usize);
             if end - first > 1 {
                 self.sorted[first..end].sort_unstable();
@@ -137,151 +159,101 @@ fn cull(tile: &Tile, proxies: &Proxies, candidates: &[Pair], near: &mut Vec<Pair
     for &pair in candidates {
         let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
         near[kept] = pair;
-        kept += usize::from(proxies.is_pair(offset, pair));
+        kept += usize::from(proxies.is_wanted(pair)) & usize::from(proxies.is_pair(offset, pair));
     }
     near.truncate(kept);
 }
 
 /// Appends the contacts among some sorted pairs.
-fn find_among(sorted: &[Pair], tile: &Tile, setup: &Setup, contacts: &mut Contacts) {
-    let ghosts = tile.ghosts();
-    let key_of = |[low, high]: Pair| {
-        let slot = |index: u32| Slot::from_index(index as usize, tile.owned, ghosts);
-        PairKey::new(slot(low), slot(high))
-    };
-    let keys = &tile.contacts.keys;
-    let mut old = sorted.first().map_or(0, |&first| keys.partition_point(|&key| key < key_of(first)));
-    for &[low, high] in sorted {
-        let key = key_of([low, high]);
-        // Both lists ascend: one pass over the old contacts serves all pairs.
-        while old < keys.len() && keys[old] < key {
-            old += 1;
+struct FindAmong<'a> {
+    sorted: &'a [Pair],
+    tile: &'a Tile,
+    setup: &'a Setup,
+    contacts: &'a mut Contacts,
+}
+
+/// A pair as its contact names it.
+#[derive(Clone, Copy)]
+struct Named<'a> {
+    key: PairKey,
+    /// Bodies A and B.
+    bodies: Pair,
+    known: Option<&'a Contact>,
+}
+
+impl Kernel for FindAmong<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { sorted, tile, setup, contacts } = self;
+        let mut names = Names::new(tile, sorted);
+        let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
+        // In a pile nearly all have a contact that may roll on; where bodies fly few do. Both ways give the same bits.
+        if 2 * tile.contacts.len() < sorted.len() {
+            for &pair in sorted {
+                let named = names.name(pair);
+                let is_slow = named.known.is_some() && is_slow(tile, named.bodies, setup);
+                if is_slow {
+                    eight.set(0, tile, named.bodies, setup);
+                    eight.look::<V>(setup, &mut outlook);
+                }
+                contacts.find(tile, setup, named, is_slow.then_some((&outlook, 0)));
+            }
+            return;
         }
-        let known = (old < keys.len() && keys[old] == key).then(|| &tile.contacts.contacts[old]);
+        for pairs in sorted.chunks(LANES) {
+            let mut named = [Named { key: PairKey::default(), bodies: [0, 0], known: None }; LANES];
+            for (lane, &pair) in pairs.iter().enumerate() {
+                named[lane] = names.name(pair);
+                eight.set(lane, tile, named[lane].bodies, setup);
+            }
+            eight.look::<V>(setup, &mut outlook);
+            for (lane, &named) in named[..pairs.len()].iter().enumerate() {
+                contacts.find(tile, setup, named, outlook.is_slow(lane, setup).then_some((&outlook, lane)));
+            }
+        }
+    }
+}
+
+/// Names pairs that ascend: one pass over the contacts of the last step serves them all.
+struct Names<'a> {
+    tile: &'a Tile,
+    ghosts: usize,
+    /// The first contact of the last step that is not before the pairs so far.
+    old: usize,
+}
+
+impl<'a> Names<'a> {
+    fn new(tile: &'a Tile, sorted: &[Pair]) -> Self {
+        let mut names = Self { tile, ghosts: tile.ghosts(), old: 0 };
+        if let Some(&first) = sorted.first() {
+            let first = names.key(first);
+            names.old = tile.contacts.keys.partition_point(|&key| key < first);
+        }
+        names
+    }
+
+    #[inline(always)]
+    fn key(&self, [low, high]: Pair) -> PairKey {
+        let slot = |index: u32| Slot::from_index(index as usize, self.tile.owned, self.ghosts);
+        PairKey::new(slot(low), slot(high))
+    }
+
+    #[inline(always)]
+    fn name(&mut self, [low, high]: Pair) -> Named<'a> {
+        let (tile, keys) = (self.tile, &self.tile.contacts.keys[..]);
+        let key = self.key([low, high]);
+        while self.old < keys.len() && keys[self.old] < key {
+            self.old += 1;
+        }
+        let known = (self.old < keys.len() && keys[self.old] == key).then(|| &tile.contacts.contacts[self.old]);
         let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
-        let (a, b, pair) = if ids.0 < ids.1 { (low, high, ids) } else { (high, low, (ids.1, ids.0)) };
+        let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
         let strange = key.is_border()
             || low as usize >= tile.arrived
             || (high as usize) < tile.owned && high as usize >= tile.arrived;
-        let stray = if strange { tile.strays.find(pair) } else { None };
-        if let Some((contact, separation)) = touch(tile, [a, b], stray.or(known), setup) {
-            contacts.cache.push(key, contact);
-            contacts.separation.push(separation);
-            contacts.bodies.push([a, b]);
-        }
+        let stray = if strange { tile.strays.find(pair, key.is_own()) } else { None };
+        Named { key, bodies, known: stray.or(known) }
     }
-}
-
-/// One side of a contact.
-struct Side<'a> {
-    kind: &'a KindRow,
-    rotation: Rot,
-    velocity: Vec2,
-    angular_velocity: f32,
-}
-
-impl<'a> Side<'a> {
-    #[inline(always)]
-    fn new(tile: &Tile, index: u32, setup: &'a Setup) -> Self {
-        let (bodies, i) = (&tile.bodies, index as usize);
-        Self {
-            kind: setup.kind(bodies.kind[i]),
-            rotation: bodies.rotation[i],
-            velocity: bodies.velocity[i],
-            angular_velocity: bodies.angular_velocity[i],
-        }
-    }
-
-    #[inline(always)]
-    fn is_round(&self) -> bool {
-        self.kind.shape.is_round()
-    }
-
-    /// How the body turned since `then`. A round body's contacts do not turn with it.
-    #[inline(always)]
-    fn turned(&self, then: Rot) -> Rot {
-        if self.is_round() { Rot::IDENTITY } else { then.to(self.rotation) }
-    }
-}
-
-/// The contact of bodies A and B, if there is one, and the separation of its points.
-#[inline(always)]
-fn touch(tile: &Tile, [a, b]: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-    let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
-    let (side_a, side_b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
-    // The contact rule: separation < speculative distance + closing speed x dt.
-    let holds = |normal: Vec2, anchor: Vec2, separation: f32| {
-        let velocity_a = side_a.velocity + turn(side_a.angular_velocity, anchor);
-        let velocity_b = side_b.velocity + turn(side_b.angular_velocity, anchor - offset);
-        let closing = -dot(velocity_b - velocity_a, normal);
-        let ahead = if closing > 0.0 { closing * setup.params.dt } else { 0.0 };
-        separation < setup.params.speculative_distance + ahead
-    };
-    if let Some(known) = known
-        && let Some(separation) = recycle(known, &side_a, &side_b, offset, setup)
-    {
-        let near = known.points().iter().zip(separation).any(|(point, s)| holds(known.normal, point.anchor, s));
-        if near {
-            return Some((*known, separation));
-        }
-    }
-    let manifold = {
-        let between = side_b.velocity - side_a.velocity;
-        let spin = |side: &Side<'_>| side.kind.bounding_radius * side.angular_velocity.abs();
-        let speed = dot(between, between).sqrt() + spin(&side_a) + spin(&side_b);
-        let reach = setup.params.speculative_distance + setup.params.dt * speed;
-        collide(side_a.kind, side_a.rotation, side_b.kind, side_b.rotation, offset, reach)
-    };
-    let mut kept = Manifold { normal: manifold.normal, ..Manifold::EMPTY };
-    for point in manifold.points() {
-        if holds(manifold.normal, point.anchor, point.separation) {
-            kept.push(*point);
-        }
-    }
-    if kept.count == 0 {
-        return None;
-    }
-    let points = kept.points.map(|point| {
-        let old = known.and_then(|known| known.points().iter().find(|old| old.feature == point.feature));
-        ContactPoint {
-            anchor: point.anchor,
-            separation: point.separation,
-            normal_impulse: old.map_or(0.0, |old| old.normal_impulse),
-            tangent_impulse: old.map_or(0.0, |old| old.tangent_impulse),
-            feature: point.feature,
-        }
-    });
-    let contact =
-        Contact { normal: kept.normal, offset, rotation_a: side_a.rotation, rotation_b: side_b.rotation, points };
-    Some((contact, [points[0].separation, points[1].separation]))
-}
-
-/// The separations of a contact whose manifold still serves: the bodies have hardly moved against each other.
-///
-/// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for
-/// ever. Here a round body's contacts do not turn with it, so that rolling keeps them.
-#[inline(always)]
-fn recycle(known: &Contact, a: &Side<'_>, b: &Side<'_>, offset: Vec2, setup: &Setup) -> Option<[f32; 2]> {
-    let (turned_a, turned_b) = (a.turned(known.rotation_a), b.turned(known.rotation_b));
-    if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
-        return None;
-    }
-    // Relative motion as seen from the body that turns its contacts, or from the world where there is none.
-    let frame = if a.is_round() { turned_b } else { turned_a };
-    let moved = frame.unrotate(offset) - known.offset;
-    let twist = if a.is_round() || b.is_round() {
-        0.0
-    } else {
-        let extent = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { side.kind.bounding_radius } else { 0.0 };
-        turned_a.to(turned_b).s.abs() * crate::model::math::max(extent(a), extent(b))
-    };
-    if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
-        return None;
-    }
-    let shift = offset - known.offset;
-    Some(known.points.map(|point| {
-        let (arm_a, arm_b) = (point.anchor, point.anchor - known.offset);
-        let swing = (turned_b.rotate(arm_b) - arm_b) - (turned_a.rotate(arm_a) - arm_a);
-        point.separation + dot(shift + swing, known.normal)
-    }))
 }

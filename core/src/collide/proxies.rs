@@ -1,11 +1,13 @@
 //! What the search for pairs, and the manifolds after it, know of each body.
 
 use super::broad_phase::Pair;
+use crate::exchange::overlap::Outline;
 use crate::model::body::Bodies;
 use crate::model::math::{self, dot};
 use crate::parallel::lanes::LaneSet;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 
@@ -30,6 +32,11 @@ pub(crate) struct Proxies {
     pub(crate) not_round: Vec<f32>,
     /// Local coordinates are rounded; comparing them needs this much more room for the body, in meters.
     pub(crate) slack: Vec<f32>,
+    /// Pairs are wanted of bodies for whom this comes to two: two for an owned one, one for a static and for a ghost near enough
+    /// (see `exchange/overlap.rs`), nothing for other ghosts.
+    weight: Vec<u8>,
+    /// Pairs of two bodies from here on are not wanted: of ghosts and statics, or of statics.
+    pub(crate) pairing: usize,
     pub(crate) owned: usize,
     /// Owned bodies and ghosts; statics come after them.
     pub(crate) dynamic: usize,
@@ -76,9 +83,29 @@ impl Proxies {
             (range, part)
         });
         team.for_each(parts.collect(), |(range, part)| load(bodies, dynamic, corner, setup, range, part));
-        (self.owned, self.dynamic) = (owned, dynamic);
+        (self.owned, self.dynamic, self.pairing) = (owned, dynamic, owned);
+        self.weight.clear();
+        self.weight.resize(owned, 2);
+        self.weight.resize(dynamic, 0);
+        self.weight.resize(total, 1);
         self.size = setup.grid.tile_size().as_vec2().to_array();
         (self.dt, self.lanes) = (setup.params.dt, setup.lanes);
+    }
+
+    /// Lets ghosts of the tile whose proxies these are be paired with each other, and with statics, where they are near.
+    pub(crate) fn pair_ghosts(&mut self, tile: &Tile, setup: &Setup) {
+        if setup.overlap.is_some() {
+            self.pairing = self.dynamic;
+            for ghost in self.owned..self.dynamic {
+                self.weight[ghost] = u8::from(Outline::of(tile, ghost, setup).is_near(tile.id, setup));
+            }
+        }
+    }
+
+    /// Whether a pair is one that the tile solves.
+    #[inline(always)]
+    pub(crate) fn is_wanted(&self, [a, b]: Pair) -> bool {
+        self.weight[a as usize] + self.weight[b as usize] >= 2
     }
 
     /// Whether the grown AABBs of two bodies overlap in local coordinates, with room for their rounding.
@@ -111,11 +138,9 @@ impl Proxies {
         let between = Vec2::new(self.velocity_x[b] - self.velocity_x[a], self.velocity_y[b] - self.velocity_y[a]);
         let square = dot(offset, offset);
         let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
-        let closing = if self.not_round[a] + self.not_round[b] > 0.0 {
-            speed * distance
-        } else {
-            math::max(-dot(between, offset), 0.0)
-        };
+        // Zero of two round ones; a branch here would be a coin toss.
+        let any = math::min(self.not_round[a] + self.not_round[b], 1.0);
+        let closing = math::max(math::max(any * (speed * distance), -dot(between, offset)), 0.0);
         let within = (self.reach[a] + self.reach[b]) * distance + self.dt * closing;
         overlap & (square <= within * 1.0001)
     }
@@ -137,7 +162,7 @@ fn load(bodies: &Bodies, dynamic: usize, corner: DVec2, setup: &Setup, range: Ra
         slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
         let mut half = kind.half_extents(rotation[i]);
         if i < dynamic {
-            half += Vec2::splat(setup.margin(velocity[i]));
+            half += setup.margin(velocity[i]);
         }
         (half_x[i], half_y[i]) = (half.x, half.y);
         (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);

@@ -2,8 +2,10 @@
 
 pub(crate) mod border;
 pub(crate) mod codec;
+pub(crate) mod far;
 pub(crate) mod halo;
 pub(crate) mod mail;
 pub(crate) mod migrate;
+pub(crate) mod overlap;
 pub(crate) mod record;
 pub(crate) mod verdict;

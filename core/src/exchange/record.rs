@@ -49,11 +49,13 @@ pub struct GhostRecord {
     pub padding: u32,
 }
 
-/// A ghost's state after a substep: 40 bytes. Velocities and displacements are mass-weighted (times the square root of
+/// A ghost's state after a substep: 48 bytes. Velocities and displacements are mass-weighted (times the square root of
 /// mass or inertia), as the solver holds them, so that the copy is exact.
 #[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct GhostRefresh {
+    /// Which body.
+    pub id: GlobalId,
     /// Velocity x, y and angular velocity, mass-weighted.
     pub velocity: [f32; 3],
     /// Displacement x, y of the step so far, mass-weighted; cosine minus one, and mass-weighted sine, of its rotation.

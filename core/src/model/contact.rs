@@ -1,7 +1,7 @@
 //! Contacts that outlive a step: their manifolds and impulses, and the cache that keeps them.
 
 use crate::model::id::GlobalId;
-use crate::model::math::Rot;
+use crate::model::math::{Rot, cross, max, right_perp};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
@@ -73,13 +73,15 @@ impl Contact {
     /// The stored impulses' sum upon body B, and its moments about the centers of A (upon A) and of B (upon B). Body A
     /// feels the opposite impulse.
     pub(crate) fn impulse(&self) -> (Vec2, f32, f32) {
-        let tangent = crate::model::math::right_perp(self.normal);
+        let tangent = right_perp(self.normal);
         let (mut sum, mut on_a, mut on_b) = (Vec2::ZERO, 0.0, 0.0);
         for point in self.points() {
             let p = self.normal * point.normal_impulse + tangent * point.tangent_impulse;
+            // Friction acts at the surfaces, as in the rows of the solver.
+            let gap = 0.5 * max(point.separation, 0.0) * point.tangent_impulse;
             sum += p;
-            on_a -= crate::model::math::cross(point.anchor, p);
-            on_b += crate::model::math::cross(point.anchor - self.offset, p);
+            on_a -= cross(point.anchor, p) + gap;
+            on_b += cross(point.anchor - self.offset, p) - gap;
         }
         (sum, on_a, on_b)
     }
@@ -134,8 +136,8 @@ impl Slot {
     }
 }
 
-/// Two slots, the lower first. The lower is always an owned body: a tile solves no other contacts.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Pod, Zeroable)]
+/// Two slots, the lower first. Contacts of owned bodies come first, therefore, and those that a tile solves for others after them.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Debug, Pod, Zeroable)]
 #[repr(transparent)]
 pub(crate) struct PairKey(u64);
 
@@ -156,10 +158,16 @@ impl PairKey {
         Slot(self.0 as u32)
     }
 
-    /// Whether the bodies belong to two tiles: then both solve the contact.
+    /// Whether one of the bodies is owned, or else the contact is one of others, and solved here for their sake.
+    #[inline(always)]
+    pub(crate) fn is_own(self) -> bool {
+        matches!(self.low().kind(), SlotKind::Owned(_))
+    }
+
+    /// Whether the bodies belong to two tiles, of which this is one: then both remember the contact.
     #[inline(always)]
     pub(crate) fn is_border(self) -> bool {
-        matches!(self.high().kind(), SlotKind::Ghost(_))
+        self.is_own() && matches!(self.high().kind(), SlotKind::Ghost(_))
     }
 }
 
@@ -173,6 +181,11 @@ pub(crate) struct ContactCache {
 impl ContactCache {
     pub(crate) fn len(&self) -> usize {
         self.keys.len()
+    }
+
+    /// How many are of owned bodies: these come first.
+    pub(crate) fn own(&self) -> usize {
+        self.keys.partition_point(|key| key.is_own())
     }
 
     pub(crate) fn clear(&mut self) {
@@ -196,13 +209,23 @@ impl ContactCache {
         self.contacts.extend_from_slice(&other.contacts);
     }
 
-    pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {
+    #[inline(always)]
+    pub(crate) fn push(&mut self, key: PairKey, contact: Contact) -> &mut Contact {
+        let place = self.contacts.len();
         self.keys.push(key);
         self.contacts.push(contact);
+        &mut self.contacts[place]
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = (PairKey, &Contact)> {
         self.keys.iter().copied().zip(&self.contacts)
+    }
+
+    /// Keeps those whose key is to stay.
+    pub(crate) fn retain(&mut self, stays: impl Fn(PairKey) -> bool) {
+        let mut keys = self.keys.iter();
+        self.contacts.retain(|_| keys.next().is_some_and(|&key| stays(key)));
+        self.keys.retain(|&key| stays(key));
     }
 
     /// Renames every slot and restores the order.
@@ -226,6 +249,8 @@ impl ContactCache {
 /// Where a contact found by name comes from; where a pair has several entries, the greatest decides.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Authority {
+    /// This tile's own cache, of a contact that it solved for others: good for nothing else.
+    Overlap,
     /// Another tile, which did not own the lower GlobalId.
     Foreign,
     /// This tile's own cache.
@@ -261,7 +286,9 @@ impl Strays {
         self.0.dedup_by_key(|stray| stray.pair);
     }
 
-    pub(crate) fn find(&self, pair: (GlobalId, GlobalId)) -> Option<&Contact> {
-        self.0.binary_search_by_key(&pair, |stray| stray.pair).ok().map(|i| &self.0[i].contact)
+    /// What is remembered of a pair: of which one is owned, or neither.
+    pub(crate) fn find(&self, pair: (GlobalId, GlobalId), is_own: bool) -> Option<&Contact> {
+        let found = &self.0[self.0.binary_search_by_key(&pair, |stray| stray.pair).ok()?];
+        (!is_own || found.authority != Authority::Overlap).then_some(&found.contact)
     }
 }

@@ -29,8 +29,8 @@ pub enum Solver {
     /// Substepped soft constraints with relax (Box2D v3's scheme).
     #[default]
     SoftStep,
-    /// Sequential impulses over the whole step: projected Gauss-Seidel with warm starting and accumulated clamping, and
-    /// Baumgarte's position correction (the report's). Counts as one substep.
+    /// Sequential impulses over each half of the step: projected Gauss-Seidel with warm starting and accumulated clamping, and
+    /// Baumgarte's position correction (the report's). Counts as two substeps.
     Pgs,
 }
 
@@ -97,7 +97,8 @@ pub struct Params {
     pub angular_damping: f32,
     /// Greatest speed of a center, in m/s (none: infinity).
     pub max_linear_speed: f32,
-    /// Greatest angular speed, in rad/s (47: no more than an eighth of a turn a step, as in Box2D).
+    /// Greatest angular speed, in rad/s (none: infinity). No body turns further than an eighth of a turn in a
+    /// substep; where a step has fewer than four, in a fourth of the step or so.
     pub max_angular_speed: f32,
     /// Stiffness of a contact between dynamic bodies, in Hz (30); twice that against statics. Held below a quarter of
     /// the substep rate.
@@ -106,7 +107,7 @@ pub struct Params {
     pub contact_damping_ratio: f32,
     /// Greatest speed at which overlap is pushed out, in m/s (3). More resolves overlap sooner, with more energy.
     pub push_out_speed: f32,
-    /// A contact is made when separation < this + closing speed x dt, in m (0.02).
+    /// A contact is made of bodies nearer than this, and of those that will touch within the step, in m (0.02).
     pub speculative_distance: f32,
     /// A contact's manifold is kept until this much relative motion, in m (0.05). Zero computes every
     /// manifold anew, and piles never quite come to rest.
@@ -115,7 +116,7 @@ pub struct Params {
     pub restitution_threshold: f32,
     /// Least margin of a body's AABB, in m (0.05).
     pub margin_floor: f32,
-    /// Greatest margin of a body's AABB, in m (0.5). Bodies that move further in a step may tunnel. Part of the width
+    /// Greatest margin of a body's AABB, in m (0.5). A step in which a body moves further costs an exchange more. Part of the width
     /// of the halo.
     pub margin_cap: f32,
     /// The bodies of a tile are sorted by place every so many steps (32). For memory locality alone, yet part of the
@@ -127,7 +128,7 @@ pub struct Params {
     pub broad_phase: BroadPhase,
     /// Solver (soft-step).
     pub solver: Solver,
-    /// Passes over all contacts in a step of [`Solver::Pgs`] (10). More make stacks stiffer; the solver's cost grows with
+    /// Passes over all contacts in a step of [`Solver::Pgs`] (10), half of them in each half. More make stacks stiffer; the solver's cost grows with
     /// them.
     pub iterations: u32,
     /// Part of an overlap that [`Solver::Pgs`] pushes out in a step (0.1), at most `push_out_speed`. More resolves it
@@ -160,7 +161,7 @@ impl Default for Params {
             linear_damping: 0.0,
             angular_damping: 0.0,
             max_linear_speed: f32::INFINITY,
-            max_angular_speed: 47.0,
+            max_angular_speed: f32::INFINITY,
             contact_hertz: 30.0,
             contact_damping_ratio: 10.0,
             push_out_speed: 3.0,
@@ -229,7 +230,7 @@ impl Params {
     pub(crate) fn integrations(&self) -> u32 {
         match self.solver {
             Solver::SoftStep => self.substeps,
-            Solver::Pgs => 1,
+            Solver::Pgs => 2,
         }
     }
 

@@ -38,6 +38,14 @@ impl Shape {
         }
     }
 
+    /// Radius of the largest circle around the center within the shape, in meters.
+    pub(crate) fn inner_radius(&self) -> f32 {
+        match *self {
+            Self::Circle { radius } => radius,
+            Self::Box { half } => half.min_element(),
+        }
+    }
+
     /// Area in square meters.
     pub fn area(&self) -> f32 {
         match *self {
@@ -158,6 +166,12 @@ impl KindRow {
             root_inv_inertia: inv_inertia.sqrt(),
             ..row
         })
+    }
+
+    /// Half extents, radius, bounding radius: of a round body the first are zero.
+    #[inline(always)]
+    pub(crate) fn outline(&self) -> [f32; 4] {
+        [self.extent.x, self.extent.y, self.radius, self.bounding_radius]
     }
 
     /// Mass and moment of inertia.

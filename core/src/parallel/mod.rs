@@ -8,3 +8,4 @@ pub(crate) mod lanes;
 #[allow(unsafe_code)]
 pub(crate) mod shared;
 pub(crate) mod team;
+pub(crate) mod vectors;

@@ -34,13 +34,15 @@ pub(crate) struct Batch {
     pub(crate) statics: u32,
     /// Whether several threads are to solve it together.
     pub(crate) large: bool,
+    /// Whether other tiles are to hear of some of its bodies within the step, or this tile of theirs.
+    pub(crate) at_border: bool,
     pub(crate) colors: Range<usize>,
     pub(crate) groups: Each<Range<usize>>,
 }
 
 impl Batch {
-    fn new(large: bool) -> Self {
-        Self { large, statics: if large { MOST_SLICES } else { 1 }, ..Self::default() }
+    fn new(large: bool, at_border: bool) -> Self {
+        Self { large, at_border, statics: if large { MOST_SLICES } else { 1 }, ..Self::default() }
     }
 
     /// Into how many pieces to cut so many groups of one color.
@@ -57,9 +59,11 @@ pub(crate) struct Graph<'a> {
     pub(crate) roots: &'a [u32],
     /// Nodes in the largest island.
     pub(crate) largest: u64,
-    /// Nodes from here on are ghosts that are heard of within the step. Islands with such, and islands without, are not
-    /// mixed: these need not wait for word.
+    /// Nodes from here on are ghosts that are heard of within the step. Islands with such, or with bodies that others hear of, and
+    /// islands without are not mixed: these need not wait for word.
     pub(crate) first_ghost: usize,
+    /// Bodies of the tile that others hear of within the step.
+    pub(crate) sent: &'a [u32],
     /// For each root whether its island sleeps. None where nobody may.
     pub(crate) sleeps: Option<&'a [bool]>,
 }
@@ -72,7 +76,7 @@ pub(crate) struct Batches {
     pub(crate) contacts: Vec<u32>,
     /// For each island, named by its lowest node, how many contacts it has, and then its batch.
     of_island: Vec<u32>,
-    /// For each island whether it has a ghost that is heard of within the step.
+    /// For each island whether it has a body that is heard of within the step.
     at_border: Vec<bool>,
     /// Whether there is more than one thread to solve a batch.
     crews: bool,
@@ -107,15 +111,22 @@ impl Batches {
         };
         let crew = parallel == Parallel::Coloring || parallel == Parallel::Auto && is_large;
         if together && sleeps.is_none() {
-            self.put_together(contacts.len(), nodes, roots.len(), crew)
+            let at_border = graph.first_ghost < roots.len() || !graph.sent.is_empty();
+            self.put_together(contacts.len(), nodes, roots.len(), [crew, at_border])
         } else {
             self.put_apart(graph, nodes, parallel, together.then_some(crew))
         }
     }
 
     /// Everything in one batch.
-    fn put_together(&mut self, contacts: usize, nodes: Vec<GraphNode>, moving: usize, crew: bool) -> Vec<SolverIndex> {
-        let mut batch = Batch::new(self.crews && crew);
+    fn put_together(
+        &mut self,
+        contacts: usize,
+        nodes: Vec<GraphNode>,
+        moving: usize,
+        [crew, at_border]: [bool; 2],
+    ) -> Vec<SolverIndex> {
+        let mut batch = Batch::new(self.crews && crew, at_border);
         let statics = batch.statics;
         batch.contacts = 0..contacts;
         batch.bodies = 0..(statics as usize + moving).next_multiple_of(LANES);
@@ -143,6 +154,12 @@ impl Batches {
         self.of_island.resize(roots.len(), 0);
         for &pair in contacts {
             self.of_island[island_of(pair) as usize] += 1;
+        }
+        self.at_border.clear();
+        self.at_border.resize(roots.len(), false);
+        roots[graph.first_ghost.min(roots.len())..].iter().for_each(|&root| self.at_border[root as usize] = true);
+        for node in graph.sent.iter().filter_map(|&body| nodes[body as usize].number()) {
+            self.at_border[roots[node as usize] as usize] = true;
         }
         self.choose(graph, parallel, together);
 
@@ -198,12 +215,9 @@ impl Batches {
     /// Decides which island goes into which batch, from the contacts of each alone: ascending, so that neighbours in
     /// memory stay neighbours.
     fn choose(&mut self, graph: Graph<'_>, parallel: Parallel, together: Option<bool>) {
-        let Graph { roots, sleeps, first_ghost, .. } = graph;
-        self.at_border.clear();
-        self.at_border.resize(roots.len(), false);
-        roots[first_ghost.min(roots.len())..].iter().for_each(|&root| self.at_border[root as usize] = true);
+        let Graph { roots, sleeps, .. } = graph;
         if let Some(crew) = together {
-            self.all.push(Batch::new(self.crews && crew));
+            self.all.push(Batch::new(self.crews && crew, self.at_border.contains(&true)));
         }
         // The batch that is being filled, and its contacts: of islands within the tile, and of those at its border.
         let mut open = [(NO_BATCH, 0); 2];
@@ -217,12 +231,13 @@ impl Batches {
             } else if together.is_some() {
                 0
             } else if parallel == Parallel::Auto && weight >= LARGE {
-                self.all.push(Batch::new(self.crews));
+                self.all.push(Batch::new(self.crews, self.at_border[node as usize]));
                 self.all.len() as u32 - 1
             } else {
-                let (batch, filled) = &mut open[usize::from(self.at_border[node as usize])];
+                let at_border = self.at_border[node as usize];
+                let (batch, filled) = &mut open[usize::from(at_border)];
                 if *batch == NO_BATCH || *filled >= SMALL {
-                    self.all.push(Batch::new(false));
+                    self.all.push(Batch::new(false, at_border));
                     (*batch, *filled) = (self.all.len() as u32 - 1, 0);
                 }
                 *filled += weight;
@@ -271,7 +286,7 @@ mod tests {
             let asleep: Vec<bool> = (0..count).map(|root| root % 3 == 0).collect();
             let sleeps = sleep.then_some(&asleep[..]);
             let first_ghost = count - count / 8;
-            let graph = Graph { contacts: &contacts, roots, largest, first_ghost, sleeps };
+            let graph = Graph { contacts: &contacts, roots, largest, first_ghost, sent: &[2], sleeps };
             for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
                 for team in [Team::ALONE, Team::of_pool()] {
                     let mut batches = Batches::default();

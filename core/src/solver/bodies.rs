@@ -9,6 +9,7 @@ use crate::parallel::lanes::Quad;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
+use glam::Vec2;
 
 /// The root of how much heavier a frozen ghost is made than it is. With mass-weighted velocities infinity cannot be
 /// written down; this leaves 1e-12 of what an impulse would do, and that is taken back in every substep.
@@ -139,7 +140,7 @@ impl SolverBodies {
         [unseen.linear.x * root_inv_mass, unseen.linear.y * root_inv_mass, unseen.angular * root_inv_inertia]
     }
 
-    /// Takes over a ghost's state from its owner. Its share of the next warm start stays this tile's own.
+    /// Takes over a ghost's state from its owner, if it has a contact here. Its share of the next warm start stays this tile's own.
     pub(crate) fn refresh(&mut self, body: usize, refresh: &GhostRefresh) {
         let place = self.index[body];
         if place == SolverIndex::NOT_SOLVED {
@@ -161,6 +162,16 @@ impl SolverBodies {
         let place = self.place_of(body).get();
         let [x, y, w, _] = self.velocity[place];
         ([x, y, w], self.pose[place])
+    }
+
+    /// How far a body of the tile has gone in the step, in m, if it is solved.
+    pub(crate) fn displacement(&self, body: usize) -> Option<Vec2> {
+        let place = self.index[body];
+        let moved = |place: SolverIndex| {
+            let ([x, y, ..], [.., root_inv_mass]) = (self.pose[place.get()], self.weight[place.get()]);
+            Vec2::new(x, y) * root_inv_mass
+        };
+        (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
     }
 
     /// Which of these a body of the tile is.

@@ -4,7 +4,7 @@ use super::bodies::Ghost;
 use super::constraint::columns::Color;
 use super::constraint::columns::SharedColumns;
 use super::constraint::kernels::{Pass, Table};
-use super::motion::{Motion, integrate_rotation};
+use super::motion::Motion;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{LANES, Lanes, Quad};
 use crate::parallel::shared::Shared;
@@ -28,16 +28,13 @@ pub(crate) struct Job<'a> {
     pub(crate) ghosts: &'a [Ghost],
     pub(crate) base: usize,
     pub(crate) frozen: bool,
+    /// Whether it waits for word from other tiles, or gives it, between substeps.
+    pub(crate) at_border: bool,
     /// Whether it is worth a crew.
     pub(crate) large: bool,
 }
 
 impl<'a> Job<'a> {
-    /// Whether other tiles' bodies take part.
-    pub(crate) fn has_ghosts(&self) -> bool {
-        !self.ghosts.is_empty()
-    }
-
     /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
     /// member: meeting costs more than they do.
     #[inline(always)]
@@ -125,8 +122,8 @@ impl<'a> Job<'a> {
 
     /// Moves bodies by their velocities.
     #[inline(always)]
-    pub(crate) fn integrate_positions<V: Lanes>(&self, member: &Member<'a>, h: f32) {
-        let (h, one) = (V::splat(h), V::splat(1.0));
+    pub(crate) fn integrate_positions<V: Lanes>(&self, member: &Member<'a>, motion: &Motion) {
+        let (h, one) = (V::splat(motion.h), V::splat(1.0));
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocity, pose) = unsafe { (self.velocity.range(range.clone()), self.pose.range(range.clone())) };
@@ -136,7 +133,7 @@ impl<'a> Job<'a> {
                 let [vx, vy, w, _] = V::load_quads(velocity);
                 let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
                 let [x, y, c, s] = V::load_quads(pose);
-                let (c, s) = integrate_rotation(c.add(one), s.mul(root_inv_inertia), h.mul(w.mul(root_inv_inertia)));
+                let (c, s) = motion.turn(c.add(one), s.mul(root_inv_inertia), w.mul(root_inv_inertia));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
             }
         }

@@ -70,19 +70,20 @@ impl Solver {
     }
 
     /// Puts the islands into batches, but those that sleep, and takes their bodies in. `roots` gives for each node the
-    /// lowest of its island, `largest` how many nodes the largest island has.
+    /// lowest of its island, `largest` how many nodes the largest island has, `sent` the bodies that others hear of within the step.
     pub(crate) fn gather(
         &mut self,
         tile: &Tile,
         contacts: &[Pair],
         (roots, largest): (&[u32], u64),
+        sent: &[u32],
         setup: &Setup,
         team: Team,
     ) {
         let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
         let heard_of = setup.params.exchange == Exchange::Substep;
         let first_ghost = if heard_of { self.bodies.first_ghost } else { roots.len() };
-        let graph = Graph { contacts, roots, largest, first_ghost, sleeps };
+        let graph = Graph { contacts, roots, largest, first_ghost, sent, sleeps };
         self.bodies.load(tile, &mut self.batches, graph, setup, team);
     }
 
@@ -101,11 +102,11 @@ impl Solver {
         }
     }
 
-    /// Makes some substeps of all batches. Those without ghosts have no word to wait for, and make all of them with the
+    /// Makes some substeps of all batches. Those away from borders have no word to wait for, and make all of them with the
     /// first, while they are in the cache.
     pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
         let substeps = |job: &Job<'_>| match substeps.start {
-            _ if job.has_ghosts() => substeps.clone(),
+            _ if job.at_border => substeps.clone(),
             0 => 0..setup.params.integrations(),
             _ => 0..0,
         };
@@ -148,6 +149,7 @@ impl Solver {
                 ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
                 base: batch.bodies.start,
                 frozen,
+                at_border: batch.at_border,
                 large: batch.large && colors.iter().any(|color| color.slices > 1),
             }
         })
@@ -187,7 +189,8 @@ impl Solver {
     /// How fast, in m/s, the surfaces of each solved point still come nearer than they may.
     pub(crate) fn violation(&self, contacts: &Contacts, setup: &Setup) -> Violation {
         let mut violation = Violation::default();
-        for (i, contact) in (0..).zip(&contacts.cache.contacts).filter(|&(i, _)| self.groups.is_solved(i)) {
+        let own = &contacts.cache.contacts[..contacts.cache.own()];
+        for (i, contact) in (0..).zip(own).filter(|&(i, _)| self.groups.is_solved(i)) {
             for point in 0..contact.point_count() {
                 let speed = f64::from(self.groups.violation(i, point, &self.bodies, setup.h));
                 violation.add(speed);

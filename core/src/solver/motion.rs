@@ -1,13 +1,21 @@
 //! How bodies move within a substep: gravity, damping, speed limits, and positions by velocities.
 
+use crate::model::math::min;
 use crate::parallel::lanes::Lanes;
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
+
+/// The turning of a body is followed in so many parts of a step, at least; further than an eighth of a turn, in rad, it turns in
+/// none: what turns faster cannot be followed.
+const PARTS: u32 = 4;
+const MOST_TURN: f32 = std::f32::consts::FRAC_PI_4;
 
 /// What moves a body in a substep, but contacts.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion {
     pub(crate) h: f32,
+    /// In so many parts turning is followed in a substep.
+    parts: u32,
     /// Velocity gained.
     gravity: Vec2,
     linear_damping: f32,
@@ -19,13 +27,15 @@ pub(crate) struct Motion {
 impl Motion {
     pub(crate) fn new(setup: &Setup) -> Self {
         let (h, params) = (setup.h, &setup.params);
+        let parts = PARTS.div_ceil(params.integrations());
         Self {
             h,
+            parts,
             gravity: params.gravity * h,
             linear_damping: 1.0 / (1.0 + h * params.linear_damping),
             angular_damping: 1.0 / (1.0 + h * params.angular_damping),
             max_linear_speed: params.max_linear_speed,
-            max_angular_speed: params.max_angular_speed,
+            max_angular_speed: min(params.max_angular_speed, MOST_TURN * parts as f32 / h),
         }
     }
 
@@ -42,20 +52,21 @@ impl Motion {
             let scale = speed.sub(limit).if_positive(limit.div(speed), one);
             (vx, vy) = (vx.mul(scale), vy.mul(scale));
         }
-        let mut w = w.mul(V::splat(self.angular_damping));
-        if self.max_angular_speed < f32::INFINITY {
-            let limit = V::splat(self.max_angular_speed).mul(root_inertia);
-            w = w.min(limit).max(V::splat(0.0).sub(limit));
-        }
+        let limit = V::splat(self.max_angular_speed).mul(root_inertia);
+        let w = w.mul(V::splat(self.angular_damping)).min(limit).max(V::splat(0.0).sub(limit));
         [vx, vy, w]
     }
-}
 
-/// A rotation turned on by a small angle, at length one again.
-#[inline(always)]
-pub(crate) fn integrate_rotation<V: Lanes>(c: V, s: V, angle: V) -> (V, V) {
-    let turned_c = c.sub(angle.mul(s));
-    let turned_s = s.add(angle.mul(c));
-    let scale = V::splat(1.0).div(turned_c.mul(turned_c).add(turned_s.mul(turned_s)).sqrt());
-    (turned_c.mul(scale), turned_s.mul(scale))
+    /// A rotation turned on for a substep, at length one again.
+    #[inline(always)]
+    pub(crate) fn turn<V: Lanes>(&self, mut c: V, mut s: V, speed: V) -> (V, V) {
+        let angle = V::splat(self.h / self.parts as f32).mul(speed);
+        for _ in 0..self.parts {
+            let turned_c = c.sub(angle.mul(s));
+            let turned_s = s.add(angle.mul(c));
+            let scale = V::splat(1.0).div(turned_c.mul(turned_c).add(turned_s.mul(turned_s)).sqrt());
+            (c, s) = (turned_c.mul(scale), turned_s.mul(scale));
+        }
+        (c, s)
+    }
 }

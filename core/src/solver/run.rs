@@ -24,7 +24,7 @@ impl Kernel for Run<'_> {
         for substep in substeps {
             match setup.params.solver {
                 Solver::SoftStep => soft_step::substep::<V>(job, &member, substep, setup),
-                Solver::Pgs => pgs::step::<V>(job, &member, setup),
+                Solver::Pgs => pgs::substep::<V>(job, &member, substep, setup),
             }
         }
     }

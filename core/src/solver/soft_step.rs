@@ -5,7 +5,7 @@
 //! the push ("relax"), so that the push adds no energy.
 
 use super::constraint::group::Group;
-use super::constraint::kernels::{Normals, Pass, Table, WarmStart, accumulate};
+use super::constraint::kernels::{Normals, Pass, Table, WarmStart};
 use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;
@@ -16,12 +16,13 @@ use crate::tiling::blueprint::Setup;
 /// One substep of a batch.
 #[inline(always)]
 pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep: u32, setup: &Setup) {
-    job.integrate_velocities::<V>(member, &Motion::new(setup), substep == 0);
+    let motion = Motion::new(setup);
+    job.integrate_velocities::<V>(member, &motion, substep == 0);
     if substep == 0 {
         job.each_color::<V>(member, WarmStart);
     }
     job.each_color::<V>(member, Solve::new(setup));
-    job.integrate_positions::<V>(member, setup.h);
+    job.integrate_positions::<V>(member, &motion);
     if setup.totals {
         job.each_color::<V>(member, Relax::<true>::new(setup));
     } else {
@@ -29,7 +30,7 @@ pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep:
     }
 }
 
-/// Normal impulses, with the soft push out of overlap, then friction.
+/// Friction and normal impulses, with the soft push out of overlap.
 #[derive(Clone, Copy)]
 struct Solve {
     softness: Softness,
@@ -62,27 +63,31 @@ impl Pass for Solve {
         let (rate, mass_scale, impulse_scale) =
             (either(|s| s.bias_rate), either(|s| s.mass_scale), either(|s| s.impulse_scale));
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        for rows in &mut group.points {
-            let axis = normals.normal(rows);
-            let separation = V::load(&rows.separation);
-            let old = V::load(&rows.normal_impulse);
-            // Apart: may close the gap within the substep, no more. Overlapping: pushed out softly.
-            let push = rate.mul(separation).max(V::splat(-self.push_out_speed));
-            let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
-            let mass_scale = separation.if_positive(one, mass_scale);
-            let impulse_scale = separation.if_positive(zero, impulse_scale);
-            let speed = axis.speed(&a, &b);
-            let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
-            let new = old.sub(wanted).sub(impulse_scale.mul(old)).max(zero);
-            axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
-        }
-        normals.apply_friction(&mut group.points, V::load(&group.sides.friction), &mut a, &mut b);
+        let friction = V::load(&group.sides.friction);
+        normals.push(
+            &mut group.points,
+            friction,
+            &mut a,
+            &mut b,
+            #[inline(always)]
+            |rows, speed| {
+                let separation = V::load(&rows.separation);
+                let old = V::load(&rows.normal_impulse);
+                // Apart: may close the gap within the substep, no more. Overlapping: pushed out softly.
+                let push = rate.mul(separation).max(V::splat(-self.push_out_speed));
+                let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
+                let mass_scale = separation.if_positive(one, mass_scale);
+                let impulse_scale = separation.if_positive(zero, impulse_scale);
+                let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
+                old.sub(wanted).sub(impulse_scale.mul(old)).max(zero)
+            },
+        );
         V::scatter(a, bodies.velocity, &group.sides.a);
         V::scatter(b, bodies.velocity, &group.sides.b);
     }
 }
 
-/// Normal impulses without the push, then friction, at the poses after the substep. Keeps the separations, which hold
+/// Friction and normal impulses without the push, at the poses after the substep. Keeps the separations, which hold
 /// until bodies move again: in the next substep's solve. With `TOTALS`, sums impulses over the step.
 #[derive(Clone, Copy)]
 struct Relax<const TOTALS: bool> {
@@ -104,23 +109,23 @@ impl<const TOTALS: bool> Pass for Relax<TOTALS> {
         let pose_b = V::gather(bodies.pose, &group.sides.b);
         let normals = Normals::<V>::load(&group.sides);
         let zero = V::splat(0.0);
-        for rows in &mut group.points {
-            let axis = normals.normal(rows);
-            let separation = V::load(&rows.first_separation).add(axis.moved_apart(rows, &pose_a, &pose_b));
-            separation.store(&mut rows.separation);
-            let bias = separation.max(zero).mul(V::splat(self.inv_h));
-            let old = V::load(&rows.normal_impulse);
-            let wanted = V::load(&rows.normal_mass).mul(axis.speed(&a, &b).add(bias));
-            let new = old.sub(wanted).max(zero);
-            axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), &mut a, &mut b);
-            if TOTALS {
-                V::load(&rows.total_normal).add(new).store(&mut rows.total_normal);
-            }
-        }
-        normals.apply_friction(&mut group.points, V::load(&group.sides.friction), &mut a, &mut b);
+        normals.part(&mut group.points, &pose_a, &pose_b);
+        let friction = V::load(&group.sides.friction);
+        normals.push(
+            &mut group.points,
+            friction,
+            &mut a,
+            &mut b,
+            #[inline(always)]
+            |rows, speed| {
+                let bias = V::load(&rows.separation).max(zero).mul(V::splat(self.inv_h));
+                let wanted = V::load(&rows.normal_mass).mul(speed.add(bias));
+                V::load(&rows.normal_impulse).sub(wanted).max(zero)
+            },
+        );
         if TOTALS {
             for rows in &mut group.points {
-                V::load(&rows.total_tangent).add(V::load(&rows.tangent_impulse)).store(&mut rows.total_tangent);
+                rows.add_to_totals::<V>();
             }
         }
         V::scatter(a, bodies.velocity, &group.sides.a);

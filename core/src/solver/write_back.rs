@@ -2,7 +2,7 @@
 
 use super::bodies::SolverBodies;
 use super::index::SolverIndex;
-use super::motion::{Motion, integrate_rotation};
+use super::motion::Motion;
 use crate::model::id::GlobalId;
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
@@ -155,7 +155,7 @@ fn fly<V: Lanes>(owned: &mut Owned<'_>, block: &[u32], motion: &Motion, substeps
     for _ in 0..substeps {
         velocity = motion.accelerate(velocity, one, one);
         (x, y) = (x.add(h.mul(velocity[0])), y.add(h.mul(velocity[1])));
-        (c, s) = integrate_rotation(c, s, h.mul(velocity[2]));
+        (c, s) = motion.turn(c, s, velocity[2]);
     }
     let mut out: [Row; 7] = [[0.0; LANES]; 7];
     for (row, value) in out.iter_mut().zip([velocity[0], velocity[1], velocity[2], x, y, c, s]) {

@@ -104,7 +104,7 @@ impl Figures {
     /// Adds the contacts that a tile found.
     pub(crate) fn add_contacts(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, team: Team) {
         let count = |range| Overlaps::among(contacts, range, tile.owned, setup);
-        in_pieces(contacts.cache.len(), team, count, |found: Overlaps| {
+        in_pieces(contacts.cache.own(), team, count, |found: Overlaps| {
             self.contacts += found.contacts;
             self.border_contacts += found.border_contacts;
             self.overlaps += found.points;

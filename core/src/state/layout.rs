@@ -38,6 +38,6 @@ layout!(Contact { normal: 0, offset: 8, rotation_a: 16, rotation_b: 24, points: 
 layout!(ContactRecord { low: 0, high: 8, from_owner_of_low: 16, contact: 24 } 104);
 layout!(Unseen { linear: 0, angular: 8 } 12);
 layout!(GhostRecord { body: 0, unseen: 48, padding: 60 } 64);
-layout!(GhostRefresh { velocity: 0, pose: 12, unseen: 28 } 40);
+layout!(GhostRefresh { id: 0, velocity: 8, pose: 20, unseen: 36 } 48);
 layout!(BorderImpulse { low: 0, high: 8, points: 16 } 64);
 layout!(BorderPoint { feature: 0, total_normal: 4, total_tangent: 8, normal: 12, tangent: 16, padding: 20 } 24);

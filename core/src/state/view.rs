@@ -54,10 +54,10 @@ impl<'a> TileView<'a> {
         &asleep[..asleep.len().min(self.tile.owned)]
     }
 
-    /// The contacts that the last step solved here. What touches across an edge is solved, and shown, by both tiles.
+    /// The contacts of its bodies that the last step solved. What touches across an edge is solved, and shown, by both tiles.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + use<'a> {
         let tile = self.tile;
-        tile.contacts.iter().map(move |(key, contact)| {
+        tile.contacts.iter().take(tile.contacts.own()).map(move |(key, contact)| {
             let [low, high] = [key.low(), key.high()].map(|slot| tile.index(slot));
             // Body A is the one with the lower name, whichever slot it has.
             let [a, b] = if tile.bodies.id[low] < tile.bodies.id[high] { [low, high] } else { [high, low] };

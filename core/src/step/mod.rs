@@ -4,8 +4,8 @@ pub(crate) mod phase;
 pub(crate) mod stage;
 
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
-use crate::exchange::migrate;
 use crate::exchange::verdict::Verdict;
+use crate::exchange::{far, migrate};
 use crate::model::error::StepError;
 use crate::model::id::GlobalId;
 use crate::model::params::Exchange;
@@ -77,8 +77,8 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
         Exchange::Substep => {
             world.each_tile_apart(|bench| {
                 collide(bench);
+                bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
                 prepare(bench);
-                bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts));
             });
             for substep in 0..world.setup.params.integrations() {
                 // After the last substep only a bounce still looks at a ghost's velocity.
@@ -138,12 +138,13 @@ fn close(mut world: World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepE
     }))
 }
 
-/// The first sync point: migrants, then ghosts. What all ranks together have to say comes back.
+/// The first sync point: migrants, then ghosts; and another where bodies go far. What all ranks together have to say comes back.
 fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
     if !world.has_failed() {
         world.each_tile(|bench| {
             bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
         });
+        world.tell_of_far_bodies();
     }
     let verdict = world.exchange(halo)?;
     if let Some((step, id)) = verdict.failure {
@@ -154,6 +155,11 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
         let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.mail, b.migrate, b.setup, b.step);
         bench.stage(Phase::Migrate, receive);
     });
+    if verdict.is_far() {
+        world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::send(b.tile, b.outgoing, b.setup)));
+        world.exchange(halo)?;
+        world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::receive(b.tile, b.mail, b.setup)));
+    }
     world.dismiss_idle();
     Ok(verdict)
 }
@@ -163,6 +169,7 @@ fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
         let (tile, counts) = (&b.tile, [b.tile.owned, b.tile.ghosts()]);
         b.work.proxies.load(&tile.bodies, counts, tile.corner, b.setup, b.team);
+        b.work.proxies.pair_ghosts(tile, b.setup);
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
         }
@@ -187,12 +194,17 @@ fn prepare(bench: &mut Bench<'_>) {
         let (solver, contacts, params) = (&mut b.work.solver, &b.work.contacts, &b.setup.params);
         let (nodes, links) = solver.graph(b.tile, &contacts.bodies);
         let sizes = b.work.islands.find(params.island_search, nodes, links, b.team);
-        let counts = &mut b.tile.counts;
-        (counts.islands, counts.largest_island) = (sizes.islands, sizes.largest);
-        (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
         let roots = b.work.islands.roots();
+        let counts = &mut b.tile.counts;
+        // Not those of ghosts alone.
+        let first_ghost = solver.bodies.first_ghost as u32;
+        let islands = (0..first_ghost).zip(roots).filter(|(node, root)| node == *root).count() as u64;
+        debug_assert!(islands == sizes.islands || b.setup.overlap.is_some());
+        (counts.islands, counts.largest_island) = (islands, sizes.largest);
+        (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
         b.tile.fall_asleep(solver.nodes(), roots, b.setup);
-        solver.gather(b.tile, &contacts.bodies, (roots, sizes.largest), b.setup, b.team);
+        let sent = if params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
+        solver.gather(b.tile, &contacts.bodies, (roots, sizes.largest), sent, b.setup, b.team);
     });
     bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
     bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));
@@ -214,7 +226,10 @@ fn finalize(bench: &mut Bench<'_>) {
         }
         solver.store_impulses(contacts);
         b.tile.contacts.copy_from(&contacts.cache);
+        far::forget(b.tile);
+        let ways = far::ways(b.tile, &solver.bodies, b.setup);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
+        far::hold(b.tile, &ways, b.setup);
         b.tile.count_rest(b.setup);
         if let Some(figures) = &mut b.figures {
             figures.add_bodies(b.tile, b.setup, b.team);

@@ -1,5 +1,6 @@
 //! What every rank knows alike, checked once and made ready for the step.
 
+use crate::exchange::overlap;
 use crate::model::body::{Body, StaticBody};
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId, TileId};
@@ -61,6 +62,9 @@ pub(crate) struct Setup {
     pub(crate) halo_width: f64,
     /// A body further inside its tile than this neither leaves nor is anybody's ghost.
     pub(crate) inset: f64,
+    /// A contact of bodies that both come this near a tile's region is solved there as well (see `exchange/overlap.rs`), in
+    /// meters. None where each contact is solved by the owners of its bodies alone.
+    pub(crate) overlap: Option<f64>,
     /// Length of a substep, in seconds.
     pub(crate) h: f32,
     pub(crate) lanes: LaneSet,
@@ -113,6 +117,7 @@ impl Setup {
             grid: blueprint.grid.clone(),
             halo_width,
             inset: 2.0 * halo_width,
+            overlap: overlap::depth(&params).map(|part| part * halo_width),
             h: params.substep(),
             lanes: LaneSet::of(params.instructions).ok_or(SetupError::NoAvx2)?,
             softness: Softness::contact(&params),
@@ -142,24 +147,36 @@ impl Setup {
         &self.kinds[kind.0 as usize]
     }
 
-    /// How much a body's AABB is grown: as far as it may come within a step, within limits. In meters.
+    /// How much a body's AABB is grown on each side: as far as it may come within a step. That is limited, but for where it goes
+    /// further by itself. In meters.
     #[inline(always)]
-    pub(crate) fn margin(&self, velocity: Vec2) -> f32 {
+    pub(crate) fn margin(&self, velocity: Vec2) -> Vec2 {
         let speed = math::dot(velocity, velocity).sqrt();
-        math::clamp(speed * self.params.dt, self.params.margin_floor, self.params.margin_cap)
+        let any_way = math::clamp(speed * self.params.dt, self.params.margin_floor, self.params.margin_cap);
+        let own_way = velocity.abs() * self.params.dt;
+        Vec2::new(math::max(own_way.x, any_way), math::max(own_way.y, any_way))
+    }
+
+    /// Whether a body goes further in a step than the halo has room for.
+    #[inline(always)]
+    pub(crate) fn goes_far(&self, velocity: Vec2) -> bool {
+        let most = self.params.margin_cap;
+        (velocity.x.abs() * self.params.dt > most) | (velocity.y.abs() * self.params.dt > most)
     }
 
     /// Half extents of a dynamic body's AABB, grown by its margin. In meters.
     #[inline(always)]
     pub(crate) fn grown_half_extents(&self, kind: KindId, rotation: Rot, velocity: Vec2) -> Vec2 {
-        self.kind(kind).half_extents(rotation) + Vec2::splat(self.margin(velocity))
+        self.kind(kind).half_extents(rotation) + self.margin(velocity)
     }
 
-    /// The statics that a tile must know: those that reach its region grown by the halo.
+    /// The statics that a tile must know: those that reach its region grown by the halo; where it solves contacts of ghosts, by
+    /// three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
+        let reach = if self.overlap.is_some() { 3.0 * self.halo_width } else { self.halo_width };
         let reaches = |body: &Body| {
             let half = self.kind(body.kind).half_extents(body.rotation);
-            self.grid.reaches(tile, body.position, half, self.halo_width)
+            self.grid.reaches(tile, body.position, half, reach)
         };
         (0..).zip(&self.statics).filter(|(_, body)| reaches(body)).map(|(row, _)| row).collect()
     }

@@ -59,6 +59,8 @@ pub(crate) struct TileCounts {
     pub(crate) ghosts: u64,
     /// Bodies that left for a tile that is no neighbour.
     pub(crate) leaps: u64,
+    /// Whether an owned body goes further in the step than the halo is wide.
+    pub(crate) far: bool,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
     pub(crate) asleep: u64,
@@ -134,6 +136,13 @@ impl Tile {
         self.unseen = Vec::new();
         self.ghost_owners = Vec::new();
         self.violation = Violation::default();
+    }
+
+    /// Puts the statics behind owned bodies and ghosts.
+    pub(crate) fn push_statics(&mut self, setup: &Setup) {
+        for &row in &self.statics {
+            self.bodies.push(setup.statics[row as usize]);
+        }
     }
 
     pub(crate) fn ghosts(&self) -> usize {

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// What a scene may be called.
-const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack" or "slope""#;
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash" or "slope""#;
 const ROOMS: &str = "[scene]\nkind = \"rooms\"\n";
 
 fn read(text: &str, overrides: &[(&str, &str)]) -> Result<Config, String> {
@@ -43,6 +43,7 @@ fn the_kind_of_scene_chooses_the_defaults() {
         ("sparse", 100_000, false),
         ("single-island", 100_000, true),
         ("stack", 10, true),
+        ("smash", 9601, false),
         ("slope", 1, true),
     ] {
         let config = read(&format!("[scene]\nkind = \"{name}\""), &[]).unwrap();

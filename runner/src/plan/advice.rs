@@ -3,7 +3,13 @@
 use super::Plan;
 use crate::config::{OutputConfig, TransportKind};
 use crate::folder::Ended;
+use atoll_core::{Blueprint, Exchange, Kind, Shape};
 use std::thread;
+
+/// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
+const BOUNCY: f32 = 0.9;
+/// Bodies whose masses are further apart are mentioned.
+const MASS_RATIO: f32 = 1e4;
 
 impl Plan {
     /// What the user may want to know before it starts, a sentence each.
@@ -32,6 +38,7 @@ impl Plan {
                 "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
             ));
         }
+        notes.extend(physical(&self.blueprint));
         let unlogged = OutputConfig { log_every: OutputConfig::default().log_every, ..self.config.output };
         if self.output.is_none() && unlogged != OutputConfig::default() {
             notes.push("[output] says what to write, and there is no --out: none of it is written".to_owned());
@@ -48,6 +55,42 @@ impl Plan {
         }));
         notes
     }
+}
+
+/// What the solver cannot do well of what is asked.
+fn physical(blueprint: &Blueprint) -> Vec<String> {
+    let params = &blueprint.params;
+    let kinds = || blueprint.kinds.iter().chain(blueprint.statics.iter().map(|fixed| &fixed.kind));
+    let mut notes = Vec::new();
+    let restitution = kinds().map(|kind| kind.material.restitution).fold(0.0, f32::max);
+    if restitution > BOUNCY && blueprint.grid.tiles() > 1 && params.exchange == Exchange::Step {
+        notes.push(format!(
+            "restitution is {restitution}, and with exchange = \"step\" bounces over borders of tiles may gain energy: set \
+             exchange=substep, or use one tile"
+        ));
+    }
+    let masses = || blueprint.kinds.iter().map(|kind| kind.material.density * kind.shape.area());
+    let (lightest, heaviest) = (masses().fold(f32::INFINITY, f32::min), masses().fold(0.0, f32::max));
+    if heaviest > MASS_RATIO * lightest {
+        notes.push(format!(
+            "the heaviest body has {:.0} times the mass of the lightest: what lies under much heavier bodies is thrown about; keep \
+             within {MASS_RATIO} times",
+            heaviest / lightest
+        ));
+    }
+    let width = |kind: &Kind| match kind.shape {
+        Shape::Circle { radius } => 2.0 * radius,
+        Shape::Box { half } => 2.0 * half.min_element(),
+    };
+    let narrowest = kinds().map(width).fold(f32::INFINITY, f32::min);
+    if narrowest < params.speculative_distance {
+        notes.push(format!(
+            "the narrowest body is {narrowest} m wide, and contacts are made from {} m on: scale lengths up, or \
+             speculative_distance, recycle_distance, linear_slop and margins down",
+            params.speculative_distance
+        ));
+    }
+    notes
 }
 
 #[cfg(test)]
@@ -67,5 +110,22 @@ mod tests {
         assert_eq!(notes, ["3 of 7 ranks stay idle: there are only 4 tiles; use fewer ranks or more tiles"]);
         let notes = plan(&[("tiles", "200x200")]).notes();
         assert!(notes.len() == 1 && notes[0].starts_with("tiles are only 0.323 m wide"), "{notes:?}");
+        let bouncing = |restitution: f32, overrides: &[(&str, &str)]| {
+            let mut plan = plan(overrides);
+            plan.blueprint.kinds[1].material.restitution = restitution;
+            plan.notes()
+        };
+        let notes = bouncing(1.0, &[("tiles", "2x2")]);
+        assert!(notes.len() == 1 && notes[0].starts_with("restitution is 1, and with exchange"), "{notes:?}");
+        for quiet in [bouncing(0.8, &[("tiles", "2x2")]), bouncing(1.0, &[("exchange", "substep"), ("tiles", "2x2")])] {
+            assert!(quiet.is_empty(), "{quiet:?}");
+        }
+        assert!(bouncing(1.0, &[("tiles", "1x1")]).is_empty());
+        let mut heavy = plan(&[]);
+        heavy.blueprint.kinds[1].material.density *= 1e6;
+        let notes = heavy.notes();
+        assert!(notes.len() == 1 && notes[0].starts_with("the heaviest body has "), "{notes:?}");
+        let notes = plan(&[("speculative_distance", "0.5")]).notes();
+        assert!(notes.len() == 1 && notes[0].starts_with("the narrowest body is 0.2 m wide"), "{notes:?}");
     }
 }

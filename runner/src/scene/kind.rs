@@ -39,6 +39,8 @@ pub enum SceneKind {
     SingleIsland,
     /// A tower of boxes.
     Stack,
+    /// A wall of boxes, and a large one that flies into it.
+    Smash,
     /// Boxes on an incline.
     Slope {
         /// Of the incline, in degrees.
@@ -57,13 +59,14 @@ impl SceneSpec {
 
 impl SceneKind {
     /// Every kind, with what is usual for what only it has.
-    pub const USUAL: [Self; 7] = [
+    pub const USUAL: [Self; 8] = [
         Self::Rooms { power: 1.0 },
         Self::Pile { jitter: 0.01 },
         Self::Pyramids { base: 10 },
         Self::Sparse,
         Self::SingleIsland,
         Self::Stack,
+        Self::Smash,
         Self::Slope { angle: 25.0, friction: 0.6 },
     ];
 
@@ -76,6 +79,7 @@ impl SceneKind {
             Self::Sparse => "sparse",
             Self::SingleIsland => "single-island",
             Self::Stack => "stack",
+            Self::Smash => "smash",
             Self::Slope { .. } => "slope",
         }
     }
@@ -96,6 +100,7 @@ impl SceneKind {
             Self::Pile { .. } | Self::Sparse | Self::SingleIsland => 100_000,
             Self::Pyramids { .. } => 22_000,
             Self::Stack => 10,
+            Self::Smash => 9601,
             Self::Slope { .. } => 1,
         }
     }
@@ -103,7 +108,7 @@ impl SceneKind {
     /// What the parameters are where nobody gives them.
     pub fn usual_params(self) -> Params {
         match self {
-            Self::Rooms { .. } | Self::Sparse => Params::default(),
+            Self::Rooms { .. } | Self::Sparse | Self::Smash => Params::default(),
             // Whatever rests needs its borders to converge.
             Self::Pile { .. } | Self::Pyramids { .. } | Self::SingleIsland | Self::Stack | Self::Slope { .. } => {
                 Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() }

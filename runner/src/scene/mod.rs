@@ -13,6 +13,7 @@ mod random;
 mod rooms;
 mod single_island;
 mod slope;
+mod smash;
 mod sparse;
 mod stack;
 mod statics;
@@ -60,6 +61,7 @@ impl Scene {
             SceneKind::Sparse => Box::new(sparse::Sparse::new(bodies)),
             SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(bodies)),
             SceneKind::Stack => Box::new(stack::Stack::new(bodies)),
+            SceneKind::Smash => Box::new(smash::Smash::new(bodies)),
             SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(bodies, angle, friction)),
         };
         Self { statics: layout.statics(), layout, seed }

@@ -3,9 +3,7 @@
 use super::Outcome;
 use crate::scenes;
 use crate::world::Scene;
-use atoll_core::{
-    Body, Contact, Exchange, GlobalId, Hashes, Loopback, RestoreError, SNAPSHOT_FORMAT, TileId, World, step,
-};
+use atoll_core::{Body, Contact, Exchange, Hashes, Loopback, RestoreError, SNAPSHOT_FORMAT, TileId, World, step};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Where things stand in a block, in bytes.
@@ -29,7 +27,7 @@ pub const BLOCK: BlockLayout = BlockLayout {
     counts: 16,
     hashes: 32,
     header: 64,
-    records: [size_of::<Body>(), 4, size_of::<GlobalId>() + size_of::<TileId>(), 8 + size_of::<Contact>()],
+    records: [size_of::<Body>(), 4, size_of::<Body>() + size_of::<TileId>(), 8 + size_of::<Contact>()],
 };
 
 const TILES: (u32, u32) = (2, 2);

@@ -96,7 +96,7 @@ impl Grid {
         for (i, &a) in self.rest.iter().enumerate() {
             for &b in &self.rest[i + 1..] {
                 if proxies.overlap([a, b]) {
-                    emit(pairs, proxies.owned, a, b);
+                    emit(pairs, proxies.pairing, a, b);
                 }
             }
         }
@@ -133,9 +133,9 @@ impl Grid {
     }
 
     fn pair_small(&self, layout: &Layout, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
-        let (sorted, dt, owned, lanes) = (&self.sorted, proxies.dt, proxies.owned, proxies.lanes);
+        let (sorted, dt, pairing, lanes) = (&self.sorted, proxies.dt, proxies.pairing, proxies.lanes);
         team.append(pairs, sorted.len, GRAIN, |places, pairs| {
-            Search { sorted, dt, owned, lanes, places, pairs }.neighbours(&self.start, layout.columns);
+            Search { sorted, dt, pairing, lanes, places, pairs }.neighbours(&self.start, layout.columns);
         });
     }
 
@@ -151,7 +151,7 @@ impl Grid {
                 let end = self.start[row * layout.columns + columns.end() + 1] as usize;
                 for &other in &self.sorted.body[first..end] {
                     if proxies.overlap([body, other]) {
-                        emit(pairs, proxies.owned, body, other);
+                        emit(pairs, proxies.pairing, body, other);
                     }
                 }
             }

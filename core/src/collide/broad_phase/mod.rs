@@ -1,7 +1,8 @@
 //! Broad phase: which pairs of bodies may touch within this step.
 //!
-//! The contract, whichever structure finds them: every pair with at least one owned body that
-//! [`Proxies::is_pair`](super::proxies::Proxies::is_pair), in any order; pairs that are none may be among them. That test reads the bodies' own bits, not the tile's local
+//! The contract, whichever structure finds them: every pair with a body before
+//! [`Proxies::pairing`](super::proxies::Proxies::pairing) that [`Proxies::is_pair`](super::proxies::Proxies::is_pair), in any
+//! order; pairs that are none may be among them. That test reads the bodies' own bits, not the tile's local
 //! coordinates, so two tiles that both see a pair agree on it.
 
 pub(crate) mod grid;

@@ -61,7 +61,7 @@ impl Sorted {
 pub(super) struct Search<'a> {
     pub(super) sorted: &'a Sorted,
     /// Pairs of two bodies from here on are not wanted.
-    pub(super) owned: usize,
+    pub(super) pairing: usize,
     /// Length of a step, in seconds.
     pub(super) dt: f32,
     pub(super) lanes: LaneSet,
@@ -73,11 +73,11 @@ pub(super) struct Search<'a> {
 /// Room for the rounding of everything that follows from the coordinates.
 const MORE: f32 = 1.001;
 
-/// Appends a pair, lower index first, unless neither body is owned.
+/// Appends a pair, lower index first, if that is wanted.
 #[inline(always)]
-pub(super) fn emit(pairs: &mut Vec<Pair>, owned: usize, a: u32, b: u32) {
+pub(super) fn emit(pairs: &mut Vec<Pair>, pairing: usize, a: u32, b: u32) {
     let (low, high) = if a < b { (a, b) } else { (b, a) };
-    if (low as usize) < owned {
+    if (low as usize) < pairing {
         pairs.push([low, high]);
     }
 }
@@ -119,7 +119,7 @@ impl Search<'_> {
 
     #[inline(always)]
     fn emit(&mut self, a: usize, b: usize) {
-        emit(self.pairs, self.owned, self.sorted.body[a], self.sorted.body[b]);
+        emit(self.pairs, self.pairing, self.sorted.body[a], self.sorted.body[b]);
     }
 
     #[cfg(target_arch = "x86_64")]

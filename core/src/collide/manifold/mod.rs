@@ -1,11 +1,10 @@
-//! Manifolds: where and along what two shapes touch, one file per pair of shapes.
+//! Manifolds: where and along what two shapes touch: of two boxes, and of a round body and any other.
 //!
-//! All of them see body A at the origin and body B at `offset`, in world directions. A new shape needs a function for
-//! every pair it forms, and a line in [`collide`].
+//! All of them see body A at the origin and body B at `offset`, in world directions. A new shape needs a line in [`collide`] for
+//! every pair it forms.
 
 mod box_box;
-mod circle_box;
-mod circle_circle;
+mod round;
 #[cfg(test)]
 mod tests;
 
@@ -50,8 +49,19 @@ impl Manifold {
         self.count += 1;
     }
 
+    #[inline(always)]
     pub(crate) fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count]
+    }
+
+    /// The point with the least separation.
+    #[inline(always)]
+    pub(crate) fn nearest(&self) -> Option<&ManifoldPoint> {
+        match self.count {
+            0 => None,
+            2 if self.points[1].separation < self.points[0].separation => Some(&self.points[1]),
+            _ => Some(&self.points[0]),
+        }
     }
 }
 
@@ -59,9 +69,7 @@ impl Manifold {
 #[inline(always)]
 pub(crate) fn collide(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
     match (a.shape, b.shape) {
-        (Shape::Circle { radius: ra }, Shape::Circle { radius: rb }) => circle_circle::collide(ra, rb, offset),
-        (Shape::Circle { radius }, Shape::Box { half }) => circle_box::circle_first(radius, half, rot_b, offset),
-        (Shape::Box { half }, Shape::Circle { radius }) => circle_box::box_first(half, rot_a, radius, offset),
         (Shape::Box { half: ha }, Shape::Box { half: hb }) => box_box::collide(ha, rot_a, hb, rot_b, offset, reach),
+        _ => round::collide(a, rot_a, b, rot_b, offset),
     }
 }

@@ -1,16 +1,21 @@
 //! The sync points within a step, for `exchange = "substep"`: ghosts are refreshed after every substep, and what both
 //! owners of a border contact found is averaged once at the end.
 //!
-//! Who hears what follows from the border contacts alone. Both owners of a contact hold it, made from the same bits,
-//! so the bodies that one side sends are exactly those the other expects, in the order of its ghost list.
+//! Who hears what follows from contacts and from who is near whom. Both owners of a border contact hold it, made from the same
+//! bits, so each hears of the other's body. What a tile solves for others (see [`overlap`](super::overlap)) it may remember
+//! otherwise than they do: then it hears of ghosts that it does not solve, or nothing of one that it does, which flies on by
+//! itself until the next step.
 
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::mail::{Mail, Mailbag};
+use crate::exchange::overlap::Outline;
 use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
-use crate::model::contact::{Contact, ContactPoint, SlotKind};
+use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::solver::Solver;
+use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::{Fault, Tile};
+use std::ops::Range;
 
 #[cfg(test)]
 mod tests;
@@ -18,12 +23,16 @@ mod tests;
 /// The border contacts of a tile and who must hear of them; made once a step.
 #[derive(Default, Debug)]
 pub(crate) struct Border {
-    /// Owned bodies in contact with ghosts, once for each tile these belong to; sorted.
+    /// Owned bodies in contacts that other tiles solve, once for each of these; sorted.
     sends: Vec<Outgoing>,
+    /// Their bodies, each once.
+    sent: Vec<u32>,
     /// What adds to a sent body's unseen impulse.
     feeds: Vec<Feed>,
-    /// Ghosts in contact, sorted by (owner, GlobalId), which is the order of ghosts.
+    /// Ghosts in contact with owned bodies, sorted by (owner, GlobalId), which is the order of ghosts.
     ghosts: Vec<u32>,
+    /// Contacts that are solved for others.
+    scratch: Range<u32>,
     /// Border contacts by the names of their bodies, sorted.
     contacts: Vec<BorderContact>,
     /// Places in `sends` in the order they are sent: by peer, and for each as its ghosts are ordered.
@@ -32,9 +41,11 @@ pub(crate) struct Border {
     contact_order: Vec<u32>,
     /// For every owned body the range of its `sends`; all empty between steps.
     sends_of: Vec<(u32, u32)>,
+    /// Of all bodies those that a pass over the contacts asks for: most contacts have none, and go by quickly.
+    marked: Vec<bool>,
 }
 
-/// An owned body that another tile has as a ghost in a contact.
+/// An owned body that another tile has as a ghost in a contact that it solves.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Outgoing {
     /// Before the peer, so that the sends of one body are neighbours while they are collected.
@@ -57,27 +68,41 @@ struct BorderContact {
     peer: TileId,
     /// Whether this tile owns body A; it then does not own body B.
     owns_a: bool,
+    /// Whether one of the bodies goes far: then each owner may know of others that it meets before.
+    far: bool,
 }
 
 impl Border {
     /// Finds the border contacts of the step.
-    pub(crate) fn find(&mut self, tile: &Tile, contacts: &Contacts) {
+    pub(crate) fn find(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
         self.sends.clear();
         self.feeds.clear();
         self.ghosts.clear();
         self.contacts.clear();
-        for (i, &key) in (0..).zip(&contacts.cache.keys) {
+        let own = contacts.cache.own();
+        self.scratch = own as u32..contacts.cache.len() as u32;
+        self.mark_outer(tile, setup);
+        for (i, &key) in (0..).zip(&contacts.cache.keys[..own]) {
+            let [a, b] = contacts.bodies[i as usize];
+            if !(self.marked[a as usize] | self.marked[b as usize]) {
+                continue;
+            }
+            self.send_near(tile, key, setup);
             if let SlotKind::Ghost(ghost) = key.high().kind() {
                 let (low, peer) = (tile.index(key.low()) as u32, tile.ghost_owners[ghost]);
                 let pair = tile.pair_of(key);
                 self.sends.push(Outgoing { body: low, peer });
                 self.ghosts.push(ghost as u32);
                 let owns_a = tile.bodies.id[low as usize] == pair.0;
-                self.contacts.push(BorderContact { pair, contact: i, peer, owns_a });
+                let goes_far = |slot| setup.goes_far(tile.bodies.velocity[tile.index(slot)]);
+                let far = goes_far(key.low()) || goes_far(key.high());
+                self.contacts.push(BorderContact { pair, contact: i, peer, owns_a, far });
             }
         }
         self.sends.sort_unstable();
         self.sends.dedup();
+        self.sent.clear();
+        self.sent.extend(self.sends.chunk_by(|a, b| a.body == b.body).map(|sends| sends[0].body));
         self.ghosts.sort_unstable();
         self.ghosts.dedup();
         self.contacts.sort_unstable();
@@ -91,10 +116,43 @@ impl Border {
         contact_order.clear();
         contact_order.extend(0..by_pair.len() as u32);
         contact_order.sort_unstable_by_key(|&i| (by_pair[i as usize].peer, i));
-        self.find_feeds(tile, contacts);
+        self.find_feeds(tile, contacts, setup);
     }
 
-    fn find_feeds(&mut self, tile: &Tile, contacts: &Contacts) {
+    /// The owned bodies that other tiles hear of.
+    pub(crate) fn sent(&self) -> &[u32] {
+        &self.sent
+    }
+
+    /// Marks ghosts, and the owned bodies that others may solve.
+    fn mark_outer(&mut self, tile: &Tile, setup: &Setup) {
+        self.marked.clear();
+        if setup.overlap.is_some() {
+            let is_near_any = |i| Outline::of(tile, i, setup).near(setup).any(|peer| peer != tile.id);
+            let owned = tile.bodies.position[..tile.owned].iter().enumerate();
+            self.marked.extend(owned.map(|(i, &position)| !tile.interior.contains(position) && is_near_any(i)));
+        }
+        self.marked.resize(tile.owned, false);
+        self.marked.resize(tile.owned + tile.ghosts(), true);
+        self.marked.resize(tile.bodies.position.len(), false);
+    }
+
+    /// Notes who must hear of the owned bodies of a contact as they solve it as well.
+    fn send_near(&mut self, tile: &Tile, key: PairKey, setup: &Setup) {
+        for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
+            let SlotKind::Owned(index) = body.kind() else { continue };
+            if setup.overlap.is_none() || !self.marked[index] {
+                continue;
+            }
+            for peer in Outline::of(tile, index, setup).near(setup).filter(|&peer| peer != tile.id) {
+                if solves(peer, tile, partner, setup) {
+                    self.sends.push(Outgoing { body: index as u32, peer });
+                }
+            }
+        }
+    }
+
+    fn find_feeds(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
         if self.sends.is_empty() {
             return;
         }
@@ -107,14 +165,27 @@ impl Border {
             }
             range.1 = i + 1;
         }
-        for (contact, &key) in (0..).zip(&contacts.cache.keys) {
+        self.marked.fill(false);
+        self.sent.iter().for_each(|&body| self.marked[body as usize] = true);
+        for (contact, &key) in (0..self.scratch.start).zip(&contacts.cache.keys) {
+            let [a, b] = contacts.bodies[contact as usize];
+            if !(self.marked[a as usize] | self.marked[b as usize]) {
+                continue;
+            }
             for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
                 let SlotKind::Owned(body) = body.kind() else { continue };
-                let owner = owner_of(tile, partner);
-                let upon_a = contacts.bodies[contact as usize][0] == body as u32;
                 let (first, end) = self.sends_of[body];
-                for send in (first..end).filter(|&send| owner != Some(self.sends[send as usize].peer)) {
-                    self.feeds.push(Feed { send, contact, upon_a });
+                if first == end {
+                    continue;
+                }
+                let owner = owner_of(tile, partner);
+                let outline = Outline::of(tile, body, setup);
+                let upon_a = contacts.bodies[contact as usize][0] == body as u32;
+                for send in first..end {
+                    let peer = self.sends[send as usize].peer;
+                    if owner != Some(peer) && !(outline.is_near(peer, setup) && solves(peer, tile, partner, setup)) {
+                        self.feeds.push(Feed { send, contact, upon_a });
+                    }
                 }
             }
         }
@@ -136,27 +207,35 @@ impl Border {
             let Outgoing { body, peer } = self.sends[i as usize];
             let (velocity, pose) = solver.bodies.state_of(body);
             bag.address(tile.id, peer);
-            bag.refreshes.push(GhostRefresh { velocity, pose, unseen: unseen[i as usize] });
+            let id = tile.bodies.id[body as usize];
+            bag.refreshes.push(GhostRefresh { id, velocity, pose, unseen: unseen[i as usize] });
         }
     }
 
     /// Takes over the owners' state of the ghosts in contact.
     pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>) {
-        let mut ghosts = self.ghosts.iter().peekable();
+        let mut awaited = self.ghosts.iter().map(|&ghost| ghost as usize).peekable();
+        let mut all_known = true;
         for message in mail.messages() {
+            let first = tile.ghost_owners.partition_point(|&owner| owner < message.from);
+            let count = tile.ghost_owners[first..].partition_point(|&owner| owner == message.from);
+            let mut names = (first..).zip(&tile.bodies.id[tile.owned + first..tile.owned + first + count]);
             for refresh in message.refreshes {
-                let of_peer = |ghost: &&u32| tile.ghost_owners[**ghost as usize] == message.from;
-                match ghosts.next_if(of_peer) {
-                    Some(&ghost) => solver.bodies.refresh(tile.owned + ghost as usize, refresh),
-                    None => tile.counts.fault = Some(Fault::Protocol),
-                }
+                // Both lists ascend.
+                let Some((ghost, _)) = names.by_ref().find(|(_, id)| **id == refresh.id) else {
+                    all_known = false;
+                    break;
+                };
+                all_known &= awaited.peek().is_none_or(|&next| next >= ghost);
+                awaited.next_if_eq(&ghost);
+                solver.bodies.refresh(tile.owned + ghost, refresh);
             }
         }
-        if ghosts.next().is_some() {
+        if !all_known || awaited.next().is_some() {
             tile.counts.fault = Some(Fault::Protocol);
         }
-        for border in &self.contacts {
-            solver.refresh_separation(border.contact);
+        for contact in self.contacts.iter().map(|border| border.contact).chain(self.scratch.clone()) {
+            solver.refresh_separation(contact);
         }
     }
 
@@ -171,7 +250,8 @@ impl Border {
         }
     }
 
-    /// Moves both copies of every border contact to their mean. Points that only one side has are left alone.
+    /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far. Points that only one side
+    /// has are left alone.
     pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, contacts: &Contacts, mail: Mail<'_>) {
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
@@ -179,7 +259,7 @@ impl Border {
                 Ok(i) => {
                     let border = &self.contacts[i];
                     for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                        solver.move_to_mean(contacts, border.contact, border.owns_a, theirs);
+                        solver.move_together(contacts, border, theirs);
                     }
                 }
                 Err(_) => tile.counts.fault = Some(Fault::Protocol),
@@ -188,8 +268,13 @@ impl Border {
     }
 }
 
+/// Whether a tile that a body is near solves its contact with this partner though it owns neither.
+fn solves(peer: TileId, tile: &Tile, partner: Slot, setup: &Setup) -> bool {
+    matches!(partner.kind(), SlotKind::Static(_)) || Outline::of(tile, tile.index(partner), setup).is_near(peer, setup)
+}
+
 /// The tile that owns a body; none owns a static.
-fn owner_of(tile: &Tile, slot: crate::model::contact::Slot) -> Option<TileId> {
+fn owner_of(tile: &Tile, slot: Slot) -> Option<TileId> {
     match slot.kind() {
         SlotKind::Owned(_) => Some(tile.id),
         SlotKind::Ghost(ghost) => Some(tile.ghost_owners[ghost]),
@@ -218,15 +303,27 @@ impl Solver {
         })
     }
 
-    fn move_to_mean(&mut self, contacts: &Contacts, contact: u32, owns_a: bool, theirs: &BorderPoint) {
+    fn move_together(&mut self, contacts: &Contacts, border: &BorderContact, theirs: &BorderPoint) {
+        let BorderContact { contact, owns_a, far, .. } = *border;
+        // Each owner may know others with whom its body bounces, or whom it meets first. The lesser impulse is the one that is sure:
+        // it gives nobody more energy than there was.
+        let lesser = far || self.groups.may_bounce(contact);
         let points = contacts.cache.contacts[contact as usize].points();
         if let Some(k) = points.iter().position(|point| point.feature == theirs.feature) {
             let mine = self.groups.point(contact, k);
-            let mean = |a: f32, b: f32| 0.5 * (a + b);
-            let normal = mean(mine.total_normal, theirs.total_normal) - mine.total_normal;
-            let tangent = mean(mine.total_tangent, theirs.total_tangent) - mine.total_tangent;
+            // Both owners must come to the same: of equal ones that of body A's.
+            let (less, equal) = (theirs.total_normal < mine.total_normal, theirs.total_normal == mine.total_normal);
+            let theirs_counts = less || equal && !owns_a;
+            let common = |mine: f32, theirs: f32| match (lesser, theirs_counts) {
+                (false, _) => 0.5 * (mine + theirs),
+                (true, true) => theirs,
+                (true, false) => mine,
+            };
+            let normal = common(mine.total_normal, theirs.total_normal) - mine.total_normal;
+            let tangent = common(mine.total_tangent, theirs.total_tangent) - mine.total_tangent;
             self.apply_impulse(contact, k, owns_a, normal, tangent);
-            self.groups.set_impulses(contact, k, mean(mine.normal, theirs.normal), mean(mine.tangent, theirs.tangent));
+            let last = [common(mine.normal, theirs.normal), common(mine.tangent, theirs.tangent)];
+            self.groups.set_impulses(contact, k, last[0], last[1]);
         }
     }
 }

@@ -98,7 +98,7 @@ fn frame(outbox: &Outbox, own: usize, to: usize, ranks: usize) -> Vec<u8> {
 
 fn any_verdict() -> impl Strategy<Value = Verdict> {
     let failure = prop::option::of((any::<u64>(), any::<u64>().prop_map(GlobalId)));
-    (any::<bool>(), any::<bool>(), failure).prop_map(|(stop, meet, failure)| Verdict { stop, meet, failure })
+    (any::<[bool; 3]>(), failure).prop_map(|([stop, meet, far], failure)| Verdict { stop, meet, far, failure })
 }
 
 fn any_letters() -> impl Strategy<Value = Letters> {
@@ -156,6 +156,7 @@ proptest! {
         prop_assert_eq!(heard.failure, joined.failure);
         prop_assert!(heard.stop == joined.stop || joined.failure.is_some());
         prop_assert!(heard.meet == joined.meet || joined.stop || joined.failure.is_some());
+        prop_assert!(heard.is_far() == joined.is_far() || joined.failure.is_some());
     }
 }
 
@@ -320,5 +321,5 @@ fn records_of(frame: &[u8]) -> usize {
 fn the_wire_is_as_narrow_as_promised() {
     assert_eq!(size_of::<Body>(), 48);
     assert!(size_of::<GhostRecord>() <= 64);
-    assert!(size_of::<GhostRefresh>() <= 40);
+    assert!(size_of::<GhostRefresh>() <= 48);
 }

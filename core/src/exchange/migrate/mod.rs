@@ -4,7 +4,9 @@
 //! and sends every body's ghosts on the new owner's behalf. So one exchange suffices, and a receiver needs to know
 //! nothing but the body: whose it is follows from where it is.
 
+use crate::exchange::far;
 use crate::exchange::mail::{Mail, Mailbag};
+use crate::exchange::overlap::Outline;
 use crate::exchange::record::{ContactRecord, GhostRecord, Unseen};
 use crate::model::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::model::id::{GlobalId, TileId};
@@ -47,6 +49,8 @@ struct Border {
 struct Send {
     body: u32,
     target: TileId,
+    /// Whether it is near enough to the target that its contacts with others that are so are solved there as well.
+    near: bool,
     unseen: Unseen,
 }
 
@@ -69,7 +73,7 @@ enum What {
 /// the tile holds owned bodies only, and its cache only contacts among them and with statics.
 pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, setup: &Setup) {
     find_border(tile, work, setup);
-    sort_contacts_out(tile, work);
+    sort_contacts_out(tile, work, setup);
     let MigrateWork { mark, border, sends, contacts, parcels, departures, .. } = work;
     tile.counts.ghosts = sends.len() as u64;
     parcels.extend((0..).zip(&*sends).map(|(i, send)| Parcel { to: send.target, what: What::Ghost(i) }));
@@ -108,13 +112,15 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
 }
 
 /// Finds the bodies near or beyond the tile's border, their owners, and who needs a ghost of them.
-fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
+fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     if work.mark.len() < tile.owned {
         work.mark.resize(tile.owned, 0);
     }
     let (bodies, grid) = (&tile.bodies, &setup.grid);
+    let any_far = far::any(&bodies.velocity[..tile.owned], setup);
     for (i, &position) in bodies.position[..tile.owned].iter().enumerate() {
-        if tile.interior.contains(position) {
+        let goes_far = any_far && setup.goes_far(bodies.velocity[i]);
+        if tile.interior.contains(position) && !goes_far {
             continue;
         }
         let half = setup.grown_half_extents(bodies.kind[i], bodies.rotation[i], bodies.velocity[i]);
@@ -122,10 +128,12 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
         if tile.region.contains(position - reach) & tile.region.contains(position + reach) {
             continue;
         }
-        let owner = grid.locate(position);
+        tile.counts.far |= goes_far;
+        let (owner, outline) = (grid.locate(position), Outline::of(tile, i, setup));
         let first_send = work.sends.len() as u32;
         for target in grid.reached(position, half, setup.halo_width).filter(|&target| target != owner) {
-            work.sends.push(Send { body: i as u32, target, unseen: Unseen::default() });
+            let near = outline.is_near(target, setup);
+            work.sends.push(Send { body: i as u32, target, near, unseen: Unseen::default() });
         }
         let end_send = work.sends.len() as u32;
         if owner != tile.id || end_send > first_send {
@@ -137,12 +145,17 @@ fn find_border(tile: &Tile, work: &mut MigrateWork, setup: &Setup) {
 
 /// One pass over the contacts of the last step: sums unseen impulses, finds the contacts of departing bodies, and
 /// moves those that cannot be found by slot any more to the strays.
-fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork) {
+fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.strays.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
         let key = tile.contacts.keys[i];
-        let SlotKind::Owned(low) = key.low().kind() else { unreachable!("the lower slot of a pair is owned") };
+        let SlotKind::Owned(low) = key.low().kind() else {
+            // Of others; they tell each other. Here it serves those who solve it with them.
+            let (pair, contact) = (tile.pair_of(key), tile.contacts.contacts[i]);
+            tile.strays.push(Stray { pair, authority: Authority::Overlap, contact });
+            continue;
+        };
         let (high_mark, high_owner) = match key.high().kind() {
             SlotKind::Owned(high) => (work.mark[high], Some(tile.id)),
             SlotKind::Ghost(ghost) => (0, Some(tile.ghost_owners[ghost])),
@@ -157,13 +170,19 @@ fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork) {
             let low_is_a = tile.bodies.id[low] == pair.0;
             let (linear, on_a, on_b) = contact.impulse();
             let mut heir = tile.id;
-            for (mark, is_a, partner) in [(low_mark, low_is_a, high_owner), (high_mark, !low_is_a, Some(tile.id))] {
+            let sides =
+                [(low_mark, low_is_a, high_owner, key.high()), (high_mark, !low_is_a, Some(tile.id), key.low())];
+            for (mark, is_a, owner, partner) in sides {
                 if mark == 0 {
                     continue;
                 }
                 let border = &work.border[mark as usize - 1];
+                // A ghost is judged by where it was: what comes of it is put right with the first refresh.
+                let outline = owner.map(|_| Outline::of(tile, tile.index(partner), setup));
+                let is_near = |target| outline.is_none_or(|outline| outline.is_near(target, setup));
                 for send in &mut work.sends[border.first_send as usize..border.end_send as usize] {
-                    if partner != Some(send.target) {
+                    let is_seen = owner == Some(send.target) || send.near && is_near(send.target);
+                    if !is_seen {
                         if is_a {
                             send.unseen.add(-linear, on_a);
                         } else {
@@ -186,8 +205,10 @@ fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork) {
             }
         }
         if !stray {
-            tile.contacts.keys[kept] = key;
-            tile.contacts.contacts[kept] = tile.contacts.contacts[i];
+            if kept < i {
+                tile.contacts.keys[kept] = key;
+                tile.contacts.contacts[kept] = tile.contacts.contacts[i];
+            }
             kept += 1;
         }
     }
@@ -248,9 +269,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
         tile.unseen.push(ghost.unseen);
         tile.ghost_owners.push(owner);
     }
-    for &row in &tile.statics {
-        tile.bodies.push(setup.statics[row as usize]);
-    }
+    tile.push_statics(setup);
 }
 
 /// Sorts the owned bodies by (cell, GlobalId), so that neighbours in space are neighbours in memory.

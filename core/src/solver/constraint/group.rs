@@ -1,5 +1,6 @@
 //! Groups: eight contacts side by side, one in each lane.
 
+use super::groups::Answer;
 use crate::model::math::max;
 use crate::parallel::lanes::{LANES, Quad, Row};
 
@@ -110,13 +111,63 @@ impl Sides {
         along(row_b, velocity[self.b[lane] as usize]) - along(row_a, velocity[self.a[lane] as usize])
     }
 
-    /// Gives a point back the speed it came in with, if it pressed at all.
-    pub(crate) fn bounce(&self, point: &mut PointRows, lane: usize, speed: f32, velocity: &mut [Quad]) {
-        if point.total_normal[lane] <= 0.0 {
+    /// Gives the points of a contact that pressed what they are to have. Two that part do so at once: one after the other, the first
+    /// would turn a box that falls flat, and the second not turn it back.
+    pub(crate) fn bounce(&self, points: &mut [PointRows], lane: usize, answers: [Answer; 2], velocity: &mut [Quad]) {
+        if let ([one, two], [Answer::Part(first), Answer::Part(second)]) = (&mut *points, answers)
+            && one.total_normal[lane] > 0.0
+            && two.total_normal[lane] > 0.0
+            && self.bounce_together([one, two], lane, [first, second], velocity)
+        {
             return;
         }
-        let wanted = -point.normal_mass[lane] * (self.normal_speed(point, lane, velocity) - speed);
-        let impulse = max(wanted, -point.normal_impulse[lane]);
+        for (point, answer) in points.iter_mut().zip(answers) {
+            let pressed = point.total_normal[lane];
+            let wanted = match answer {
+                Answer::Part(speed) if pressed > 0.0 => {
+                    point.normal_mass[lane] * (speed - self.normal_speed(point, lane, velocity))
+                }
+                Answer::NotYet(most) if pressed > most * point.normal_mass[lane] => -pressed,
+                _ => continue,
+            };
+            self.add_normal_impulse(point, lane, max(wanted, -pressed), velocity);
+        }
+    }
+
+    /// Two points at once, if that takes no pull from either.
+    fn bounce_together(
+        &self,
+        points: [&mut PointRows; 2],
+        lane: usize,
+        speeds: [f32; 2],
+        velocity: &mut [Quad],
+    ) -> bool {
+        let [one, two] = &points;
+        let ([one_a, one_b], [two_a, two_b]) = (self.normal_rows(one, lane), self.normal_rows(two, lane));
+        let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+        // How much speed an impulse at one of them gives each.
+        let own = [product(one_a, one_a) + product(one_b, one_b), product(two_a, two_a) + product(two_b, two_b)];
+        let other = product(one_a, two_a) + product(one_b, two_b);
+        let determinant = own[0] * own[1] - other * other;
+        let lacks = [0, 1].map(|k| speeds[k] - self.normal_speed(points[k], lane, velocity));
+        let impulses = [
+            (own[1] * lacks[0] - other * lacks[1]) / determinant,
+            (own[0] * lacks[1] - other * lacks[0]) / determinant,
+        ];
+        let pulls = |k: usize| impulses[k] < -points[k].total_normal[lane];
+        // Points that are nearly one leave nothing to tell them apart by.
+        let is_regular = determinant > 1e-3 * own[0] * own[1];
+        if !is_regular || pulls(0) || pulls(1) {
+            return false;
+        }
+        for (point, impulse) in points.into_iter().zip(impulses) {
+            self.add_normal_impulse(point, lane, impulse, velocity);
+        }
+        true
+    }
+
+    /// Gives both bodies some more impulse along the normal of a point.
+    fn add_normal_impulse(&self, point: &mut PointRows, lane: usize, impulse: f32, velocity: &mut [Quad]) {
         point.total_normal[lane] += impulse;
         let ([row_a, row_b], a, b) = (self.normal_rows(point, lane), self.a[lane] as usize, self.b[lane] as usize);
         for k in 0..3 {

@@ -16,17 +16,28 @@ pub(crate) struct Groups {
     pub(super) colors: Vec<Color>,
     /// For each contact, in canonical order.
     pub(super) lanes: Vec<Lane>,
-    /// Points that may bounce.
+    /// Contacts that may bounce.
     pub(super) bounces: Vec<Bounce>,
 }
 
-/// A point that may bounce.
+/// A contact that may bounce.
 #[derive(Debug)]
 pub(crate) struct Bounce {
     pub(super) contact: u32,
-    pub(super) point: u32,
-    /// Restitution times approach speed, in m/s.
-    pub(super) speed: f32,
+    /// Of each point.
+    pub(super) answers: [Answer; 2],
+}
+
+/// What becomes of a point that pressed in the step.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Answer {
+    /// No more than the solver did.
+    Rest,
+    /// It came in fast, and parts at this speed, in m/s.
+    Part(f32),
+    /// It came apart, and only a blow within the step had it press: if that gave it more than this speed, in m/s, the blow is
+    /// passed on in the next step, as one between bodies that come in fast.
+    NotYet(f32),
 }
 
 /// Where a contact's constraint lies.

@@ -7,6 +7,7 @@ use crate::collide::narrow_phase::Contacts;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
 use crate::parallel::team::Team;
+use crate::parallel::vectors::Vectors;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use crate::solver::index::SolverIndex;
@@ -111,17 +112,18 @@ impl<V: Lanes> Numbers<V> {
         self.0[number / 4][number % 4]
     }
 
-    /// Anchor, impulse along the normal, impulse along the tangent of a point.
+    /// Anchor, separation there, impulse along the normal, impulse along the tangent of a point.
     #[inline(always)]
-    fn point(&self, point: usize) -> (Vectors<V>, V, V) {
+    fn point(&self, point: usize) -> (Vectors<V>, V, V, V) {
         let first = offset_of!(Contact, points) + point * size_of::<ContactPoint>();
         let anchor = Vectors {
             x: self.at(first + offset_of!(ContactPoint, anchor.x)),
             y: self.at(first + offset_of!(ContactPoint, anchor.y)),
         };
+        let separation = self.at(first + offset_of!(ContactPoint, separation));
         let normal_impulse = self.at(first + offset_of!(ContactPoint, normal_impulse));
         let tangent_impulse = self.at(first + offset_of!(ContactPoint, tangent_impulse));
-        (anchor, normal_impulse, tangent_impulse)
+        (anchor, separation, normal_impulse, tangent_impulse)
     }
 }
 
@@ -167,38 +169,9 @@ impl Inputs {
     }
 }
 
-/// A vector in every lane.
-#[derive(Clone, Copy)]
-struct Vectors<V> {
-    x: V,
-    y: V,
-}
-
-impl<V: Lanes> Vectors<V> {
-    #[inline(always)]
-    fn scaled(self, by: V) -> Self {
-        Self { x: self.x.mul(by), y: self.y.mul(by) }
-    }
-
-    #[inline(always)]
-    fn minus(self, other: Self) -> Self {
-        Self { x: self.x.sub(other.x), y: self.y.sub(other.y) }
-    }
-
-    #[inline(always)]
-    fn dot(self, other: Self) -> V {
-        self.x.mul(other.x).add(self.y.mul(other.y))
-    }
-
-    #[inline(always)]
-    fn cross(self, other: Self) -> V {
-        self.x.mul(other.y).sub(self.y.mul(other.x))
-    }
-}
-
 #[inline(always)]
 fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
-    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let (zero, half, one) = (V::splat(0.0), V::splat(0.5), V::splat(1.0));
     let contact = Numbers::<V>::load(&inputs.contact);
     let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
     let [_, _, root_b, root_mass_b] = V::load_quads(&inputs.weight_b);
@@ -222,20 +195,28 @@ fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
     let points = [contact.point(0), contact.point(1)];
     for (k, rows) in group.points.iter_mut().enumerate() {
-        let (arm_a, normal_impulse, tangent_impulse) = points[k];
+        let (arm_a, separation, normal_impulse, tangent_impulse) = points[k];
         let arm_b = arm_a.minus(offset);
         // A round body's anchor lies on the line of its center and the normal; rounding must not spin it.
         let normal_a = not_round_a.if_positive(root_a.mul(arm_a.cross(normal)), zero);
         let normal_b = not_round_b.if_positive(root_b.mul(arm_b.cross(normal)), zero);
-        let (tangent_a, tangent_b) = (root_a.mul(arm_a.cross(tangent)), root_b.mul(arm_b.cross(tangent)));
+        // Friction acts once surfaces touch: at each one's own, half the gap nearer to its body than the anchor.
+        let gap = separation.max(zero).mul(half);
+        let tangent_a = root_a.mul(arm_a.cross(tangent).add(gap));
+        let tangent_b = root_b.mul(arm_b.cross(tangent).sub(gap));
         normal_a.store(&mut rows.normal_a);
         normal_b.store(&mut rows.normal_b);
         tangent_a.store(&mut rows.tangent_a);
         tangent_b.store(&mut rows.tangent_b);
         not_round_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
         not_round_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
-        inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b))).store(&mut rows.normal_mass);
-        inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b))).store(&mut rows.tangent_mass);
+        let normal_mass = inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b)));
+        normal_mass.store(&mut rows.normal_mass);
+        // Of the tangent alone; or, where one point is pushed at once, while the normal keeps its speed.
+        let coupling = normal_a.mul(tangent_a).add(normal_b.mul(tangent_b));
+        let held = if N == 1 { coupling.mul(coupling).mul(normal_mass) } else { zero };
+        let tangent_mass = inverse(linear.add(tangent_a.mul(tangent_a)).add(tangent_b.mul(tangent_b)).sub(held));
+        tangent_mass.store(&mut rows.tangent_mass);
         rows.first_separation = inputs.separation[k];
         rows.separation = inputs.separation[k];
         normal_impulse.store(&mut rows.normal_impulse);

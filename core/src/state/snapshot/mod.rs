@@ -4,23 +4,23 @@
 //!
 //! ```text
 //! header     64 bytes: format, tile, checksum of all that follows it, counts, the tile's hashes
-//! bodies     six columns: names, positions, rotations, velocities, angular velocities, kinds
+//! bodies     six columns: names, positions, rotations, velocities, angular velocities, kinds; ghosts after owned ones
 //! rest       where bodies may sleep, how long each has rested
-//! ghosts     two columns: names and owners
+//! owners     of the ghosts
 //! contacts   two columns: keys, and the contacts themselves
 //! ```
 //!
 //! Everything lies there as it does in memory, little-endian and with nothing between, so that saving is copying.
 //! Bodies and ghosts are in the order of the tile: contacts know them by their slots, and the order of constraints
-//! follows from that of bodies. The next step makes ghosts anew and only asks whom a contact was with, so their names
-//! and owners are enough. Statics are in the setup. All else is derived in each step; who sleeps follows from who has
+//! follows from that of bodies. The next step makes ghosts anew, and asks whom a contact was with and who was near. Statics
+//! are in the setup. All else is derived in each step; who sleeps follows from who has
 //! rested.
 
 use crate::exchange::record::Unseen;
 use crate::islands::sleep::Sleep;
 use crate::model::body::{Bodies, Body};
-use crate::model::contact::{Contact, ContactCache, PairKey, SlotKind};
-use crate::model::id::{GlobalId, TileId};
+use crate::model::contact::{Contact, ContactCache, PairKey, Slot, SlotKind};
+use crate::model::id::TileId;
 use crate::state::hash::Hashes;
 use crate::state::layout::layout;
 use crate::tiling::blueprint::Setup;
@@ -37,7 +37,7 @@ mod tests;
 pub use error::RestoreError;
 
 /// The version of a saved tile; grows with every change of what is saved.
-pub const SNAPSHOT_FORMAT: u32 = 1;
+pub const SNAPSHOT_FORMAT: u32 = 2;
 
 /// What was saved of one tile.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -132,7 +132,7 @@ impl Header {
         let arrays = [
             (self.bodies, size_of::<Body>()),
             (self.rested, size_of::<f32>()),
-            (self.ghosts, size_of::<GlobalId>() + size_of::<TileId>()),
+            (self.ghosts, size_of::<Body>() + size_of::<TileId>()),
             (self.contacts, size_of::<PairKey>() + size_of::<Contact>()),
         ];
         arrays.iter().fold(HEADER as u64, |sum, &(count, size)| sum + u64::from(count) * size as u64)
@@ -191,18 +191,17 @@ impl World {
 }
 
 /// The columns of a block, in their order.
-fn columns(tile: &Tile) -> [&[u8]; 11] {
+fn columns(tile: &Tile) -> [&[u8]; 10] {
     let Tile { bodies, owned, ghost_owners, contacts, sleep, .. } = tile;
-    let (owned, dynamic) = (*owned, *owned + tile.ghosts());
+    let dynamic = *owned + tile.ghosts();
     [
-        cast_slice(&bodies.id[..owned]),
-        cast_slice(&bodies.position[..owned]),
-        cast_slice(&bodies.rotation[..owned]),
-        cast_slice(&bodies.velocity[..owned]),
-        cast_slice(&bodies.angular_velocity[..owned]),
-        cast_slice(&bodies.kind[..owned]),
+        cast_slice(&bodies.id[..dynamic]),
+        cast_slice(&bodies.position[..dynamic]),
+        cast_slice(&bodies.rotation[..dynamic]),
+        cast_slice(&bodies.velocity[..dynamic]),
+        cast_slice(&bodies.angular_velocity[..dynamic]),
+        cast_slice(&bodies.kind[..dynamic]),
         cast_slice(sleep.still()),
-        cast_slice(&bodies.id[owned..dynamic]),
         cast_slice(ghost_owners),
         cast_slice(&contacts.keys),
         cast_slice(&contacts.contacts),
@@ -235,10 +234,10 @@ fn checksum(block: &[u8]) -> u64 {
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
-    fn column<T: Pod>(&mut self, count: u32) -> Vec<T> {
-        let (bytes, rest) = self.0.split_at(count as usize * size_of::<T>());
+    fn column<T: Pod>(&mut self, count: usize) -> Vec<T> {
+        let (bytes, rest) = self.0.split_at(count * size_of::<T>());
         self.0 = rest;
-        let mut column = vec![T::zeroed(); count as usize];
+        let mut column = vec![T::zeroed(); count];
         bytemuck::cast_slice_mut(&mut column).copy_from_slice(bytes);
         column
     }
@@ -249,22 +248,21 @@ fn restore(old: &Tile, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError
     let tile = old.id;
     let header = Header::read(tile, block)?;
     let mut reader = Reader(&block[HEADER..]);
+    let (owned, dynamic) = (header.bodies as usize, header.bodies as usize + header.ghosts as usize);
     let mut bodies = Bodies {
-        id: reader.column(header.bodies),
-        position: reader.column(header.bodies),
-        rotation: reader.column(header.bodies),
-        velocity: reader.column(header.bodies),
-        angular_velocity: reader.column(header.bodies),
-        kind: reader.column(header.bodies),
+        id: reader.column(dynamic),
+        position: reader.column(dynamic),
+        rotation: reader.column(dynamic),
+        velocity: reader.column(dynamic),
+        angular_velocity: reader.column(dynamic),
+        kind: reader.column(dynamic),
     };
-    let sleep = Sleep::of(reader.column(header.rested));
-    let (ghosts, ghost_owners): (Vec<GlobalId>, _) = (reader.column(header.ghosts), reader.column(header.ghosts));
-    let contacts = ContactCache { keys: reader.column(header.contacts), contacts: reader.column(header.contacts) };
-    // Ghosts and statics have rows, as a step leaves them; of a ghost's nothing but the name is looked at.
-    let owned = bodies.len();
-    ghosts.iter().for_each(|&id| bodies.push(Body { id, ..Body::zeroed() }));
+    let sleep = Sleep::of(reader.column(header.rested as usize));
+    let ghost_owners = reader.column(header.ghosts as usize);
+    let contacts = header.contacts as usize;
+    let contacts = ContactCache { keys: reader.column(contacts), contacts: reader.column(contacts) };
     old.statics.iter().for_each(|&row| bodies.push(setup.statics[row as usize]));
-    let unseen = vec![Unseen::default(); ghosts.len()];
+    let unseen = vec![Unseen::default(); dynamic - owned];
     let empty = Tile::with_statics(tile, old.statics.clone(), setup);
     let restored = Tile { bodies, owned, unseen, ghost_owners, contacts, sleep, ..empty };
     check(&restored, setup)?;
@@ -288,25 +286,26 @@ fn check(tile: &Tile, setup: &Setup) -> Result<(), RestoreError> {
         return Err(RestoreError::BadRest { tile: id });
     }
     let mut last = None;
-    let mut ghosts = tile.ghost_owners.iter().zip(&tile.bodies.id[tile.owned..]);
-    let bad_ghost = ghosts.find(|&(owner, name)| {
-        let ascends = last.replace((owner, name)) <= Some((owner, name));
-        let elsewhere = *owner != id && (owner.0 as usize) < setup.grid.tiles();
-        !(ascends && elsewhere && !setup.is_static(*name))
+    let ghosts = (tile.owned..).map(|i| tile.bodies.get(i));
+    let bad_ghost = tile.ghost_owners.iter().zip(ghosts).find(|(owner, ghost)| {
+        let ascends = last.replace((**owner, ghost.id)) <= Some((**owner, ghost.id));
+        let elsewhere = **owner != id && (owner.0 as usize) < setup.grid.tiles();
+        !(ascends && elsewhere && ghost.is_finite() && setup.knows(ghost))
     });
-    if let Some((_, &ghost)) = bad_ghost {
-        return Err(RestoreError::BadGhost { tile: id, id: ghost });
+    if let Some((_, ghost)) = bad_ghost {
+        return Err(RestoreError::BadGhost { tile: id, id: ghost.id });
     }
     let mut last = None;
     let bad_contact = tile.contacts.iter().position(|(key, contact)| {
-        let low = matches!(key.low().kind(), SlotKind::Owned(i) if i < tile.owned);
-        let high = match key.high().kind() {
-            SlotKind::Owned(i) => i < tile.owned && key.low() < key.high(),
+        let exists = |slot: Slot| match slot.kind() {
+            SlotKind::Owned(i) => i < tile.owned,
             SlotKind::Ghost(i) => i < tile.ghosts(),
             SlotKind::Static(i) => i < tile.statics.len(),
         };
+        let moves = !matches!(key.low().kind(), SlotKind::Static(_)) && (key.is_own() || setup.overlap.is_some());
+        let slots = moves && exists(key.low()) && exists(key.high()) && key.low() < key.high();
         let ascends = last.replace(key) < Some(key);
-        !(low && high && ascends && contact.is_finite())
+        !(slots && ascends && contact.is_finite())
     });
     match bad_contact {
         Some(contact) => Err(RestoreError::BadContact { tile: id, contact }),

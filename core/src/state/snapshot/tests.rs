@@ -141,7 +141,7 @@ fn a_block_is_as_small_as_promised() {
     let lengths = |world: &World| save(world).0.iter().map(|tile| tile.length).collect::<Vec<_>>();
     assert_eq!(lengths(&empty(&blueprint(2, false))), [64, 64]);
     let (halves, _) = &worlds()[0];
-    let expected = halves.tile_states().iter().map(|t| 64 + 48 * t.owned + 12 * t.ghosts() + 88 * t.contacts.len());
+    let expected = halves.tile_states().iter().map(|t| 64 + 48 * t.owned + 52 * t.ghosts() + 88 * t.contacts.len());
     assert_eq!(lengths(halves), expected.collect::<Vec<_>>());
 }
 
@@ -291,8 +291,8 @@ fn contacts_of_bodies_that_are_not_there_are_refused() {
     let (original, mut restored) = worlds().into_iter().next().unwrap();
     let tile = &original.tile_states()[0];
     let block = block_of(&original);
-    let last = tile.contacts.len() - 1;
-    let at = block.len() - 80 * tile.contacts.len() - 8;
+    let last = tile.contacts.own() - 1;
+    let at = block.len() - 88 * tile.contacts.len() + 8 * last;
     let (owned, ghosts) = (tile.owned as u64, tile.ghosts() as u64);
     let (ghost, fixed) = (1 << 30, 1 << 31);
     let mut restore = |low: u64, high: u64| {
@@ -306,7 +306,7 @@ fn contacts_of_bodies_that_are_not_there_are_refused() {
         assert!(!matches!(restore(low, high), Err(RestoreError::BadContact { .. })), "{high:x}");
     }
     for (low, high) in
-        [(low, owned), (low, low), (low, ghost + ghosts), (low, fixed + 1), (owned, ghost), (ghost, ghost + 1)]
+        [(low, owned), (low, low), (low, ghost + ghosts), (low, fixed + 1), (owned, ghost), (ghost + 1, ghost)]
     {
         let refused = Err(RestoreError::BadContact { tile: TileId(0), contact: last });
         assert_eq!(restore(low, high), refused, "{low:x}, {high:x}");

@@ -112,8 +112,11 @@ impl TileGrid {
     }
 
     /// The rectangle a tile owns; infinite where the tile is outermost.
+    #[inline]
     pub fn region(&self, tile: TileId) -> Region {
-        let (column, row) = (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
+        // In 32 bits, in which division is fast.
+        let columns = self.columns() as u32;
+        let (column, row) = ((tile.0 % columns) as usize, (tile.0 / columns) as usize);
         let ((min_x, max_x), (min_y, max_y)) = (self.x.span(column), self.y.span(row));
         Region { min: DVec2::new(min_x, min_y), max: DVec2::new(max_x, max_y) }
     }
@@ -139,10 +142,12 @@ impl TileGrid {
     }
 
     /// Whether a tile is among those [`TileGrid::reached`].
+    #[inline]
     pub(crate) fn reaches(&self, tile: TileId, center: DVec2, half: Vec2, reach: f64) -> bool {
-        let (columns, rows) = self.reached_span(center, half, reach);
-        let (column, row) = (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
-        columns.contains(&column) && rows.contains(&row)
+        let (region, half) = (self.region(tile), half.as_dvec2() + DVec2::splat(reach));
+        let (low, high) = (center - half, center + half);
+        // Bitwise `&`: four comparisons without a branch.
+        (low.x < region.max.x) & (low.y < region.max.y) & (high.x >= region.min.x) & (high.y >= region.min.y)
     }
 
     #[inline]

@@ -66,10 +66,10 @@ impl Quadtree {
 
     /// Appends every pair, and some that are none (see the contract in [`super`]). The tree must be up to date.
     pub(crate) fn find_pairs(&self, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
-        team.append(pairs, proxies.owned, GRAIN, |bodies, pairs| self.query(proxies, bodies, pairs));
+        team.append(pairs, proxies.pairing, GRAIN, |bodies, pairs| self.query(proxies, bodies, pairs));
     }
 
-    /// Pairs of some owned bodies with those that come after them.
+    /// Pairs of some bodies with those that come after them.
     fn query(&self, proxies: &Proxies, bodies: std::ops::Range<usize>, pairs: &mut Vec<Pair>) {
         for body in bodies.start as u32..bodies.end as u32 {
             self.tree.query(&grown(proxies, body, 0.0), |other| {

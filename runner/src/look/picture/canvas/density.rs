@@ -68,7 +68,7 @@ impl Field {
             return;
         }
         let (column, row) = (left as usize, top as usize);
-        let [r, g, b] = color().0.map(u32::from);
+        let color = color();
         let (right, low) = ((left - column as f64) as f32, (top - row as f64) as f32);
         let whole = (PARTS * area) as f32;
         self.rows = self.rows.start.min(row)..self.rows.end.max(row + 2);
@@ -77,10 +77,7 @@ impl Field {
             let cells = &mut self.cells[from..from + 2];
             for (cell, wide) in cells.iter_mut().zip([1.0 - right, right]) {
                 // Rounded up: nothing is too small to be there.
-                let parts = (wide * high * whole + 0.999) as u32;
-                for (sum, value) in cell.iter_mut().zip([r, g, b, 1]) {
-                    *sum = sum.wrapping_add(value * parts);
-                }
+                pour(cell, (wide * high * whole + 0.999) as u32, color);
             }
         }
     }
@@ -90,13 +87,8 @@ impl Field {
     pub(crate) fn dot(&mut self, [x, y]: [f64; 2], area: f64, color: impl FnOnce() -> Rgb) {
         if x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64 {
             let (column, row) = (x as u32 as usize, y as u32 as usize);
-            let parts = (PARTS * area + 0.999) as u32;
-            let [r, g, b] = color().0.map(u32::from);
             self.rows = self.rows.start.min(row)..self.rows.end.max(row + 1);
-            let cell = &mut self.cells[row * self.size[0] + column];
-            for (sum, value) in cell.iter_mut().zip([r, g, b, 1]) {
-                *sum = sum.wrapping_add(value * parts);
-            }
+            pour(&mut self.cells[row * self.size[0] + column], (PARTS * area + 0.999) as u32, color());
         }
     }
 
@@ -157,6 +149,15 @@ impl Field {
                 }
             }
         }
+    }
+}
+
+/// Adds so many parts of a color to a pixel, quickly: sums that are too great are any.
+#[inline(always)]
+fn pour(cell: &mut [u32; 4], parts: u32, color: Rgb) {
+    let [r, g, b] = color.0.map(u32::from);
+    for (sum, value) in cell.iter_mut().zip([r, g, b, 1]) {
+        *sum = sum.wrapping_add(value * parts);
     }
 }
 

@@ -1,0 +1,216 @@
+//! The cases, each with what theory says of it.
+//!
+//! Single collisions of rigid bodies without restitution, with Coulomb's friction: E. Routh, "Dynamics of a System of Rigid
+//! Bodies" (1860). With the effective masses `m_n` along and `m_t` across the normal, the impulses are `m_n v_n` and `m_t v_t`, the
+//! latter no more than the coefficient of friction times the former.
+
+use super::{Course, PHASES, Start};
+use atoll_core::{Blueprint, Body, GlobalId, Kind, KindId, Material, Params, Rot, Shape, StaticBody, TileGrid};
+use glam::{DVec2, Vec2};
+
+/// A case.
+pub(super) struct Law {
+    pub(super) name: String,
+    pub(super) theory: f64,
+    /// For how many moments within a step it is measured.
+    pub(super) phases: u32,
+    /// The world at a number of steps per second; surfaces meet after that part of a step.
+    pub(super) start: Box<dyn Fn(f64, f64) -> Start>,
+    /// Lets time go on and takes the figure.
+    pub(super) read: fn(&mut Course<'_>) -> Result<f64, String>,
+}
+
+const FRICTION: f32 = 0.6;
+const RADIUS: f32 = 0.25;
+
+/// All cases.
+pub(super) fn laws() -> Vec<Law> {
+    let mut laws = Vec::new();
+    for (velocity, spin) in [((5.0, -3.0), 0.0), ((10.0, -3.0), 0.0), ((0.0, -3.0), 5.0)] {
+        laws.push(wall(Vec2::from(velocity), spin));
+    }
+    laws.extend([0.1, 0.2, 0.3, 0.4].map(discs));
+    laws.push(pair());
+    laws.extend([20.0, 35.0].map(corner));
+    laws.push(incline("a box slides down", 30.0, 0.3, Shape::rectangle(1.0, 1.0)));
+    laws.push(incline("a disc rolls down", 20.0, FRICTION, Shape::circle(0.5)));
+    for (name, shape) in [("disc", Shape::circle(RADIUS)), ("flat box", Shape::rectangle(0.5, 0.5))] {
+        laws.extend([0.5, 0.8, 1.0].map(|restitution| bounce(name, shape, restitution)));
+    }
+    laws
+}
+
+/// A world of some bodies: shape, material, place, turned by how much, velocity, spin.
+pub(super) fn world(
+    hertz: f64,
+    gravity: f32,
+    statics: Vec<StaticBody>,
+    bodies: &[(Shape, Material, DVec2, Rot, Vec2, f32)],
+) -> Start {
+    let first = statics.len() as u64;
+    let kinds = bodies.iter().map(|&(shape, material, ..)| Kind { shape, material }).collect();
+    let made = (0..).zip(bodies).map(|(k, &(_, _, position, rotation, velocity, angular_velocity))| {
+        let (id, kind) = (GlobalId(first + u64::from(k)), KindId(k));
+        Body { id, position, rotation, velocity, angular_velocity, kind }
+    });
+    let bodies = made.collect();
+    let params = Params { dt: (1.0 / hertz) as f32, gravity: Vec2::new(0.0, gravity), ..Params::default() };
+    let grid = TileGrid::new(DVec2::splat(-40.0), DVec2::splat(40.0), 1, 1).expect("a domain with a size");
+    Start { blueprint: Blueprint { params, grid, kinds, statics }, bodies }
+}
+
+fn floor(material: Material) -> StaticBody {
+    StaticBody::new(GlobalId(0), Kind { shape: Shape::rectangle(60.0, 2.0), material }, DVec2::new(0.0, -1.0))
+}
+
+fn rough(friction: f32) -> Material {
+    Material { friction, ..Material::default() }
+}
+
+fn wall(velocity: Vec2, spin: f32) -> Law {
+    let slip = velocity.x + spin * RADIUS;
+    let pull = (slip / 3.0).min(-FRICTION * velocity.y);
+    let start = move |hertz: f64, phase: f64| {
+        let high = f64::from(RADIUS) - f64::from(velocity.y) / hertz * (2.0 + phase);
+        let disc = (Shape::circle(RADIUS), rough(FRICTION), DVec2::new(0.0, high), Rot::IDENTITY, velocity, spin);
+        world(hertz, 0.0, vec![floor(rough(FRICTION))], &[disc])
+    };
+    Law {
+        name: format!("a disc meets a wall at {velocity} m/s, turning at {spin} rad/s: spin after"),
+        theory: f64::from(spin - 2.0 * pull / RADIUS),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| Ok(course.after(0.1)?[0].angular_velocity.into()),
+    }
+}
+
+fn discs(apart: f32) -> Law {
+    let sine = apart / (2.0 * RADIUS);
+    let cosine = (1.0 - sine * sine).sqrt();
+    let pull = (10.0 * sine / 6.0).min(FRICTION * 5.0 * cosine);
+    let start = move |hertz: f64, phase: f64| {
+        let x = f64::from(cosine * RADIUS) + 5.0 / hertz * (2.0 + phase);
+        let place = DVec2::new(x, 0.5 * f64::from(apart));
+        let disc = |side: f64| {
+            let velocity = Vec2::new(-5.0 * side as f32, 0.0);
+            (Shape::circle(RADIUS), rough(FRICTION), place * side, Rot::IDENTITY, velocity, 0.0)
+        };
+        world(hertz, 0.0, Vec::new(), &[disc(1.0), disc(-1.0)])
+    };
+    Law {
+        name: format!("two discs meet at 10 m/s, {apart} m beside each other: spin after"),
+        theory: f64::from(2.0 * pull / RADIUS),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| Ok(course.after(0.1)?[0].angular_velocity.abs().into()),
+    }
+}
+
+/// Nothing acts upon two discs that meet: they keep what angular momentum they have.
+fn pair() -> Law {
+    let Law { start, .. } = discs(0.2);
+    Law {
+        name: "the same, 0.2 m: angular momentum, by what it was".to_owned(),
+        theory: 1.0,
+        phases: PHASES,
+        start,
+        read: |course| {
+            let momentum = |bodies: Vec<Body>| -> f64 {
+                let of = |body: &Body| {
+                    let turning = 0.5 * f64::from(RADIUS * RADIUS) * f64::from(body.angular_velocity);
+                    body.position.perp_dot(body.velocity.as_dvec2()) + turning
+                };
+                bodies.iter().map(of).sum()
+            };
+            let before = momentum(course.simulation.bodies());
+            Ok(momentum(course.after(0.1)?) / before)
+        },
+    }
+}
+
+fn corner(degrees: f32) -> Law {
+    let rotation = Rot::from_angle(degrees.to_radians());
+    let arm = rotation.rotate(Vec2::new(-0.5, -0.5));
+    let arm = if degrees < 45.0 { arm } else { rotation.rotate(Vec2::new(0.5, -0.5)) };
+    // Of a box of 1 m, whose inertia is a sixth of its mass: the impulse that stops its lowest corner.
+    let (xx, xy, yy) = (1.0 + 6.0 * arm.y * arm.y, -6.0 * arm.x * arm.y, 1.0 + 6.0 * arm.x * arm.x);
+    let velocity = Vec2::new(0.0, -3.0);
+    let impulse = Vec2::new(xy, -xx) * velocity.y / (xx * yy - xy * xy);
+    let start = move |hertz: f64, phase: f64| {
+        let high = 3.0 / hertz * (2.0 + phase) - f64::from(arm.y);
+        let square = (Shape::rectangle(1.0, 1.0), rough(FRICTION), DVec2::new(0.0, high), rotation, velocity, 0.0);
+        world(hertz, 0.0, vec![floor(rough(FRICTION))], &[square])
+    };
+    Law {
+        name: format!("a box lands on a corner, turned by {degrees} degrees: spin after"),
+        theory: f64::from(6.0 * arm.perp_dot(impulse)),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| Ok(course.after(3.0 / course.hertz)?[0].angular_velocity.into()),
+    }
+}
+
+/// g (sin a - mu cos a) of what slides, 2/3 g sin a of a disc that rolls.
+fn incline(name: &str, degrees: f32, friction: f32, shape: Shape) -> Law {
+    let turned = Rot::from_angle(-degrees.to_radians());
+    let (down, up) = (turned.rotate(Vec2::X), turned.rotate(Vec2::Y));
+    let (rolls, half) = match shape {
+        Shape::Circle { radius } => (true, radius),
+        Shape::Box { half } => (false, half.y),
+    };
+    let (sine, cosine) = (f64::from(degrees).to_radians().sin(), f64::from(degrees).to_radians().cos());
+    let start = move |hertz: f64, _: f64| {
+        let slope = StaticBody { rotation: turned, position: (up * -1.0).as_dvec2(), ..floor(rough(friction)) };
+        let place = (up * half - down * 15.0).as_dvec2();
+        world(hertz, -10.0, vec![slope], &[(shape, rough(friction), place, turned, Vec2::ZERO, 0.0)])
+    };
+    Law {
+        name: format!("{name} {degrees} degrees, friction {friction}: acceleration"),
+        theory: if rolls { 10.0 * sine / 1.5 } else { 10.0 * (sine - f64::from(friction) * cosine) },
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| {
+            let speed = |bodies: Vec<Body>| f64::from(bodies[0].velocity.length());
+            let first = speed(course.after(0.5)?);
+            Ok(speed(course.after(1.5)?) / 1.5 - first / 1.5)
+        },
+    }
+}
+
+/// Down from 5 m and up to the first peak: the square of the restitution.
+fn bounce(name: &str, shape: Shape, restitution: f32) -> Law {
+    let half = match shape {
+        Shape::Circle { radius } => radius,
+        Shape::Box { half } => half.y,
+    };
+    let material = Material { friction: 0.0, restitution, ..Material::default() };
+    let start = move |hertz: f64, phase: f64| {
+        // Falling from 5 m takes a second: a step more or less is 0.17 m at 60 Hz.
+        let high = f64::from(half) + 5.0 + 10.0 / hertz * phase;
+        let body = (shape, material, DVec2::new(0.0, high), Rot::IDENTITY, Vec2::ZERO, 0.0);
+        world(hertz, -10.0, vec![floor(Material { restitution: 0.0, ..material })], &[body])
+    };
+    Law {
+        name: format!("a {name} of restitution {restitution} bounces: height by that of its fall"),
+        theory: f64::from(restitution * restitution),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| {
+            let (mut rises, mut peak, mut first) = (false, f64::MIN, None);
+            for _ in 0..(4.0 * course.hertz) as u64 {
+                let body = course.after(1.0 / course.hertz)?[0];
+                let (high, speed) = (body.position.y, body.velocity.y);
+                first.get_or_insert(high - 0.5 * f64::from(speed) / course.hertz);
+                if rises && speed < 0.0 {
+                    break;
+                }
+                rises |= speed > 0.0;
+                if rises {
+                    peak = peak.max(high);
+                }
+            }
+            let ground = 0.25;
+            Ok((peak - ground) / (first.unwrap_or(f64::NAN) - ground))
+        },
+    }
+}

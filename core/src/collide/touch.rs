@@ -1,0 +1,296 @@
+//! One pair: whether and where its bodies touch within the step, and the contact that comes of it.
+//!
+//! A contact of bodies that meet fast must act as they touch and not before: its normal is that of the touch, and friction
+//! pulls where surfaces are then (E. Routh, "Dynamics of a System of Rigid Bodies", 1860, for what one collision of rough
+//! bodies leaves). So both are moved along their free path, turning included, until they touch, by conservative advancement
+//! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013),
+//! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
+
+use crate::collide::broad_phase::Pair;
+use crate::collide::eight_pairs::TOUCHING;
+use crate::collide::manifold::{Manifold, collide};
+use crate::model::contact::{Contact, ContactPoint};
+use crate::model::math::{Rot, cross, dot, max, min, turn};
+use crate::model::shape::KindRow;
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+use glam::Vec2;
+
+/// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
+const RECYCLE_COSINE: f32 = 0.98;
+
+/// The search for a touch ends with surfaces this near, in m; from deeper than the second it takes a step back.
+const NEAR: f32 = 0.0002;
+const DEEP: f32 = -0.01;
+
+/// Steps of the search, at most. A last one mends what they leave.
+const ROUNDS: usize = 3;
+
+/// One body of a pair.
+struct Side<'a> {
+    kind: &'a KindRow,
+    rotation: Rot,
+    velocity: Vec2,
+    angular_velocity: f32,
+}
+
+impl<'a> Side<'a> {
+    #[inline(always)]
+    fn new(tile: &Tile, index: u32, setup: &'a Setup) -> Self {
+        let (bodies, i) = (&tile.bodies, index as usize);
+        Self {
+            kind: setup.kind(bodies.kind[i]),
+            rotation: bodies.rotation[i],
+            velocity: bodies.velocity[i],
+            angular_velocity: bodies.angular_velocity[i],
+        }
+    }
+
+    #[inline(always)]
+    fn is_round(&self) -> bool {
+        self.kind.shape.is_round()
+    }
+
+    /// How it will have turned after some seconds, as far as that can be seen: in four parts, as in the substeps of a step.
+    #[inline(always)]
+    fn turning(&self, time: f32) -> Rot {
+        if self.is_round() {
+            return Rot::IDENTITY;
+        }
+        let quarter = Rot { c: 1.0, s: 0.25 * time * self.angular_velocity }.normalized();
+        let half = quarter.after(quarter);
+        half.after(half)
+    }
+
+    /// The greatest speed that turning gives a point of its surface that it brings nearer, in m/s.
+    #[inline(always)]
+    fn sweep(&self) -> f32 {
+        self.kind.not_round * (self.kind.bounding_radius * self.angular_velocity.abs())
+    }
+
+    /// How far its surface, at a point of a contact, comes along a normal as it turns so, in m.
+    #[inline(always)]
+    fn swing(&self, turning: Rot, arm: Vec2, normal: Vec2) -> f32 {
+        self.kind.not_round * ((turning.c - 1.0) * dot(arm, normal) + turning.s * cross(arm, normal))
+    }
+}
+
+/// Two bodies on their way.
+struct Approach<'a> {
+    a: Side<'a>,
+    b: Side<'a>,
+    /// From the center of A to that of B, now, in m.
+    offset: Vec2,
+    /// Velocity of B as seen from A, in m/s.
+    between: Vec2,
+}
+
+/// A manifold, and the moment in which it is one.
+#[derive(Clone, Copy)]
+struct Moment {
+    /// From now, in s.
+    time: f32,
+    manifold: Manifold,
+    /// At that time.
+    offset: Vec2,
+    turning_a: Rot,
+    turning_b: Rot,
+}
+
+/// Whether surfaces move by less than the speculative distance within the step.
+#[inline(always)]
+pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
+    Approach::new(tile, pair, setup).far(setup.params.dt) < setup.params.speculative_distance
+}
+
+/// The contact of bodies A and B, if there is one, and the separation of its points.
+#[inline(always)]
+pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+    let pair = Approach::new(tile, pair, setup);
+    if pair.pass_by(setup) {
+        return None;
+    }
+    let far = pair.far(setup.params.dt);
+    let reach = setup.params.speculative_distance + far;
+    let now = pair.at(0.0, reach);
+    let nearest = now.manifold.nearest()?.separation;
+    let is_now = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
+    // Speeds that overflow tell of no other moment.
+    if is_now || far.is_infinite() {
+        return pair.contact(&now, known, setup);
+    }
+    match pair.first_touch(&now, reach, setup.params.dt) {
+        Some(then) => pair.contact(&then, known, setup),
+        None if nearest < setup.params.speculative_distance => pair.contact(&now, known, setup),
+        None => None,
+    }
+}
+
+impl<'a> Approach<'a> {
+    #[inline(always)]
+    fn new(tile: &Tile, [a, b]: Pair, setup: &'a Setup) -> Self {
+        let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
+        let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
+        let between = b.velocity - a.velocity;
+        Self { a, b, offset, between }
+    }
+
+    /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.
+    #[inline(always)]
+    fn pass_by(&self, setup: &Setup) -> bool {
+        let Self { a, b, offset, between } = self;
+        let nearest = -dot(*offset, *between) / max(dot(*between, *between), f32::MIN_POSITIVE);
+        // Where speeds overflow nothing is known: then they do not pass.
+        let gap = *offset + *between * min(max(nearest, 0.0), setup.params.dt);
+        let near = a.kind.bounding_radius + b.kind.bounding_radius + setup.params.speculative_distance;
+        dot(gap, gap) > near * near
+    }
+
+    /// How far surfaces can move against each other within the step, in m.
+    #[inline(always)]
+    fn far(&self, dt: f32) -> f32 {
+        dt * (dot(self.between, self.between).sqrt() + self.a.sweep() + self.b.sweep())
+    }
+
+    /// What will be after some seconds if nothing else happens.
+    #[inline(always)]
+    fn at(&self, time: f32, reach: f32) -> Moment {
+        // Now nothing has moved, not even at a speed that overflows.
+        let (offset, turning_a, turning_b) = if time > 0.0 {
+            (self.offset + self.between * time, self.a.turning(time), self.b.turning(time))
+        } else {
+            (self.offset, Rot::IDENTITY, Rot::IDENTITY)
+        };
+        let (rotation_a, rotation_b) = (turning_a.after(self.a.rotation), turning_b.after(self.b.rotation));
+        let manifold = collide(self.a.kind, rotation_a, self.b.kind, rotation_b, offset, reach);
+        Moment { time, manifold, offset, turning_a, turning_b }
+    }
+
+    /// Speed at which the surfaces come nearer at a point, in m/s.
+    #[inline(always)]
+    fn closing(&self, at: &Moment, anchor: Vec2) -> f32 {
+        let velocity_a = turn(self.a.angular_velocity, anchor);
+        let velocity_b = turn(self.b.angular_velocity, anchor - at.offset);
+        -dot(self.between + velocity_b - velocity_a, at.manifold.normal)
+    }
+
+    /// The moment in which the two, apart now, touch, if that is within the step.
+    #[inline(never)]
+    fn first_touch(&self, now: &Moment, reach: f32, dt: f32) -> Option<Moment> {
+        if self.a.is_round() && self.b.is_round() {
+            // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
+            let (Self { offset, between, .. }, sum) = (self, self.a.kind.bounding_radius + self.b.kind.bounding_radius);
+            let (square, half, rest) =
+                (dot(*between, *between), -dot(*offset, *between), dot(*offset, *offset) - sum * sum);
+            let root = half * half - square * rest;
+            return (half > 0.0 && root >= 0.0)
+                .then(|| rest / (half + root.sqrt()))
+                .filter(|&time| time <= dt)
+                .map(|time| self.at(max(time, 0.0), reach));
+        }
+        let sweep = self.a.sweep() + self.b.sweep();
+        let mut at = *now;
+        for _ in 0..ROUNDS {
+            let nearest = *at.manifold.nearest()?;
+            // What is apart along a direction stays so for as long as nothing moves further along it.
+            let bound = -dot(self.between, at.manifold.normal) + sweep;
+            let left = dt - at.time;
+            if bound * left < nearest.separation {
+                return None;
+            }
+            // Half as if the fastest corner led, half as if the nearest point did.
+            let speed = 0.5 * (bound + max(self.closing(&at, nearest.anchor), 0.0));
+            at = self.at(at.time + min(nearest.separation / speed, left), reach);
+            let nearest = at.manifold.nearest()?.separation;
+            if nearest < DEEP {
+                break;
+            }
+            if nearest < NEAR {
+                return Some(at);
+            }
+        }
+        let nearest = *at.manifold.nearest()?;
+        let closing = self.closing(&at, nearest.anchor);
+        if closing <= 0.0 {
+            return Some(at);
+        }
+        let time = at.time + nearest.separation / closing;
+        (time <= dt).then(|| self.at(max(time, 0.0), reach))
+    }
+
+    /// The contact with the geometry of a moment, and the separations that its points have now.
+    #[inline(never)]
+    fn contact(&self, at: &Moment, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+        let Moment { time, manifold, offset, turning_a, turning_b } = at;
+        let normal = manifold.normal;
+        // A second point may come down upon a static within the step; between moving bodies the next step is soon enough.
+        let is_fixed = self.a.kind.inv_mass * self.b.kind.inv_mass == 0.0;
+        let holds = |anchor: Vec2, separation: f32| {
+            let closing = max(self.closing(at, anchor), 0.0);
+            // A speed that overflows is not one that can wait for the next step.
+            let ahead = if is_fixed || closing.is_infinite() { (setup.params.dt - time) * closing } else { 0.0 };
+            separation < setup.params.speculative_distance + ahead
+        };
+        let mut kept = Manifold { normal, ..Manifold::EMPTY };
+        for point in manifold.points() {
+            if holds(point.anchor, point.separation) {
+                kept.push(*point);
+            }
+        }
+        if kept.count == 0 {
+            return None;
+        }
+        let points = kept.points.map(|point| {
+            let old = known.and_then(|known| known.points().iter().find(|old| old.feature == point.feature));
+            ContactPoint {
+                anchor: point.anchor,
+                separation: point.separation,
+                normal_impulse: old.map_or(0.0, |old| old.normal_impulse),
+                tangent_impulse: old.map_or(0.0, |old| old.tangent_impulse),
+                feature: point.feature,
+            }
+        });
+        let (rotation_a, rotation_b) = (turning_a.after(self.a.rotation), turning_b.after(self.b.rotation));
+        let contact = Contact { normal, offset: *offset, rotation_a, rotation_b, points };
+        if *time == 0.0 {
+            return Some((contact, points.map(|point| point.separation)));
+        }
+        // As the rows of the solver will see the way there.
+        let moved = dot(self.between, normal) * time;
+        let separation = points.map(|point| {
+            let on_a = self.a.swing(*turning_a, point.anchor, normal);
+            let on_b = self.b.swing(*turning_b, point.anchor - *offset, normal);
+            point.separation - (moved + (on_b - on_a))
+        });
+        Some((contact, separation))
+    }
+}
+
+/// The separations of a contact of boxes whose manifold still serves: they touch, and have hardly moved against each other.
+///
+/// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever.
+#[inline(always)]
+pub(super) fn recycle(tile: &Tile, pair: Pair, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
+    let Approach { a, b, offset, .. } = &Approach::new(tile, pair, setup);
+    if a.is_round() || b.is_round() {
+        return None;
+    }
+    let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
+    if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
+        return None;
+    }
+    let moved = turned_a.unrotate(*offset) - known.offset;
+    let extent = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { side.kind.bounding_radius } else { 0.0 };
+    let twist = turned_a.to(turned_b).s.abs() * max(extent(a), extent(b));
+    if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
+        return None;
+    }
+    let shift = *offset - known.offset;
+    let separation = known.points.map(|point| {
+        let (arm_a, arm_b) = (point.anchor, point.anchor - known.offset);
+        let swing = (turned_b.rotate(arm_b) - arm_b) - (turned_a.rotate(arm_a) - arm_a);
+        point.separation + dot(shift + swing, known.normal)
+    });
+    let touches = |(point, now): (&ContactPoint, f32)| point.separation < TOUCHING && now < TOUCHING;
+    known.points().iter().zip(separation).any(touches).then_some(separation)
+}

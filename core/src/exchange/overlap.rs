@@ -1,0 +1,84 @@
+//! Which tiles solve a contact.
+//!
+//! A tile solves the contacts of its bodies. With these alone it would push against ghosts whose own neighbours are missing, but
+//! for what these did a substep ago, and border contacts would converge more slowly than others. So it solves contacts between
+//! others' bodies as well, where both are near it: an overlapping domain decomposition (H. A. Schwarz, 1870; in the form in
+//! which each part solves a little beyond its border and keeps what is its own: X.-C. Cai, M. Sarkis, "A restricted additive
+//! Schwarz preconditioner for general sparse linear systems", 1999). Of such a contact only what it does to bodies within the
+//! step is used; it is scratch otherwise, and remembered for the next step's scratch alone.
+//!
+//! Who is near follows from bit-exact copies, so that who sends knows what who receives solves.
+
+use crate::model::id::TileId;
+use crate::model::params::{Exchange, Ghosts, Params};
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+use glam::{DVec2, Vec2};
+
+/// How far bodies are solved with that are heard of after every substep, as part of the width of the halo. More gains nothing;
+/// what lies at the rim of the halo has too few neighbours there to be solved well.
+const HEARD_OF: f64 = 0.75;
+
+/// The same where a tile hears of them once a step.
+const UNHEARD_OF: f64 = 1.0;
+
+/// How far beyond its border a tile solves contacts, as part of the width of the halo. Frozen ghosts need no neighbours.
+pub(crate) fn depth(params: &Params) -> Option<f64> {
+    match (params.ghosts, params.exchange) {
+        (Ghosts::Frozen, _) => None,
+        (_, Exchange::Substep) => Some(HEARD_OF),
+        (_, Exchange::Step) => Some(UNHEARD_OF),
+    }
+}
+
+/// A body's place and the half extents of its grown AABB.
+#[derive(Clone, Copy)]
+pub(crate) struct Outline {
+    place: DVec2,
+    half: Vec2,
+}
+
+impl Outline {
+    /// Of an owned body, or of a ghost as it was last heard of.
+    #[inline]
+    pub(crate) fn of(tile: &Tile, body: usize, setup: &Setup) -> Self {
+        let bodies = &tile.bodies;
+        let half = setup.grown_half_extents(bodies.kind[body], bodies.rotation[body], bodies.velocity[body]);
+        Self { place: bodies.position[body], half }
+    }
+
+    /// Whether it is so near a tile that its contacts with others that are, and with statics, are solved there.
+    #[inline]
+    pub(crate) fn is_near(&self, tile: TileId, setup: &Setup) -> bool {
+        setup.overlap.is_some_and(|depth| setup.grid.reaches(tile, self.place, self.half, depth))
+    }
+
+    /// Whether a tile that does not own it has it as a ghost.
+    pub(crate) fn is_ghost_of(&self, tile: TileId, setup: &Setup) -> bool {
+        setup.grid.reaches(tile, self.place, self.half, setup.halo_width)
+    }
+
+    /// Whether all that its box meets is a ghost of that tile, or lives there.
+    pub(crate) fn is_within_halo_of(&self, tile: TileId, setup: &Setup) -> bool {
+        let (region, (low, high)) = (setup.grid.region(tile), self.corners());
+        let halo = DVec2::splat(setup.halo_width);
+        (low.cmpge(region.min - halo) & high.cmple(region.max + halo)).all()
+    }
+
+    /// Whether the boxes of two bodies overlap.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        (self.place - other.place).abs().cmple((self.half + other.half).as_dvec2()).all()
+    }
+
+    /// The corners of its box.
+    pub(crate) fn corners(&self) -> (DVec2, DVec2) {
+        let half = self.half.as_dvec2();
+        (self.place - half, self.place + half)
+    }
+
+    /// The tiles that it is so near to.
+    pub(crate) fn near(&self, setup: &Setup) -> impl Iterator<Item = TileId> {
+        let near = |depth| setup.grid.reached(self.place, self.half, depth);
+        setup.overlap.into_iter().flat_map(near)
+    }
+}

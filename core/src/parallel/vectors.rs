@@ -1,0 +1,67 @@
+//! Eight vectors of the plane at once.
+
+use super::lanes::Lanes;
+
+/// A vector in every lane; or a rotation, by its cosine and its sine.
+#[derive(Clone, Copy)]
+pub(crate) struct Vectors<V> {
+    pub(crate) x: V,
+    pub(crate) y: V,
+}
+
+impl<V: Lanes> Vectors<V> {
+    #[inline(always)]
+    pub(crate) fn new(x: V, y: V) -> Self {
+        Self { x, y }
+    }
+
+    #[inline(always)]
+    pub(crate) fn scaled(self, by: V) -> Self {
+        Self { x: self.x.mul(by), y: self.y.mul(by) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn plus(self, other: Self) -> Self {
+        Self { x: self.x.add(other.x), y: self.y.add(other.y) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn minus(self, other: Self) -> Self {
+        Self { x: self.x.sub(other.x), y: self.y.sub(other.y) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn dot(self, other: Self) -> V {
+        self.x.mul(other.x).add(self.y.mul(other.y))
+    }
+
+    #[inline(always)]
+    pub(crate) fn cross(self, other: Self) -> V {
+        self.x.mul(other.y).sub(self.y.mul(other.x))
+    }
+
+    /// `v`, turned by this rotation.
+    #[inline(always)]
+    pub(crate) fn rotate(self, v: Self) -> Self {
+        Self { x: self.x.mul(v.x).sub(self.y.mul(v.y)), y: self.y.mul(v.x).add(self.x.mul(v.y)) }
+    }
+
+    /// The rotation that undoes this one.
+    #[inline(always)]
+    pub(crate) fn back(self) -> Self {
+        Self { x: self.x, y: V::splat(0.0).sub(self.y) }
+    }
+
+    /// The vector of this box nearest to `v`: half extents within which each part is held.
+    #[inline(always)]
+    pub(crate) fn hold(self, v: Self) -> Self {
+        let zero = V::splat(0.0);
+        Self { x: v.x.min(self.x).max(zero.sub(self.x)), y: v.y.min(self.y).max(zero.sub(self.y)) }
+    }
+
+    /// `yes` where a number is positive, else `no`.
+    #[inline(always)]
+    pub(crate) fn pick(positive: V, yes: Self, no: Self) -> Self {
+        Self { x: positive.if_positive(yes.x, no.x), y: positive.if_positive(yes.y, no.y) }
+    }
+}

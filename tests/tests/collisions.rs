@@ -1,0 +1,208 @@
+//! Single collisions, whose outcome is known exactly: E. Routh, "Dynamics of a System of Rigid Bodies", 1860. At 60 Hz and at
+//! others, and whenever in the step surfaces touch.
+
+use atoll_core::{Body, Exchange, Material, Rot, Shape};
+use atoll_tests::world::{Cut, Scene, Sim};
+use glam::{DVec2, Vec2};
+
+const MIDDLE: DVec2 = DVec2::new(3.0, 5.0);
+
+/// Moments within a step.
+const PHASES: u32 = 20;
+
+/// Friction, and radius and sides in m.
+const FRICTION: f32 = 0.6;
+const RADIUS: f32 = 0.25;
+
+fn rough() -> Material {
+    Material { friction: FRICTION, ..Material::default() }
+}
+
+fn bouncy(restitution: f32) -> Material {
+    Material { friction: 0.0, restitution, ..Material::default() }
+}
+
+fn start(scene: &Scene) -> Sim {
+    scene.start((Cut::Whole, Exchange::Step))
+}
+
+/// What is the same in all phases: a name for messages, and the greatest relative error.
+#[track_caller]
+fn assert_near(what: &str, phase: u32, [is, should]: [f64; 2], within: f64) {
+    assert!((is / should - 1.0).abs() < within, "{what}, phase {phase}: {is} instead of {should}");
+}
+
+/// A disc without restitution meets a wall: it keeps what friction leaves of its speed along it.
+fn disc_on_wall(hertz: f32, velocity: Vec2, spin: f32, phase: u32) -> Body {
+    let mut scene = Scene::new(MIDDLE, 0.0);
+    scene.params.dt = 1.0 / hertz;
+    scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, rough());
+    let kind = scene.kind(Shape::circle(RADIUS), rough());
+    let part = f64::from(phase) / f64::from(PHASES);
+    let gap = f64::from(-velocity.y / hertz) * (2.0 + part);
+    let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(RADIUS) + gap), velocity);
+    scene.last().angular_velocity = spin;
+    let mut sim = start(&scene);
+    sim.run(6);
+    sim.body(id)
+}
+
+#[test]
+fn a_disc_leaves_a_wall_with_the_spin_that_friction_gives() {
+    for hertz in [60.0, 240.0] {
+        for (velocity, spin) in [((5.0, -3.0), 0.0), ((10.0, -3.0), 0.0), ((0.0, -3.0), 5.0)] {
+            let slip = velocity.0 + spin * RADIUS;
+            let pull = (slip / 3.0).min(-FRICTION * velocity.1);
+            let expected = [spin - 2.0 * pull / RADIUS, velocity.0 - pull].map(f64::from);
+            for phase in 0..PHASES {
+                let body = disc_on_wall(hertz, velocity.into(), spin, phase);
+                let what = format!("{velocity:?} {spin} at {hertz} Hz");
+                assert_near(&what, phase, [body.angular_velocity.into(), expected[0]], 1e-3);
+                assert_near(&what, phase, [body.velocity.x.into(), expected[1]], 1e-3);
+            }
+        }
+    }
+}
+
+#[test]
+fn two_discs_part_with_the_spins_that_friction_gives() {
+    for hertz in [60.0, 240.0] {
+        for apart in [0.1, 0.2, 0.3, 0.4] {
+            let sine = apart / (2.0 * RADIUS);
+            let push = 5.0 * (1.0 - sine * sine).sqrt();
+            let pull = (10.0 * sine / 6.0).min(FRICTION * push);
+            let expected = f64::from(2.0 * pull / RADIUS);
+            for phase in 0..PHASES {
+                let mut scene = Scene::new(MIDDLE, 0.0);
+                scene.params.dt = 1.0 / hertz;
+                let kind = scene.kind(Shape::circle(RADIUS), rough());
+                let far = 0.5 * (1.0 - sine * sine).sqrt() * 2.0 * RADIUS
+                    // Never just as a step begins: rounding then says whether they overlap already, and are pushed apart softly.
+                    + 5.0 / hertz * (2.0 + (phase as f32 + 0.5) / PHASES as f32);
+                let from = DVec2::new(far.into(), f64::from(0.5 * apart));
+                let left = scene.body(kind, MIDDLE - from, Vec2::new(5.0, 0.0));
+                let right = scene.body(kind, MIDDLE + from, Vec2::new(-5.0, 0.0));
+                let mut sim = start(&scene);
+                sim.run(4);
+                let what = format!("{apart} m apart at {hertz} Hz");
+                let [a, b] = [left, right].map(|id| sim.body(id));
+                for spin in [a.angular_velocity, b.angular_velocity] {
+                    assert_near(&what, phase, [f64::from(spin.abs()), expected], 1e-2);
+                }
+                // Of the pair, about its center.
+                let mass = sim.mass(&a);
+                let inertia = 0.5 * mass * f64::from(RADIUS * RADIUS);
+                let angular: f64 = [a, b].iter().map(|body| angular_momentum(body, mass, inertia)).sum();
+                let first = 2.0 * mass * 5.0 * from.y;
+                assert_near(&format!("{what}, angular momentum"), phase, [angular, first], 1e-3);
+            }
+        }
+    }
+}
+
+/// About the middle, in kg m^2/s.
+fn angular_momentum(body: &Body, mass: f64, inertia: f64) -> f64 {
+    let (at, velocity) = (body.position - MIDDLE, body.velocity.as_dvec2());
+    mass * at.perp_dot(velocity) + inertia * f64::from(body.angular_velocity)
+}
+
+#[test]
+fn a_box_that_lands_on_a_corner_turns_about_it() {
+    for (degrees, velocity) in [(20.0_f32, (0.0, -3.0)), (35.0, (0.0, -3.0)), (20.0, (1.0, -4.0)), (60.0, (-1.0, -4.0))]
+    {
+        let rotation = Rot::from_angle(degrees.to_radians());
+        // From the lowest corner's side: of a box of 1 m, whose inertia is a sixth of its mass.
+        let arm = [Vec2::new(-0.5, -0.5), Vec2::new(0.5, -0.5)].map(|corner| rotation.rotate(corner));
+        let arm = if arm[0].y < arm[1].y { arm[0] } else { arm[1] };
+        let velocity = Vec2::from(velocity);
+        let (xx, xy, yy) = (1.0 + 6.0 * arm.y * arm.y, -6.0 * arm.x * arm.y, 1.0 + 6.0 * arm.x * arm.x);
+        let determinant = xx * yy - xy * xy;
+        let impulse = Vec2::new(-velocity.x * yy + velocity.y * xy, -velocity.y * xx + velocity.x * xy) / determinant;
+        assert!(impulse.x.abs() < 0.95 * FRICTION * impulse.y, "the corner is to hold: {degrees} {impulse}");
+        let expected = f64::from(6.0 * arm.perp_dot(impulse));
+        let mut mean = 0.0;
+        for phase in 0..PHASES {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, rough());
+            let kind = scene.kind(Shape::rectangle(1.0, 1.0), rough());
+            let gap = -velocity.y / 60.0 * (2.0 + phase as f32 / PHASES as f32);
+            let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(gap - arm.y)), velocity);
+            scene.last().rotation = rotation;
+            let mut sim = start(&scene);
+            sim.run(5);
+            let spin = sim.body(id).angular_velocity;
+            assert_near(&format!("{degrees} degrees"), phase, [spin.into(), expected], 2e-2);
+            mean += f64::from(spin) / f64::from(PHASES);
+        }
+        assert_near(&format!("{degrees} degrees, mean"), PHASES, [mean, expected], 1e-2);
+    }
+}
+
+/// The first peak of what falls from so high, by the share of the height.
+fn peak(shape: Shape, restitution: f32, height: f64) -> f64 {
+    let mut scene = Scene::new(MIDDLE, -10.0);
+    scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, bouncy(0.0));
+    let kind = scene.kind(shape, bouncy(restitution));
+    let half = match shape {
+        Shape::Circle { radius } => radius,
+        Shape::Box { half } => half.y,
+    };
+    let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(half) + height), Vec2::ZERO);
+    let mut sim = start(&scene);
+    let (mut rises, mut peak) = (false, 0.0);
+    for _ in 0..240 {
+        sim.run(1);
+        let body = sim.body(id);
+        assert!(body.angular_velocity.abs() < 1e-3, "it does not tumble");
+        if rises && body.velocity.y < 0.0 {
+            break;
+        }
+        rises |= body.velocity.y > 0.0;
+        if rises {
+            peak = f64::max(peak, body.position.y - MIDDLE.y - f64::from(half));
+        }
+    }
+    peak / height
+}
+
+#[test]
+fn what_falls_flat_bounces_to_the_square_of_its_restitution() {
+    for shape in [Shape::circle(0.25), Shape::rectangle(0.5, 0.5), Shape::rectangle(1.5, 0.4)] {
+        for restitution in [0.5, 0.8, 1.0] {
+            for phase in 0..PHASES {
+                let peak = peak(shape, restitution, 5.0 + 0.17 * f64::from(phase) / f64::from(PHASES));
+                let what = format!("{shape:?} of restitution {restitution}");
+                assert_near(&what, phase, [peak, f64::from(restitution * restitution)], 2e-2);
+            }
+        }
+    }
+}
+
+/// Acceleration down a slope: g (sin a - friction cos a) of what slides, two thirds of g sin a of a disc that rolls.
+#[test]
+fn what_slides_and_what_rolls_gains_the_speed_that_theory_gives() {
+    let (slides, rolls) = (30.0_f32.to_radians(), 20.0_f32.to_radians());
+    for (angle, friction, shape, expected) in [
+        (slides, 0.3, Shape::rectangle(1.0, 1.0), 10.0 * (slides.sin() - 0.3 * slides.cos())),
+        (rolls, FRICTION, Shape::circle(0.5), 10.0 * rolls.sin() / 1.5),
+    ] {
+        for phase in 0..PHASES {
+            let mut scene = Scene::new(MIDDLE, -10.0);
+            let turn = Rot::from_angle(-angle);
+            let material = Material { friction, ..Material::default() };
+            let along = |x: f32, y: f32| MIDDLE + turn.rotate(Vec2::new(x, y)).as_dvec2();
+            scene.wall(along(0.0, -1.0), (80.0, 2.0), -angle, material);
+            let kind = scene.kind(shape, material);
+            // It falls for a part of a step first.
+            let above = 10.0 / 3600.0 * phase as f32 / PHASES as f32;
+            let id = scene.body(kind, along(-15.0, 0.5 + above), Vec2::ZERO);
+            scene.last().rotation = turn;
+            let mut sim = start(&scene);
+            sim.run(30);
+            let before = sim.body(id).velocity.length();
+            sim.run(90);
+            let gained = (sim.body(id).velocity.length() - before) / 1.5;
+            assert_near(&format!("{shape:?}"), phase, [gained.into(), expected.into()], 5e-3);
+        }
+    }
+}

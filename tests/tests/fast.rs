@@ -1,0 +1,121 @@
+//! Bodies that go further within a step than everything around them is wide pass through nothing, wherever tiles end.
+
+use atoll_core::{Exchange, Material, Rot, Shape};
+use atoll_tests::world::{Scene, noise};
+use glam::{DVec2, Vec2};
+
+const MIDDLE: DVec2 = DVec2::new(7.0, -3.0);
+
+/// Speeds in m/s: 3 mm to 33 m in a step.
+const SPEEDS: [f32; 7] = [10.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0];
+
+/// Columns and rows of tiles, of which the smaller are 2.5 m wide; and where the target stands, from where tiles meet.
+const GRIDS: [(u32, u32); 4] = [(1, 1), (2, 2), (4, 4), (16, 16)];
+const PLACES: [DVec2; 3] = [DVec2::ZERO, DVec2::new(0.0, 1.3), DVec2::new(0.9, 0.6)];
+
+const EXCHANGES: [Exchange; 2] = [Exchange::Step, Exchange::Substep];
+
+/// How much of a step is over when a body comes to its target, and so how far it starts from that.
+fn starts(speed: f32, direction: Vec2) -> impl Iterator<Item = DVec2> {
+    (0..6_u32).map(move |k| -direction.as_dvec2() * (0.4 + f64::from(speed) / 60.0 * (0.9 * f64::from(k) / 3.0)))
+}
+
+/// Does something for each target's place, grid, exchange, speed, angle of flight and start.
+fn each(angles: &[f32], mut test: impl FnMut(&str, DVec2, (u32, u32), Exchange, Vec2, DVec2)) {
+    for place in PLACES {
+        for grid in GRIDS {
+            for exchange in EXCHANGES {
+                for speed in SPEEDS {
+                    for &angle in angles {
+                        let direction = Rot::from_angle(angle).rotate(Vec2::X);
+                        for (k, from) in starts(speed, direction).enumerate() {
+                            let what =
+                                format!("{speed} m/s at {angle} upon {place}, {grid:?}, {exchange:?}, start {k}");
+                            test(&what, MIDDLE + place, grid, exchange, direction * speed, from);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_disc_never_passes_a_thin_wall() {
+    each(&[0.0, 0.4], |what, place, grid, exchange, velocity, from| {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        scene.wall(place, (0.05, 200.0), 0.0, Material::default());
+        let disc = scene.kind(Shape::circle(0.1), Material::default());
+        let id = scene.body(disc, place + from, velocity);
+        let mut sim = scene.start_on(grid, exchange);
+        for step in 0..8 {
+            sim.run(1);
+            let beyond = sim.body(id).position.x - place.x;
+            assert!(beyond < 0.0, "{what}: {beyond} m beyond the wall after step {step}");
+        }
+    });
+}
+
+#[test]
+fn a_disc_never_passes_a_box_at_rest() {
+    each(&[0.0], |what, place, grid, exchange, velocity, from| {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let smooth = Material { friction: 0.0, ..Material::default() };
+        let square = scene.kind(Shape::rectangle(0.5, 0.5), smooth);
+        let disc = scene.kind(Shape::circle(0.1), smooth);
+        let target = scene.body(square, place, Vec2::ZERO);
+        let id = scene.body(disc, place + from, velocity);
+        let mut sim = scene.start_on(grid, exchange);
+        sim.run(8);
+        let [target, disc] = [target, id].map(|id| sim.body(id));
+        let along = velocity.as_dvec2().normalize();
+        let ahead = (disc.position - target.position).dot(along);
+        assert!(ahead < 0.0, "{what}: {ahead} m beyond the box");
+        assert!(target.velocity.as_dvec2().dot(along) > 0.1 * f64::from(velocity.length()), "{what}: nothing was hit");
+    });
+}
+
+/// Bodies at rest in two rows with a gap, and one that flies through: it meets nobody.
+#[test]
+fn who_flies_past_others_meets_nobody() {
+    for exchange in EXCHANGES {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let square = scene.kind(Shape::rectangle(0.5, 0.5), Material::default());
+        let disc = scene.kind(Shape::circle(0.1), Material::default());
+        for k in 0..40 {
+            let side = if k % 2 == 0 { 0.5 } else { -0.5 };
+            scene.body(square, MIDDLE + DVec2::new(0.8 * f64::from(k) - 16.0, side), Vec2::ZERO);
+        }
+        let velocity = Vec2::new(700.0, 0.0);
+        let id = scene.body(disc, MIDDLE - DVec2::new(18.0, 0.0), velocity);
+        let mut sim = scene.start_on((16, 16), exchange);
+        sim.run(4);
+        assert_eq!(sim.body(id).velocity, velocity, "{exchange:?}");
+        assert_eq!(sim.greatest_speed(), 700.0);
+    }
+}
+
+/// Defect: at 500 m/s 6 to 96 of 196 discs left a walled room.
+#[test]
+fn discs_at_500_m_s_stay_in_their_room() {
+    for (grid, exchange) in [((1, 1), Exchange::Step), ((4, 4), Exchange::Step), ((7, 7), Exchange::Substep)] {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let bouncy = Material { restitution: 0.9, friction: 0.0, ..Material::default() };
+        for (x, y, size) in
+            [(8.1, 0.0, (0.2, 16.4)), (-8.1, 0.0, (0.2, 16.4)), (0.0, 8.1, (16.4, 0.2)), (0.0, -8.1, (16.4, 0.2))]
+        {
+            scene.wall(MIDDLE + DVec2::new(x, y), size, 0.0, bouncy);
+        }
+        let disc = scene.kind(Shape::circle(0.2), bouncy);
+        for k in 0..196_u64 {
+            let place = DVec2::new((k % 14) as f64 - 6.5, (k / 14) as f64 - 6.5);
+            let angle = (noise(5, k) * std::f64::consts::TAU) as f32;
+            scene.body(disc, MIDDLE + place, Rot::from_angle(angle).rotate(Vec2::X) * 500.0);
+        }
+        let mut sim = scene.start_on(grid, exchange);
+        sim.run(300);
+        let outside = |place: DVec2| (place - MIDDLE).abs().max_element() > 8.1;
+        let escaped = sim.bodies().iter().filter(|body| outside(body.position)).count();
+        assert_eq!(escaped, 0, "of 196 discs on {grid:?}, {exchange:?}");
+    }
+}
