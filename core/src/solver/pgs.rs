@@ -13,7 +13,7 @@
 //! fault. Contacts still apart may close their gap within the step, no more.
 
 use super::constraint::group::Group;
-use super::constraint::kernels::{Normals, Pass, Table, WarmStart};
+use super::constraint::kernels::{Normals, Pass, Table, WarmStart, pressing};
 use super::job::Job;
 use super::motion::Motion;
 use crate::parallel::crew::Member;
@@ -80,7 +80,7 @@ impl Pass for Iterate {
                 let push = deep.mul(V::splat(self.rate)).max(V::splat(-self.push_out_speed));
                 let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
                 let wanted = V::load(&rows.normal_mass).mul(speed.add(bias));
-                V::load(&rows.normal_impulse).sub(wanted).max(zero)
+                pressing(V::load(&rows.normal_impulse).sub(wanted))
             },
         );
         if self.last {

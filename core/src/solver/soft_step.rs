@@ -5,7 +5,7 @@
 //! the push ("relax"), so that the push adds no energy.
 
 use super::constraint::group::Group;
-use super::constraint::kernels::{Normals, Pass, Table, WarmStart};
+use super::constraint::kernels::{Normals, Pass, Table, WarmStart, pressing};
 use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;
@@ -79,7 +79,7 @@ impl Pass for Solve {
                 let mass_scale = separation.if_positive(one, mass_scale);
                 let impulse_scale = separation.if_positive(zero, impulse_scale);
                 let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
-                old.sub(wanted).sub(impulse_scale.mul(old)).max(zero)
+                pressing(old.sub(wanted).sub(impulse_scale.mul(old)))
             },
         );
         V::scatter(a, bodies.velocity, &group.sides.a);
@@ -120,7 +120,7 @@ impl<const TOTALS: bool> Pass for Relax<TOTALS> {
             |rows, speed| {
                 let bias = V::load(&rows.separation).max(zero).mul(V::splat(self.inv_h));
                 let wanted = V::load(&rows.normal_mass).mul(speed.add(bias));
-                V::load(&rows.normal_impulse).sub(wanted).max(zero)
+                pressing(V::load(&rows.normal_impulse).sub(wanted))
             },
         );
         if TOTALS {

@@ -167,6 +167,12 @@ impl PointRows {
     }
 }
 
+/// An impulse if it presses, else none. One that cannot be computed, as speeds overflow, stays so: the step then fails.
+#[inline(always)]
+pub(crate) fn pressing<V: Lanes>(impulse: V) -> V {
+    V::splat(0.0).max(impulse)
+}
+
 /// An impulse, but no more than this either way.
 #[inline(always)]
 fn within<V: Lanes>(impulse: V, most: V) -> V {
