@@ -97,7 +97,7 @@ mod tests {
             let (low, high) = smash.domain();
             for index in 0..bodies {
                 let place = smash.body(index, GlobalId(index), 1).position;
-                assert!((place - LARGE).cmpgt(low).all() && (place + LARGE).cmplt(high).all(), "{bodies}: {place}");
+                assert!((place - LARGE).cmpge(low).all() && (place + LARGE).cmple(high).all(), "{bodies}: {place}");
             }
         }
     }

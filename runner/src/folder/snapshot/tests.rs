@@ -164,7 +164,7 @@ fn another_version_is_refused_and_no_damage() {
     // As another version would have written it, with the right checksum.
     for (from, to, expected) in [
         (env!("CARGO_PKG_VERSION"), "9.9.9", "program version = 9.9.9 in this snapshot"),
-        ("\"format\":1", "\"format\":7", "snapshot format = 7 in this snapshot, and 1 in this program"),
+        ("\"format\":2", "\"format\":7", "snapshot format = 7 in this snapshot, and 2 in this program"),
     ] {
         file::tests::rewrite_facts(&path, &bytes, |facts| facts.replacen(from, to, 1));
         let error = go_on(&plan, &folder, hashes).unwrap_err();
