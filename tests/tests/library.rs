@@ -73,7 +73,7 @@ fn memory_is_foreseen() {
     for (bodies, tiles) in [(200_000_u64, 6_u32), (20_000, 300), (2_000, 700)] {
         let folder = tempfile::tempdir().unwrap();
         let (json, toml) = (folder.path().join("run.json"), format!("--tiles={tiles}x{tiles}"));
-        let mut command = program::command_of(program::Profile::Release);
+        let mut command = program::command_of(program::Profile::CURRENT);
         command.args(["run", "configs/normal.toml", "--steps", "2", "--quiet", &toml]);
         let peak =
             program::run_to_summary(command.args(["--bodies", &bodies.to_string()]), &json)["peak_rss_bytes"].as_u64();
