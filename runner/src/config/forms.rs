@@ -1,7 +1,7 @@
 //! Forms of values: how each is read from what was given and written again. [`super::keys`] says which key has which.
 
 use super::error::{ConfigError, Origin};
-use super::sections::{Config, MOST_TILES, TransportKind};
+use super::sections::{Config, MOST_THREADS, MOST_TILES, TransportKind};
 use super::settings::{Settings, one_of};
 use super::words::{self, Words, word_for};
 use crate::scene::SceneKind;
@@ -203,6 +203,20 @@ impl Form for Ranks {
 
     fn write(&self, config: &mut Config) -> Option<Value> {
         Some(whole(config.run.ranks as u64))
+    }
+}
+
+/// Threads of each rank, if they are chosen.
+pub(super) struct Threads;
+
+impl Form for Threads {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        config.run.threads = settings.threads(key, MOST_THREADS)?;
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        Some(config.run.threads.map_or_else(|| "auto".into(), |threads| whole(threads as u64)))
     }
 }
 

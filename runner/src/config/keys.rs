@@ -8,7 +8,8 @@
 
 use super::error::ConfigError;
 use super::forms::{
-    Flag, Float, Form, Hertz, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Tiles, Whole, Word,
+    Flag, Float, Form, Hertz, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Threads, Tiles,
+    Whole, Word,
 };
 use super::sections::Config;
 use super::settings::Settings;
@@ -69,7 +70,7 @@ pub(super) static KEYS: &[Key] = &[
     key("scene.friction", What, &Number(friction, 0.0..=2.0)),
     key("run.steps", What, &Whole(|c| Some(&mut c.run.steps), |_| 1..=MOST_STEPS)),
     key("run.ranks", How, &Ranks),
-    key("run.threads", How, &Whole(|c| Some(&mut c.run.threads), |_| 1..=1024)),
+    key("run.threads", How, &Threads),
     key("run.transport", How, &OptionalWord(|c| &mut c.run.transport, words::TRANSPORT)),
     key("run.tiles", What, &Tiles),
     key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),

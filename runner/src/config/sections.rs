@@ -8,6 +8,9 @@ use std::time::Duration;
 /// More tiles along an axis cannot be named in 32 bits for both.
 pub(crate) const MOST_TILES: u32 = 65_535;
 
+/// More threads of a rank are of no use to it.
+pub(crate) const MOST_THREADS: u64 = 1024;
+
 /// Everything a run depends on.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Config {
@@ -30,8 +33,8 @@ pub struct RunConfig {
     pub ranks: usize,
     /// Whether that number was asked for on the command line, so that another one is an error.
     pub ranks_asked_for: bool,
-    /// Threads of each rank.
-    pub threads: usize,
+    /// Threads of each rank; `None` gives them all cores that there are.
+    pub threads: Option<usize>,
     /// What carries bytes between ranks; `None` chooses by their number.
     pub transport: Option<TransportKind>,
     /// Columns and rows of tiles; `None` chooses by scene and physics, never by ranks or threads.
@@ -104,7 +107,7 @@ impl Default for RunConfig {
             steps: 600,
             ranks: 1,
             ranks_asked_for: false,
-            threads: 1,
+            threads: None,
             transport: None,
             tiles: None,
             peer_timeout: Duration::from_secs(30),

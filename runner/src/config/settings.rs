@@ -170,6 +170,15 @@ impl Settings {
         self.get(key, "two numbers, such as [0, -10]", pair)
     }
 
+    /// `"auto"` or a whole number from one on; `None` stands for auto.
+    pub(super) fn threads(&mut self, key: &'static str, most: u64) -> Result<Option<usize>, ConfigError> {
+        let threads = |value: &Value| match value {
+            Value::String(text) if text == "auto" => Some(None),
+            number => Some(Some(value_as_u64(number).filter(|number| (1..=most).contains(number))? as usize)),
+        };
+        Ok(self.get(key, format!("\"auto\", or a whole number within 1 to {most}"), threads)?.flatten())
+    }
+
     /// `"auto"`, `[columns, rows]` or `"COLUMNSxROWS"`; `None` stands for auto.
     pub(super) fn tiles(&mut self, key: &'static str, most: u32) -> Result<Option<[u32; 2]>, ConfigError> {
         let count = |number: u64| u32::try_from(number).ok().filter(|number| (1..=most).contains(number));

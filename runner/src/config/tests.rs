@@ -30,7 +30,7 @@ fn the_kind_of_scene_chooses_the_defaults() {
     let rooms = read(ROOMS, &[]).unwrap();
     assert_eq!(rooms.params, Params::default());
     assert_eq!((rooms.scene.bodies, rooms.scene.seed), (700_000, 1));
-    assert_eq!((rooms.run.steps, rooms.run.ranks, rooms.run.threads, rooms.run.tiles), (600, 1, 1, None));
+    assert_eq!((rooms.run.steps, rooms.run.ranks, rooms.run.threads, rooms.run.tiles), (600, 1, None, None));
     assert_eq!(rooms.transport(), TransportKind::Local);
 
     let pile = read("[scene]\nkind = \"pile\"", &[]).unwrap();
@@ -137,7 +137,7 @@ fn every_key_can_be_given() {
     "#;
     let config = read(text, &[]).unwrap();
     assert_eq!(config.scene, SceneSpec { kind: SceneKind::Rooms { power: 1.2 }, bodies: 1000, seed: 5 });
-    assert_eq!((config.run.steps, config.run.ranks, config.run.threads), (7, 2, 3));
+    assert_eq!((config.run.steps, config.run.ranks, config.run.threads), (7, 2, Some(3)));
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
     assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
@@ -180,7 +180,7 @@ fn out_of_range_and_of_the_wrong_type() {
         ("scene", "power = true", "test.toml: scene.power = true: must be a number"),
         ("run", "steps = 0", "test.toml: run.steps = 0: must be a whole number within 1 to"),
         ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 1024"),
-        ("run", "threads = 0", "test.toml: run.threads = 0: must be a whole number within 1 to 1024"),
+        ("run", "threads = 0", "test.toml: run.threads = 0: must be \"auto\", or a whole number within 1 to 1024"),
         ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", or columns and rows"),
         ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
         ("run", "tiles = \"3by2\"", "test.toml: run.tiles = \"3by2\": must be"),

@@ -21,8 +21,7 @@ impl Plan {
             let tiles = if tiles == 1 { "is only one tile".to_owned() } else { format!("are only {tiles} tiles") };
             notes.push(format!("{idle} of {ranks} ranks stay idle: there {tiles}; use fewer ranks or more tiles"));
         }
-        let (threads, cores) =
-            (self.config.run.threads, thread::available_parallelism().map_or(usize::MAX, usize::from));
+        let (threads, cores) = (self.threads, thread::available_parallelism().map_or(usize::MAX, usize::from));
         if self.transport == TransportKind::Mpi && threads > cores {
             // Launchers do this unless told otherwise.
             let cores = if cores == 1 { "one core".to_owned() } else { format!("{cores} cores") };

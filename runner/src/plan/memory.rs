@@ -21,6 +21,7 @@ pub(super) fn check(
     blueprint: &Blueprint,
     bodies: u64,
     config: &Config,
+    threads: usize,
     output: Option<&OutputConfig>,
 ) -> Result<(), RunError> {
     let (ranks, tiles) = (config.run.ranks as u64, blueprint.grid.tiles() as u64);
@@ -44,7 +45,7 @@ pub(super) fn check(
         TransportKind::Iceoryx2 | TransportKind::Mpi => 1,
     };
     // Those of the ranks, and those that hear signals and show progress.
-    let threads = in_process * (config.run.threads as u64 + u64::from(output.is_some())) + 2;
+    let threads = in_process * (threads as u64 + u64::from(output.is_some())) + 2;
     let left = left_of_limit();
     let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
     let arenas = if left.is_some_and(|left| left >= ARENA) { threads.min(ARENAS * cores) * ARENA } else { 0 };

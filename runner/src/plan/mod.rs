@@ -3,6 +3,7 @@
 mod advice;
 mod assignment;
 mod memory;
+mod threads;
 pub(crate) mod tiles;
 
 pub(crate) use assignment::Assignment;
@@ -29,6 +30,8 @@ pub struct Plan {
     pub tiles: [u32; 2],
     /// Which rank holds which tiles.
     pub assignment: Assignment,
+    /// Threads of each rank of this process.
+    pub threads: usize,
     /// What carries the bytes.
     pub transport: TransportKind,
     /// What is written while it runs, if anything is.
@@ -163,7 +166,8 @@ impl Plan {
         let params = config.params.clone();
         let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
         blueprint.check()?;
-        memory::check(&blueprint, scene.bodies(), config, folder.is_some().then_some(&config.output))?;
+        let threads = threads::of_each_rank(config);
+        memory::check(&blueprint, scene.bodies(), config, threads, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;
         let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
@@ -181,7 +185,7 @@ impl Plan {
             begins,
         });
         let config = config.clone();
-        Ok(Self { config, scene, blueprint, tiles, assignment, transport, output, log: None, found })
+        Ok(Self { config, scene, blueprint, tiles, assignment, threads, transport, output, log: None, found })
     }
 }
 

@@ -103,7 +103,7 @@ pub(crate) struct RankEnd {
 /// Runs one rank, with a pool of threads of its own that this thread becomes part of. `leads_process` is true for one
 /// rank of each process.
 pub(crate) fn drive<T: Transport>(transport: T, plan: &Plan, observer: &Observer, leads_process: bool) -> RankEnd {
-    let (rank, threads) = (transport.rank(), plan.config.run.threads);
+    let (rank, threads) = (transport.rank(), plan.threads);
     let _span = info_span!("rank", rank = rank.0).entered();
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -152,7 +152,7 @@ fn run<T: Transport>(
     let before = halo.transport().stats();
     let mut last = StepReport::default();
     let (mut migrations, mut log_failure) = (0, None);
-    let threads = plan.config.run.threads * plan.config.run.ranks;
+    let threads = plan.threads * plan.config.run.ranks;
     let mut tracer = Tracer::new(observer.trace.as_ref(), world.step_count(), threads);
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);

@@ -127,7 +127,7 @@ impl Summary {
         let facts = Facts::total(tiles);
         let hashes = Hashes::from_words(all.hashes);
         let made = all.steps - all.resumed_at;
-        let threads = plan.config.run.threads;
+        let threads = plan.threads;
         let timings: Vec<_> =
             ranks.iter().enumerate().map(|(rank, facts)| RankTimings::new(rank, threads, facts)).collect();
         let wall_s = all.wall_nanos as f64 * 1e-9;

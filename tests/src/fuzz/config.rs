@@ -43,7 +43,7 @@ pub fn config(bytes: &[u8]) -> Outcome<ConfigError> {
 fn check(config: &Config) {
     let Config { scene, run, params, output: _ } = config;
     params.check().expect("what the core refuses is refused as a configuration");
-    assert!(scene.bodies >= 1 && run.steps >= 1 && run.ranks >= 1 && run.threads >= 1);
+    assert!(scene.bodies >= 1 && run.steps >= 1 && run.ranks >= 1 && run.threads != Some(0));
     assert!(!run.peer_timeout.is_zero());
     match scene.kind {
         SceneKind::Rooms { power } => assert!(power.is_finite() && power > 0.0),

@@ -19,6 +19,11 @@ pub fn launched() -> Option<Launched> {
     launched_in(|name| std::env::var(name).ok())
 }
 
+/// How many of the ranks run on this machine, this one among them, if the launcher says so.
+pub fn ranks_here() -> Option<usize> {
+    ranks_here_in(|name| std::env::var(name).ok())
+}
+
 /// Whether a launcher of MPI started this process, or another one in a way that MPI understands, so that it can join
 /// others.
 pub fn can_join_others() -> bool {
@@ -35,6 +40,13 @@ fn launched_in(variable: impl Fn(&str) -> Option<String>) -> Option<Launched> {
     ];
     let found = |(size, rank)| Some(Launched { size: number(size)? as usize, rank: Rank(number(rank)?) });
     names.into_iter().find_map(found)
+}
+
+fn ranks_here_in(variable: impl Fn(&str) -> Option<String>) -> Option<usize> {
+    // Of Open MPI; of MPICH and those like it; of srun, which tells it of each machine, such as `4(x2),1`: the first of equals.
+    let all = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_TASKS_PER_NODE"];
+    let first = |text: String| text.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok();
+    all.into_iter().find_map(|name| first(variable(name)?)).filter(|&ranks| ranks > 0)
 }
 
 #[cfg(test)]
@@ -59,5 +71,16 @@ mod tests {
         assert_eq!(with(within_slurm), launched(16, 9));
         assert_eq!(with(&[("PMI_SIZE", "many"), ("PMI_RANK", "0")]), None);
         assert_eq!(with(&[("HOME", "1")]), None);
+    }
+
+    #[test]
+    fn launchers_say_how_many_ranks_are_here() {
+        let with = |name: &'static str, value: &'static str| {
+            ranks_here_in(move |asked| (asked == name).then(|| value.to_owned()))
+        };
+        assert_eq!(with("OMPI_COMM_WORLD_LOCAL_SIZE", "4"), Some(4));
+        assert_eq!(with("MPI_LOCALNRANKS", "12"), Some(12));
+        assert_eq!(with("SLURM_STEP_TASKS_PER_NODE", "16(x2),3"), Some(16));
+        assert_eq!([with("MPI_LOCALNRANKS", "0"), with("MPI_LOCALNRANKS", "few"), with("HOME", "1")], [None; 3]);
     }
 }

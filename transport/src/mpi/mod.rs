@@ -47,7 +47,7 @@ mod sparse;
 use std::time::Duration;
 
 pub use self::endpoint::Mpi;
-pub use self::launched::{Launched, can_join_others, launched};
+pub use self::launched::{Launched, can_join_others, launched, ranks_here};
 
 /// The exit code of a job that a rank ended by [`abort`](crate::Transport::abort) or by a panic.
 pub const ABORTED: i32 = 3;

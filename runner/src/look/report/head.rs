@@ -152,7 +152,8 @@ fn facts(sources: &[Source]) -> String {
         ("Tiles", |source| Some(source.tiles().map(|tiles| tiles.to_string()).join(" \u{d7} "))),
         ("Ranks and threads", |source| {
             let ranks = source.number("ranks").unwrap_or(source.config.run.ranks as f64);
-            let threads = source.number("threads").unwrap_or(source.config.run.threads as f64);
+            let threads = source.number("threads").or(source.config.run.threads.map(|threads| threads as f64));
+            let threads = threads.map_or_else(|| "all cores".to_owned(), |threads| threads.to_string());
             let transport = source.word("transport").unwrap_or(source.config.transport().name());
             Some(format!("{ranks} ({}), {threads} each", Text(transport)))
         }),

@@ -141,9 +141,12 @@ fn ranks(source: &Source, timings: &Columns, run: Option<&str>) -> String {
     }
     let title = title_of("Time per phase of each rank", run);
     let axes = Axes { title: &title, x: "ms per step", y: "rank", scale: Scale::FromZero, wide: true };
-    let threads = source.number("threads").unwrap_or(source.config.run.threads as f64);
-    let threads = if threads == 1.0 { "1 thread".to_owned() } else { format!("{threads} threads") };
-    let about = format!("A bar for each rank, mean over the run, in ms per step; {threads} each.");
+    let threads = match source.number("threads").or(source.config.run.threads.map(|threads| threads as f64)) {
+        Some(1.0) => "; 1 thread each".to_owned(),
+        Some(threads) => format!("; {threads} threads each"),
+        None => String::new(),
+    };
+    let about = format!("A bar for each rank, mean over the run, in ms per step{threads}.");
     let content = super::chart::legend(&all, true, |_| None) + &bars(axes, &rows);
     figure(&name_of("ranks", run), true, &title, &about, &content)
 }
