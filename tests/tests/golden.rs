@@ -170,12 +170,15 @@ fn results_are_golden() {
     judge(&results, "this build");
 }
 
-/// Whole runs on lanes that are not this processor's widest. What `auto` takes without AVX2 is portable.
+/// Whole runs on lanes that are not this processor's widest. What `auto` takes without AVX2 is portable, and AVX2 without AVX-512.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn results_are_golden_on_portable_lanes() {
     if is_x86_feature_detected!("avx2") {
         judge(&results(("portable", Instructions::Portable)), "portable lanes");
+    }
+    if is_x86_feature_detected!("avx512f") {
+        judge(&results(("avx2", Instructions::Avx2)), "AVX2");
     }
 }
 

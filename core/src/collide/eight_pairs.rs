@@ -1,11 +1,12 @@
-//! Eight pairs that had a contact in the last step at once: how far they move within this one, and the contacts of what rolls.
-//!
-//! In a pile, of most pairs nothing more is asked.
+//! Eight pairs at once, at least one body of each being round: the contacts of what rolls, as most does in a pile, and of what
+//! touches within the step (`eight_touches.rs`).
 
 use crate::collide::broad_phase::Pair;
-use crate::model::contact::Contact;
+use crate::collide::eight_touches::Touches;
+use crate::model::contact::{Contact, ContactPoint};
+use crate::model::math::Rot;
 use crate::parallel::lanes::{LANES, Lanes, Quad, Row};
-use crate::parallel::vectors::Vectors;
+use crate::parallel::vectors::{Vectors, absolute, any};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -16,9 +17,13 @@ pub(super) const TOUCHING: f32 = 0.002;
 /// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
 const ROLLING: f32 = 0.0005;
 
-/// Eight pairs of bodies A and B.
+/// Eight pairs of bodies A and B, one of which is round.
 #[derive(Default, Debug)]
 pub(super) struct EightPairs {
+    /// One where they had a contact in the last step, else zero.
+    known: Row,
+    /// One where one of them is a static, else zero.
+    fixed: Row,
     /// Velocity and rotation.
     a: [Quad; LANES],
     b: [Quad; LANES],
@@ -32,11 +37,11 @@ pub(super) struct EightPairs {
 /// What can be said of them.
 #[derive(Default, Debug)]
 pub(super) struct Outlook {
-    /// How far surfaces can move against each other within the step, in m.
-    far: Row,
-    /// Positive if they may be rolling on each other; then `frames`, `rotations` and `points` hold.
-    rolls: Row,
-    /// Normal and offset, both rotations, anchor and separation, of a [`Contact`].
+    /// Positive if they make a contact, of which the others tell.
+    meets: Row,
+    /// Positive if that cannot be told here.
+    unsure: Row,
+    /// Normal and offset, both rotations, of a [`Contact`]; anchor, separation there and now.
     frames: [Quad; LANES],
     rotations: [Quad; LANES],
     points: [Quad; LANES],
@@ -44,15 +49,17 @@ pub(super) struct Outlook {
 
 impl EightPairs {
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, setup: &Setup) {
+    pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, is_known: bool, setup: &Setup) {
         let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
         let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
         self.a[lane] = moves(a);
         self.b[lane] = moves(b);
         self.between[lane] = [offset.x, offset.y, bodies.angular_velocity[a], bodies.angular_velocity[b]];
-        self.kind_a[lane] = setup.kind(bodies.kind[a]).outline();
-        self.kind_b[lane] = setup.kind(bodies.kind[b]).outline();
+        let (kind_a, kind_b) = (setup.kind(bodies.kind[a]), setup.kind(bodies.kind[b]));
+        (self.kind_a[lane], self.kind_b[lane]) = (kind_a.outline(), kind_b.outline());
+        self.known[lane] = if is_known { 1.0 } else { 0.0 };
+        self.fixed[lane] = if kind_a.inv_mass * kind_b.inv_mass == 0.0 { 1.0 } else { 0.0 };
     }
 
     /// Tells of all lanes, also of those that were not set.
@@ -73,33 +80,50 @@ impl EightPairs {
             spin: [w_a, w_b],
             dt: V::splat(setup.params.dt),
         };
-        eight.far().store(&mut outlook.far);
-        eight.roll(outlook);
+        let zero = V::splat(0.0);
+        let is_slow = V::splat(setup.params.speculative_distance).sub(eight.far());
+        let known = is_slow.if_positive(V::load(&self.known), zero);
+        // No closures here: they might be compiled without the lanes' instructions.
+        let (one, mut others) = (V::splat(1.0), V::splat(1.0));
+        let mut touches = Touches::none();
+        if any(known) {
+            touches = eight.roll();
+            others = known.if_positive(touches.meets, zero).if_positive(zero, one);
+        }
+        if any(others) {
+            touches = Touches::pick(others, &eight.touch(V::load(&self.fixed), setup), &touches);
+        }
+        touches.meets.store(&mut outlook.meets);
+        touches.unsure.store(&mut outlook.unsure);
+        let Touches { normal, offset, rotation: [a, b], anchor, separation, now, .. } = touches;
+        V::store_quads([normal.x, normal.y, offset.x, offset.y], &mut outlook.frames);
+        V::store_quads([a.x, a.y, b.x, b.y], &mut outlook.rotations);
+        V::store_quads([anchor.x, anchor.y, separation, now], &mut outlook.points);
     }
 }
 
 /// The bodies A and B of eight pairs, and how they are to each other.
-struct Eight<V> {
-    offset: Vectors<V>,
-    between: Vectors<V>,
-    half: [Vectors<V>; 2],
-    radius: [V; 2],
-    bound: [V; 2],
-    rotation: [Vectors<V>; 2],
-    spin: [V; 2],
-    dt: V,
+pub(super) struct Eight<V> {
+    pub(super) offset: Vectors<V>,
+    pub(super) between: Vectors<V>,
+    pub(super) half: [Vectors<V>; 2],
+    pub(super) radius: [V; 2],
+    pub(super) bound: [V; 2],
+    pub(super) rotation: [Vectors<V>; 2],
+    pub(super) spin: [V; 2],
+    pub(super) dt: V,
 }
 
 impl<V: Lanes> Eight<V> {
     /// The greatest speed that turning gives a point that it brings nearer to the other: of a round body, none.
     #[inline(always)]
-    fn sweep(&self, side: usize) -> V {
+    pub(super) fn sweep(&self, side: usize) -> V {
         let speed = self.bound[side].mul(absolute(self.spin[side]));
         self.half[side].x.if_positive(speed, V::splat(0.0))
     }
 
     #[inline(always)]
-    fn far(&self) -> V {
+    pub(super) fn far(&self) -> V {
         let speed = self.between.dot(self.between).sqrt();
         self.dt.mul(speed.add(self.sweep(0)).add(self.sweep(1)))
     }
@@ -117,7 +141,7 @@ impl<V: Lanes> Eight<V> {
 
     /// That of the one that has a core, or of B.
     #[inline(always)]
-    fn core_of(&self, of: [Vectors<V>; 2]) -> Vectors<V> {
+    pub(super) fn core_of(&self, of: [Vectors<V>; 2]) -> Vectors<V> {
         Vectors::pick(self.half[0].x, of[0], of[1])
     }
 
@@ -128,7 +152,7 @@ impl<V: Lanes> Eight<V> {
     /// rocks, as position is integrated in four parts of a step in which force does not change. With those of the middle it
     /// falls by 1/8 (w dt)^2.
     #[inline(always)]
-    fn roll(&self, outlook: &mut Outlook) {
+    fn roll(&self) -> Touches<V> {
         let (zero, half, one) = (V::splat(0.0), V::splat(0.5), V::splat(1.0));
         let time = half.mul(self.dt);
         let offset = self.offset.plus(self.between.scaled(time));
@@ -156,87 +180,110 @@ impl<V: Lanes> Eight<V> {
         let from = offset.scaled(has_core.if_positive(zero, one));
         let anchor = from.plus(arm).minus(normal.scaled(half.mul(nearer)));
         let offset = offset.minus(normal.scaled(nearer));
-        V::store_quads([normal.x, normal.y, offset.x, offset.y], &mut outlook.frames);
-        V::store_quads([rotation[0].x, rotation[0].y, rotation[1].x, rotation[1].y], &mut outlook.rotations);
-        V::store_quads([anchor.x, anchor.y, now, zero], &mut outlook.points);
-        // They touch, slowly, the center of the round one lies in no core, and one of them is round.
+        // They touch, slowly, and the center of the round one lies in no core.
         let slow = V::splat(ROLLING).sub(absolute(nearer));
         let rolls = slow.min(V::splat(TOUCHING).sub(now)).min(distance);
-        has_core.if_positive(self.half[1].x.if_positive(zero, rolls), rolls).store(&mut outlook.rolls);
+        Touches { meets: rolls, unsure: zero, normal, offset, rotation, anchor, separation: now, now }
     }
-}
-
-#[inline(always)]
-fn absolute<V: Lanes>(x: V) -> V {
-    x.max(V::splat(0.0).sub(x))
 }
 
 impl Outlook {
-    /// Whether surfaces move by less than the speculative distance.
+    /// Whether it cannot be told here if a pair makes a contact.
     #[inline(always)]
-    pub(super) fn is_slow(&self, lane: usize, setup: &Setup) -> bool {
-        self.far[lane] < setup.params.speculative_distance
+    pub(super) fn is_unsure(&self, lane: usize) -> bool {
+        self.unsure[lane] > 0.0
     }
 
-    /// Whether a pair that has touched, and is slow, rolls on.
+    /// Whether a pair makes a contact.
     #[inline(always)]
-    pub(super) fn rolls(&self, lane: usize) -> bool {
-        self.rolls[lane] > 0.0
+    pub(super) fn meets(&self, lane: usize) -> bool {
+        self.meets[lane] > 0.0
     }
 
-    /// Gives the contact of a pair that rolls the geometry of the middle of the step, and tells the separation of its points now.
+    /// The contact of a pair, with the impulses of the last one, and the separation of its points now.
     #[inline(always)]
-    pub(super) fn roll(&self, lane: usize, contact: &mut Contact) -> [f32; 2] {
-        let quads: &mut [Quad; size_of::<Contact>() / size_of::<Quad>()] = bytemuck::cast_mut(contact);
-        (quads[0], quads[1]) = (self.frames[lane], self.rotations[lane]);
-        let [anchor_x, anchor_y, separation, _] = self.points[lane];
-        contact.points[0].anchor = Vec2::new(anchor_x, anchor_y);
-        contact.points[0].separation = separation;
-        [separation, 0.0]
+    pub(super) fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
+        let [anchor_x, anchor_y, separation, now] = self.points[lane];
+        let (normal_impulse, tangent_impulse) =
+            known.map_or((0.0, 0.0), |known| (known.points[0].normal_impulse, known.points[0].tangent_impulse));
+        let anchor = Vec2::new(anchor_x, anchor_y);
+        let contact = Contact {
+            normal: Vec2::new(nx, ny),
+            offset: Vec2::new(x, y),
+            rotation_a: Rot { c: ca, s: sa },
+            rotation_b: Rot { c: cb, s: sb },
+            points: [
+                ContactPoint { anchor, separation, normal_impulse, tangent_impulse, feature: 0 },
+                ContactPoint::NONE,
+            ],
+        };
+        (contact, [now, 0.0])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collide::touch::is_slow;
+    use crate::collide::touch::touch;
     use crate::model::body::Body;
     use crate::model::id::{GlobalId, KindId, TileId};
-    use crate::model::params::Params;
-    use crate::parallel::lanes::Portable;
-    use crate::testing::{any_rotation, cases, circle, rectangle};
+    use crate::model::params::{Instructions, Params};
+    use crate::parallel::lanes::{Kernel, LaneSet};
+    use crate::testing::{any_kind, any_rotation, cases, circle};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::TileGrid;
     use glam::DVec2;
     use proptest::prelude::*;
 
-    proptest! {
-        #![proptest_config(cases(256))]
+    struct Look<'a>(&'a EightPairs, &'a Setup);
 
-        /// Which way the narrow phase asks is decided by counts, and must not show.
+    impl Kernel for Look<'_> {
+        type Output = Outlook;
+        fn run<V: Lanes>(self) -> Outlook {
+            let mut outlook = Outlook::default();
+            self.0.look::<V>(self.1, &mut outlook);
+            outlook
+        }
+    }
+
+    proptest! {
+        #![proptest_config(cases(2048))]
+
+        /// One moment, and every bit of one contact, whoever looks for it.
         #[test]
-        fn slow_at_once_is_slow_one_by_one(
-            speed in -1.0_f32..1.0, spins in any_rotation(), rotation in any_rotation(), round in any::<[bool; 2]>(),
+        fn eight_touch_as_one_does(
+            other in any_kind(0.05, 2.0), swapped: bool, radius in 0.05_f32..1.0,
+            (x, y) in (-3.0_f64..3.0, -3.0_f64..3.0), (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0),
+            slowness in 0_u32..4, spins in (-40.0_f32..40.0, -40.0_f32..40.0), rotation in any_rotation(),
         ) {
-            let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(10.0), 1, 1).unwrap();
-            let kinds = round.map(|round| if round { circle(0.3) } else { rectangle(0.4, 0.8) }).to_vec();
-            let blueprint = Blueprint { params: Params::default(), grid, kinds, statics: Vec::new() };
+            let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
+            let blueprint = Blueprint { params: Params::default(), grid, kinds: vec![circle(radius), other], statics: Vec::new() };
             let setup = Setup::new(&blueprint).unwrap();
             let mut tile = Tile::new(TileId(0), &setup);
-            let body = |k: u32, spin: f32| Body {
-                id: GlobalId(k.into()),
-                kind: KindId(k),
-                position: DVec2::splat(5.0 + 0.3 * f64::from(k)),
-                rotation,
-                velocity: Vec2::new(0.2, speed * k as f32),
-                angular_velocity: spin,
-            };
-            tile.bodies.push(body(0, spins.c));
-            tile.bodies.push(body(1, 2.0 * spins.s));
-            let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
-            eight.set(3, &tile, [0, 1], &setup);
-            eight.look::<Portable>(&setup, &mut outlook);
-            prop_assert_eq!(outlook.is_slow(3, &setup), is_slow(&tile, [0, 1], &setup));
+            let velocity = Vec2::new(vx, vy) * 0.1_f32.powi(slowness as i32);
+            let kinds = if swapped { [1, 0] } else { [0, 1] };
+            for (k, position, velocity, spin) in
+                [(0, DVec2::splat(10.0), Vec2::ZERO, spins.0), (1, DVec2::new(10.0 + x, 10.0 + y), velocity, spins.1)]
+            {
+                let (id, kind) = (GlobalId(k), KindId(kinds[k as usize]));
+                tile.bodies.push(Body { id, kind, position, rotation, velocity, angular_velocity: spin });
+            }
+            let expected = touch(&tile, [0, 1], None, &setup);
+            for instructions in [Instructions::Auto, Instructions::Portable] {
+                let mut eight = EightPairs::default();
+                (0..LANES).for_each(|lane| eight.set(lane, &tile, [0, 1], false, &setup));
+                let outlook = LaneSet::of(instructions).unwrap().run(Look(&eight, &setup));
+                if outlook.is_unsure(5) {
+                    continue;
+                }
+                prop_assert_eq!(outlook.meets(5), expected.is_some());
+                if let Some((contact, separation)) = expected {
+                    let (found, now) = outlook.contact(5, None);
+                    prop_assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&contact));
+                    prop_assert_eq!(now[0].to_bits(), separation[0].to_bits());
+                }
+            }
         }
     }
 }

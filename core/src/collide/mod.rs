@@ -1,7 +1,9 @@
 //! Who touches whom, and how: pairs of near bodies, and their manifolds with the impulses of the step before.
 
 pub(crate) mod broad_phase;
+mod cull;
 mod eight_pairs;
+mod eight_touches;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
 pub(crate) mod proxies;

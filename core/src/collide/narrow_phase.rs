@@ -1,14 +1,17 @@
 //! Narrow phase: from pairs to contacts, in canonical order, each with the impulses it had.
 
 use crate::collide::broad_phase::Pair;
+use crate::collide::cull::Cull;
 use crate::collide::eight_pairs::{EightPairs, Outlook};
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
+use crate::parallel::ahead::fetch;
 use crate::parallel::lanes::{Kernel, LANES, Lanes};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
+use bytemuck::Zeroable;
 use std::ops::Range;
 
 /// Candidates, and pairs, in a piece of work, at least.
@@ -29,32 +32,6 @@ impl Contacts {
         self.cache.clear();
         self.separation.clear();
         self.bodies.clear();
-    }
-
-    /// Adds the contact of a pair, if there is one; of a slow one there may be an outlook.
-    #[inline(always)]
-    fn find(&mut self, tile: &Tile, setup: &Setup, named: Named<'_>, slow: Option<(&Outlook, usize)>) {
-        let Named { key, bodies, known } = named;
-        if let (Some(known), Some((outlook, lane))) = (known, slow) {
-            if outlook.rolls(lane) {
-                let separation = outlook.roll(lane, self.cache.push(key, *known));
-                return self.push_bodies(bodies, separation);
-            }
-            if let Some(separation) = recycle(tile, bodies, known, setup) {
-                self.cache.push(key, *known);
-                return self.push_bodies(bodies, separation);
-            }
-        }
-        if let Some((contact, separation)) = touch(tile, bodies, known, setup) {
-            self.cache.push(key, contact);
-            self.push_bodies(bodies, separation);
-        }
-    }
-
-    #[inline(always)]
-    fn push_bodies(&mut self, bodies: Pair, separation: [f32; 2]) {
-        self.bodies.push(bodies);
-        self.separation.push(separation);
     }
 
     fn append(&mut self, other: &mut Self) {
@@ -98,7 +75,7 @@ impl NarrowPhase {
         team: Team,
         contacts: &mut Contacts,
     ) {
-        self.cull(tile, proxies, candidates, team);
+        self.cull(tile, proxies, candidates, setup, team);
         self.sort(proxies.pairing);
         contacts.clear();
         let sorted = &self.sorted[..];
@@ -115,10 +92,10 @@ impl NarrowPhase {
     }
 
     /// Keeps the candidates that are pairs, and counts them by their lower index.
-    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], team: Team) {
+    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], setup: &Setup, team: Team) {
         self.near.clear();
         team.append(&mut self.near, candidates.len(), GRAIN, |range, near| {
-            cull(tile, proxies, &candidates[range], near)
+            setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates: &candidates[range], near });
         });
         self.start.clear();
         self.start.resize(proxies.pairing + 2, 0);
@@ -150,20 +127,6 @@ impl NarrowPhase {
     }
 }
 
-/// Appends the candidates that are pairs. Every one is written down and counted or not: a branch here would be a coin
-/// toss.
-fn cull(tile: &Tile, proxies: &Proxies, candidates: &[Pair], near: &mut Vec<Pair>) {
-    let position = &tile.bodies.position;
-    let mut kept = near.len();
-    near.resize(kept + candidates.len(), [0, 0]);
-    for &pair in candidates {
-        let offset = (position[pair[1] as usize] - position[pair[0] as usize]).as_vec2();
-        near[kept] = pair;
-        kept += usize::from(proxies.is_wanted(pair)) & usize::from(proxies.is_pair(offset, pair));
-    }
-    near.truncate(kept);
-}
-
 /// Appends the contacts among some sorted pairs.
 struct FindAmong<'a> {
     sorted: &'a [Pair],
@@ -181,6 +144,16 @@ struct Named<'a> {
     known: Option<&'a Contact>,
 }
 
+/// So many pairs are sorted into those with a round body and others at a time.
+const BLOCK: usize = 128;
+
+/// Some pairs, and what was found of each: its contact and the separation of the points, if `makes_contact`.
+struct Block<'a> {
+    named: [Named<'a>; BLOCK],
+    found: [(Contact, [f32; 2]); BLOCK],
+    makes_contact: [bool; BLOCK],
+}
+
 impl Kernel for FindAmong<'_> {
     type Output = ();
 
@@ -188,30 +161,80 @@ impl Kernel for FindAmong<'_> {
     fn run<V: Lanes>(self) {
         let Self { sorted, tile, setup, contacts } = self;
         let mut names = Names::new(tile, sorted);
-        let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
-        // In a pile nearly all have a contact that may roll on; where bodies fly few do. Both ways give the same bits.
-        if 2 * tile.contacts.len() < sorted.len() {
-            for &pair in sorted {
-                let named = names.name(pair);
-                let is_slow = named.known.is_some() && is_slow(tile, named.bodies, setup);
-                if is_slow {
-                    eight.set(0, tile, named.bodies, setup);
-                    eight.look::<V>(setup, &mut outlook);
-                }
-                contacts.find(tile, setup, named, is_slow.then_some((&outlook, 0)));
+        let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None };
+        let nothing = (Contact::zeroed(), [0.0; 2]);
+        let mut block = Block { named: [nobody; BLOCK], found: [nothing; BLOCK], makes_contact: [false; BLOCK] };
+        for pairs in sorted.chunks(BLOCK) {
+            // Each is written down in both lists and counted in one: kinds come in no order, and a branch would be a coin toss.
+            let (mut round, mut others) = ([0_u8; BLOCK], [0_u8; BLOCK]);
+            let (mut rounds, mut other) = (0, 0);
+            names.name(pairs, &mut block.named);
+            for (i, &pair) in pairs.iter().enumerate() {
+                (round[rounds], others[other]) = (i as u8, i as u8);
+                let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).not_round);
+                let any_round = a * b == 0.0;
+                rounds += usize::from(any_round);
+                other += usize::from(!any_round);
             }
-            return;
+            block.find_round::<V>(&round[..rounds], tile, setup);
+            block.find_others(&others[..other], tile, setup);
+            for i in 0..pairs.len() {
+                if block.makes_contact[i] {
+                    let (Named { key, bodies, .. }, (contact, separation)) = (block.named[i], block.found[i]);
+                    contacts.cache.push(key, contact);
+                    contacts.bodies.push(bodies);
+                    contacts.separation.push(separation);
+                }
+            }
         }
-        for pairs in sorted.chunks(LANES) {
-            let mut named = [Named { key: PairKey::default(), bodies: [0, 0], known: None }; LANES];
-            for (lane, &pair) in pairs.iter().enumerate() {
-                named[lane] = names.name(pair);
-                eight.set(lane, tile, named[lane].bodies, setup);
+    }
+}
+
+impl Block<'_> {
+    /// Finds the contacts of pairs with a round body.
+    #[inline(always)]
+    fn find_round<V: Lanes>(&mut self, round: &[u8], tile: &Tile, setup: &Setup) {
+        let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
+        for places in round.chunks(LANES) {
+            for lane in 0..LANES {
+                let place = *places.get(lane).unwrap_or(&places[0]);
+                let Named { bodies, known, .. } = self.named[usize::from(place)];
+                eight.set(lane, tile, bodies, known.is_some(), setup);
             }
             eight.look::<V>(setup, &mut outlook);
-            for (lane, &named) in named[..pairs.len()].iter().enumerate() {
-                contacts.find(tile, setup, named, outlook.is_slow(lane, setup).then_some((&outlook, lane)));
+            for (lane, &place) in places.iter().enumerate() {
+                let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
+                if outlook.is_unsure(lane) {
+                    self.keep(place, touch(tile, bodies, known, setup));
+                } else {
+                    self.makes_contact[place] = outlook.meets(lane);
+                    self.found[place] = outlook.contact(lane, known);
+                }
             }
+        }
+    }
+
+    /// Finds the contacts of other pairs: that of before, if its manifold still serves.
+    #[inline(always)]
+    fn find_others(&mut self, others: &[u8], tile: &Tile, setup: &Setup) {
+        for &place in others {
+            let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
+            if let Some(known) = known
+                && is_slow(tile, bodies, setup)
+                && let Some(separation) = recycle(tile, bodies, known, setup)
+            {
+                self.keep(place, Some((*known, separation)));
+            } else {
+                self.keep(place, touch(tile, bodies, known, setup));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, place: usize, found: Option<(Contact, [f32; 2])>) {
+        self.makes_contact[place] = found.is_some();
+        if let Some(found) = found {
+            self.found[place] = found;
         }
     }
 }
@@ -240,20 +263,34 @@ impl<'a> Names<'a> {
         PairKey::new(slot(low), slot(high))
     }
 
+    /// Names up to a block of pairs.
     #[inline(always)]
-    fn name(&mut self, [low, high]: Pair) -> Named<'a> {
-        let (tile, keys) = (self.tile, &self.tile.contacts.keys[..]);
-        let key = self.key([low, high]);
-        while self.old < keys.len() && keys[self.old] < key {
-            self.old += 1;
+    fn name(&mut self, pairs: &[Pair], named: &mut [Named<'a>; BLOCK]) {
+        let (tile, mut known) = (self.tile, [NOT_KNOWN; BLOCK]);
+        for (named, &pair) in named.iter_mut().zip(pairs) {
+            named.key = self.key(pair);
         }
-        let known = (self.old < keys.len() && keys[self.old] == key).then(|| &tile.contacts.contacts[self.old]);
-        let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
-        let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
-        let strange = key.is_border()
-            || low as usize >= tile.arrived
-            || (high as usize) < tile.owned && high as usize >= tile.arrived;
-        let stray = if strange { tile.strays.find(pair, key.is_own()) } else { None };
-        Named { key, bodies, known: stray.or(known) }
+        // Two ascending lists are merged; which of them goes on is not for a branch to foresee.
+        let (keys, mut pair, mut old) = (&tile.contacts.keys[..], 0, self.old);
+        while pair < pairs.len().min(BLOCK) && old < keys.len() {
+            let (key, other) = (named[pair].key, keys[old]);
+            known[pair] = if key == other { old } else { NOT_KNOWN };
+            fetch(&tile.contacts.contacts, old);
+            pair += usize::from(key <= other);
+            old += usize::from(key >= other);
+        }
+        self.old = old;
+        for ((named, &[low, high]), &known) in named.iter_mut().zip(pairs).zip(&known) {
+            let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
+            let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
+            let strange = named.key.is_border()
+                || low as usize >= tile.arrived
+                || (high as usize) < tile.owned && high as usize >= tile.arrived;
+            let stray = if strange { tile.strays.find(pair, named.key.is_own()) } else { None };
+            (named.bodies, named.known) = (bodies, stray.or_else(|| tile.contacts.contacts.get(known)));
+        }
     }
 }
+
+/// The place of a contact that there was not.
+const NOT_KNOWN: usize = usize::MAX;

@@ -3,16 +3,24 @@
 use super::broad_phase::Pair;
 use crate::exchange::overlap::Outline;
 use crate::model::body::Bodies;
-use crate::model::math::{self, dot};
-use crate::parallel::lanes::LaneSet;
+use crate::model::math;
+use crate::parallel::ahead::fetch;
+use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad, Row};
 use crate::parallel::team::Team;
+use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 
+/// Bodies are asked for so many before they are read.
+const AHEAD: usize = 128;
+
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 8192;
+
+/// The mean velocity of a tile is that of one body of so many.
+const SAMPLED: usize = 13;
 
 /// What the broad phase knows of every body of a tile, a column for each number.
 #[derive(Default, Debug)]
@@ -20,18 +28,12 @@ pub(crate) struct Proxies {
     /// Center, in meters from the tile's corner.
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
-    /// Half extents of the AABB, grown by the body's margin.
-    pub(crate) half_x: Vec<f32>,
-    pub(crate) half_y: Vec<f32>,
-    pub(crate) velocity_x: Vec<f32>,
-    pub(crate) velocity_y: Vec<f32>,
-    /// How near a surface at rest may come to the center without touching: bounding radius, what turning may bring
-    /// nearer in the step, half the speculative distance.
-    pub(crate) reach: Vec<f32>,
-    /// One for a shape that changes as it turns, zero for a round one.
-    pub(crate) not_round: Vec<f32>,
-    /// Local coordinates are rounded; comparing them needs this much more room for the body, in meters.
-    pub(crate) slack: Vec<f32>,
+    /// The greater half extent of the AABB grown by the body's margin, with room for the rounding of local coordinates.
+    pub(crate) extent: Vec<f32>,
+    /// Two bodies that are further apart than these radii together, with room for rounding, do not touch in the step: `reach`, and
+    /// as far as the body goes, seen from who goes as most do.
+    pub(crate) radius: Vec<f32>,
+    outline: Vec<Quad>,
     /// Pairs are wanted of bodies for whom this comes to two: two for an owned one, one for a static and for a ghost near enough
     /// (see `exchange/overlap.rs`), nothing for other ghosts.
     weight: Vec<u8>,
@@ -43,7 +45,8 @@ pub(crate) struct Proxies {
     /// Width and height of the tile, in meters.
     pub(crate) size: [f32; 2],
     /// Length of a step, in seconds.
-    pub(crate) dt: f32,
+    #[cfg(test)]
+    dt: f32,
     pub(crate) lanes: LaneSet,
 }
 
@@ -63,33 +66,33 @@ impl Proxies {
         team: Team,
     ) {
         let (total, dynamic) = (bodies.len(), owned + ghosts);
-        let columns = [
-            &mut self.x,
-            &mut self.y,
-            &mut self.half_x,
-            &mut self.half_y,
-            &mut self.velocity_x,
-            &mut self.velocity_y,
-            &mut self.reach,
-            &mut self.not_round,
-            &mut self.slack,
-        ];
-        let mut rest = columns.map(|column| {
+        let mean = mean(&bodies.velocity[..dynamic]);
+        let load = Load { bodies, dynamic, corner, mean, setup };
+        self.outline.resize(total, [0.0; 4]);
+        let mut rest = [&mut self.x, &mut self.y, &mut self.extent, &mut self.radius].map(|column| {
             column.resize(total, 0.0);
-            &mut column[..total]
+            &mut column[..]
         });
-        let parts = team.ranges(total, GRAIN).map(|range| {
-            let part = rest.each_mut().map(|column| column.split_off_mut(..range.len()).expect("as many are left"));
-            (range, part)
+        let mut outlines = &mut self.outline[..];
+        const ENOUGH: &str = "as many are left";
+        let parts = team.ranges(total, GRAIN).map(|range| Part {
+            columns: rest.each_mut().map(|column| column.split_off_mut(..range.len()).expect(ENOUGH)),
+            outline: outlines.split_off_mut(..range.len()).expect(ENOUGH),
+            load,
+            range,
         });
-        team.for_each(parts.collect(), |(range, part)| load(bodies, dynamic, corner, setup, range, part));
+        team.for_each(parts.collect(), |part| setup.lanes.run(part));
         (self.owned, self.dynamic, self.pairing) = (owned, dynamic, owned);
         self.weight.clear();
         self.weight.resize(owned, 2);
         self.weight.resize(dynamic, 0);
         self.weight.resize(total, 1);
         self.size = setup.grid.tile_size().as_vec2().to_array();
-        (self.dt, self.lanes) = (setup.params.dt, setup.lanes);
+        self.lanes = setup.lanes;
+        #[cfg(test)]
+        {
+            self.dt = setup.params.dt;
+        }
     }
 
     /// Lets ghosts of the tile whose proxies these are be paired with each other, and with statics, where they are near.
@@ -102,6 +105,19 @@ impl Proxies {
         }
     }
 
+    /// Half extents of a body's AABB, grown by its margin, in meters.
+    #[inline(always)]
+    pub(crate) fn half(&self, body: usize) -> [f32; 2] {
+        let [x, y, ..] = self.outline[body];
+        [x, y]
+    }
+
+    /// A body's local coordinates are rounded; comparing them needs this much more room for it, in meters.
+    #[inline(always)]
+    pub(crate) fn slack(&self, body: usize) -> f32 {
+        SLACK * math::max(self.x[body].abs(), self.y[body].abs())
+    }
+
     /// Whether a pair is one that the tile solves.
     #[inline(always)]
     pub(crate) fn is_wanted(&self, [a, b]: Pair) -> bool {
@@ -112,63 +128,149 @@ impl Proxies {
     #[inline(always)]
     pub(crate) fn overlap(&self, [a, b]: Pair) -> bool {
         let (a, b) = (a as usize, b as usize);
-        let apart_x = (self.x[a] - self.x[b]).abs() - (self.half_x[a] + self.half_x[b]);
-        let apart_y = (self.y[a] - self.y[b]).abs() - (self.half_y[a] + self.half_y[b]);
-        let slack = self.slack[a] + self.slack[b];
+        let (half_a, half_b) = (self.half(a), self.half(b));
+        let apart_x = (self.x[a] - self.x[b]).abs() - (half_a[0] + half_b[0]);
+        let apart_y = (self.y[a] - self.y[b]).abs() - (half_a[1] + half_b[1]);
+        let slack = self.slack(a) + self.slack(b);
         (apart_x <= slack) & (apart_y <= slack)
     }
 
-    /// The greater half extent of a body's AABB, with room for rounding.
+    /// Half extents of a body's AABB, grown by its margin; how near a surface at rest may come to the center without touching:
+    /// bounding radius, what turning may bring nearer in the step, half the speculative distance; and the bounding radius, less than
+    /// zero if it is round. In meters.
     #[inline(always)]
-    pub(crate) fn extent(&self, body: u32) -> f32 {
-        let i = body as usize;
-        math::max(self.half_x[i], self.half_y[i]) + self.slack[i]
+    pub(super) fn outline(&self, body: usize) -> Quad {
+        self.outline[body]
     }
 
-    /// The definition of a pair: the grown AABBs of two bodies overlap, and their bounding circles may touch within the
-    /// step. `offset` leads from the center of the first to that of the second.
-    ///
-    /// Circles touch if distance < reach + closing speed x dt, the contact rule with the greatest closing speed there
-    /// can be. Of two round bodies that is known, of others only that it is no more than their relative speed. All is
-    /// multiplied by the distance, which saves a division.
-    #[inline(always)]
-    pub(crate) fn is_pair(&self, offset: Vec2, [a, b]: Pair) -> bool {
-        let (a, b, apart) = (a as usize, b as usize, offset.abs());
-        let overlap = (apart.x <= self.half_x[a] + self.half_x[b]) & (apart.y <= self.half_y[a] + self.half_y[b]);
-        let between = Vec2::new(self.velocity_x[b] - self.velocity_x[a], self.velocity_y[b] - self.velocity_y[a]);
+    /// The definition of a pair, in plain numbers: that of [`Cull`](super::cull), but for who passes by. `bodies` are those that the
+    /// proxies were loaded from.
+    #[cfg(test)]
+    pub(crate) fn is_pair(&self, bodies: &Bodies, [a, b]: Pair) -> bool {
+        use crate::model::math::dot;
+        let (a, b) = (a as usize, b as usize);
+        let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
+        let between = bodies.velocity[b] - bodies.velocity[a];
+        let [half_x_a, half_y_a, reach_a, bound_a] = self.outline[a];
+        let [half_x_b, half_y_b, reach_b, bound_b] = self.outline[b];
+        let overlap = offset.x.abs() <= half_x_a + half_x_b && offset.y.abs() <= half_y_a + half_y_b;
         let square = dot(offset, offset);
         let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
-        // Zero of two round ones; a branch here would be a coin toss.
-        let any = math::min(self.not_round[a] + self.not_round[b], 1.0);
-        let closing = math::max(math::max(any * (speed * distance), -dot(between, offset)), 0.0);
-        let within = (self.reach[a] + self.reach[b]) * distance + self.dt * closing;
-        overlap & (square <= within * 1.0001)
+        let any = if bound_a > 0.0 || bound_b > 0.0 { speed * distance } else { 0.0 };
+        let closing = math::max(math::max(any, -dot(between, offset)), 0.0);
+        let within = (reach_a + reach_b) * distance + self.dt * closing;
+        overlap && square <= within * 1.0001
     }
 }
 
-/// Fills in the proxies of some bodies: the columns of [`Proxies`], in their order.
-fn load(bodies: &Bodies, dynamic: usize, corner: DVec2, setup: &Setup, range: Range<usize>, columns: [&mut [f32]; 9]) {
-    let (count, dynamic) = (range.len(), dynamic.saturating_sub(range.start));
-    // One length for all columns: each index is checked once, not once per column.
-    let [x, y, half_x, half_y, velocity_x, velocity_y, reach, not_round, slack] =
-        columns.map(|column| &mut column[..count]);
-    let (position, velocity, rotation) =
-        (&bodies.position[range.clone()], &bodies.velocity[range.clone()], &bodies.rotation[range.clone()]);
-    let (angular_velocity, kinds) = (&bodies.angular_velocity[range.clone()], &bodies.kind[range]);
-    for i in 0..count {
-        let kind = setup.kind(kinds[i]);
-        let local = (position[i] - corner).as_vec2();
-        (x[i], y[i]) = (local.x, local.y);
-        slack[i] = 4.0 * f32::EPSILON * math::max(local.x.abs(), local.y.abs());
-        let mut half = kind.half_extents(rotation[i]);
-        if i < dynamic {
-            half += setup.margin(velocity[i]);
+/// Rounding of a local coordinate, as part of it.
+const SLACK: f32 = 4.0 * f32::EPSILON;
+
+/// About the mean of some velocities. Any vector would do, and what is not finite would not.
+fn mean(velocities: &[Vec2]) -> Vec2 {
+    let (mut sum, mut count) = (Vec2::ZERO, 0.0_f32);
+    for &velocity in velocities.iter().step_by(SAMPLED) {
+        (sum, count) = (sum + velocity, count + 1.0);
+    }
+    let mean = sum / math::max(count, 1.0);
+    if mean.is_finite() { mean } else { Vec2::ZERO }
+}
+
+/// Bodies whose proxies are to be filled in, and what that takes.
+#[derive(Clone, Copy)]
+struct Load<'a> {
+    bodies: &'a Bodies,
+    dynamic: usize,
+    corner: DVec2,
+    mean: Vec2,
+    setup: &'a Setup,
+}
+
+/// Some of them, with their rows of x, y, extent and radius, and their outlines.
+struct Part<'a> {
+    load: Load<'a>,
+    range: Range<usize>,
+    columns: [&'a mut [f32]; 4],
+    outline: &'a mut [Quad],
+}
+
+impl Kernel for Part<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { load, range, columns: [x, y, extent, radius], outline } = self;
+        let (x, x_rest) = x.as_chunks_mut::<LANES>();
+        let (y, y_rest) = y.as_chunks_mut::<LANES>();
+        let (extent, extent_rest) = extent.as_chunks_mut::<LANES>();
+        let (radius, radius_rest) = radius.as_chunks_mut::<LANES>();
+        let (outline, outline_rest) = outline.as_chunks_mut::<LANES>();
+        let mut first = range.start;
+        for ((((x, y), extent), radius), outline) in x.iter_mut().zip(y).zip(extent).zip(radius).zip(outline) {
+            load.eight::<V>(first, LANES, [x, y, extent, radius], outline);
+            first += LANES;
         }
-        (half_x[i], half_y[i]) = (half.x, half.y);
-        (velocity_x[i], velocity_y[i]) = (velocity[i].x, velocity[i].y);
+        let (mut rows, mut quads) = ([[0.0; LANES]; 4], [[0.0; 4]; LANES]);
+        load.eight::<V>(first, range.end - first, rows.each_mut(), &mut quads);
+        for (rest, row) in [x_rest, y_rest, extent_rest, radius_rest].into_iter().zip(&rows) {
+            rest.copy_from_slice(&row[..rest.len()]);
+        }
+        outline_rest.copy_from_slice(&quads[..outline_rest.len()]);
+    }
+}
+
+impl Load<'_> {
+    /// Fills in the proxies of up to eight bodies.
+    #[inline(always)]
+    fn eight<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) {
+        let (mut local_x, mut local_y, mut spin, mut grows): (Row, Row, Row, Row) = Default::default();
+        let (mut moves, mut kinds) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+        let Bodies { position, rotation, velocity, angular_velocity, kind, .. } = self.bodies;
+        let (position, rotation) = (&position[first..][..count], &rotation[first..][..count]);
+        let (velocity, angular_velocity) = (&velocity[first..][..count], &angular_velocity[first..][..count]);
+        let kind = &kind[first..][..count];
+        // A step begins here to read its bodies.
+        fetch(position, AHEAD);
+        fetch(position, AHEAD + LANES / 2);
+        fetch(velocity, AHEAD);
+        fetch(rotation, AHEAD);
+        fetch(angular_velocity, AHEAD);
+        fetch(kind, AHEAD);
+        for lane in 0..count {
+            let local = (position[lane] - self.corner).as_vec2();
+            (local_x[lane], local_y[lane]) = (local.x, local.y);
+            moves[lane] = bytemuck::cast([velocity[lane].to_array(), bytemuck::cast(rotation[lane])]);
+            kinds[lane] = self.setup.kind(kind[lane]).outline();
+            spin[lane] = angular_velocity[lane];
+            grows[lane] = if first + lane < self.dynamic { 1.0 } else { 0.0 };
+        }
+        let [x, y, extent, radius] = columns;
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let (local_x, local_y, params) = (V::load(&local_x), V::load(&local_y), &self.setup.params);
+        let [vx, vy, c, s] = V::load_quads(&moves);
+        let [width, height, rounding, bound] = V::load_quads(&kinds);
+        let velocity = Vectors::new(vx, vy);
+        let (dt, grows, not_round) = (V::splat(params.dt), V::load(&grows), width.if_positive(one, zero));
+        // As `KindRow::half_extents` and `Setup::margin`.
+        let (c, s) = (absolute(c), absolute(s));
+        let speed = velocity.dot(velocity).sqrt();
+        let any_way = speed.mul(dt).max(V::splat(params.margin_floor)).min(V::splat(params.margin_cap));
+        let margin_x = absolute(vx).mul(dt).max(any_way).mul(grows);
+        let margin_y = absolute(vy).mul(dt).max(any_way).mul(grows);
+        let half_x = c.mul(width).add(s.mul(height)).add(rounding).add(margin_x);
+        let half_y = s.mul(width).add(c.mul(height)).add(rounding).add(margin_y);
         // Turning brings no point of a round body nearer.
-        let sweep = kind.not_round * (kind.bounding_radius * angular_velocity[i].abs()) * setup.params.dt;
-        reach[i] = kind.bounding_radius + sweep + 0.5 * setup.params.speculative_distance;
-        not_round[i] = kind.not_round;
+        let sweep = not_round.mul(bound.mul(absolute(V::load(&spin)))).mul(dt);
+        let reach = bound.add(sweep).add(V::splat(0.5 * params.speculative_distance));
+        let slack = V::splat(SLACK).mul(absolute(local_x).max(absolute(local_y)));
+        let way = velocity.minus(Vectors::new(V::splat(self.mean.x), V::splat(self.mean.y)));
+        let far = dt.mul(way.dot(way).sqrt());
+        local_x.store(x);
+        local_y.store(y);
+        half_x.max(half_y).add(slack).store(extent);
+        // Distances there come from local coordinates.
+        reach.add(slack.add(slack)).add(far).store(radius);
+        let bound = width.if_positive(bound, zero.sub(bound));
+        V::store_quads([half_x, half_y, reach, bound], outline);
     }
 }

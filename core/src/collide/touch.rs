@@ -20,11 +20,11 @@ use glam::Vec2;
 const RECYCLE_COSINE: f32 = 0.98;
 
 /// The search for a touch ends with surfaces this near, in m; from deeper than the second it takes a step back.
-const NEAR: f32 = 0.0002;
-const DEEP: f32 = -0.01;
+pub(super) const NEAR: f32 = 0.0002;
+pub(super) const DEEP: f32 = -0.01;
 
 /// Steps of the search, at most. A last one mends what they leave.
-const ROUNDS: usize = 3;
+pub(super) const ROUNDS: usize = 3;
 
 /// One body of a pair.
 struct Side<'a> {

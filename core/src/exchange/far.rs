@@ -136,6 +136,7 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
 /// Source: continuous collision against statics after the solver, as in Box2D v3 (E. Catto), which a body pays for with time.
 pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup) {
     let statics = tile.owned + tile.ghosts()..tile.bodies.len();
+    tile.rim.is_known &= ways.is_empty();
     for &Way { row, start } in ways {
         let whole = tile.bodies.position[row] - start;
         let body = tile.bodies.get(row);

@@ -8,4 +8,5 @@ pub(crate) mod mail;
 pub(crate) mod migrate;
 pub(crate) mod overlap;
 pub(crate) mod record;
+pub(crate) mod rim;
 pub(crate) mod verdict;

@@ -9,6 +9,7 @@
 //!
 //! Who is near follows from bit-exact copies, so that who sends knows what who receives solves.
 
+use crate::exchange::rim::RimBody;
 use crate::model::id::TileId;
 use crate::model::params::{Exchange, Ghosts, Params};
 use crate::tiling::blueprint::Setup;
@@ -45,6 +46,11 @@ impl Outline {
         let bodies = &tile.bodies;
         let half = setup.grown_half_extents(bodies.kind[body], bodies.rotation[body], bodies.velocity[body]);
         Self { place: bodies.position[body], half }
+    }
+
+    /// Of an owned body near the border.
+    pub(crate) fn of_rim(body: &RimBody) -> Self {
+        Self { place: body.body.position, half: body.half }
     }
 
     /// Whether it is so near a tile that its contacts with others that are, and with statics, are solved there.

@@ -24,6 +24,10 @@ pub struct ContactPoint {
 impl ContactPoint {
     /// The feature of a point that is not there.
     pub const ABSENT: u32 = u32::MAX;
+
+    /// A point that is not there.
+    pub(crate) const NONE: Self =
+        Self { anchor: Vec2::ZERO, separation: 0.0, normal_impulse: 0.0, tangent_impulse: 0.0, feature: Self::ABSENT };
 }
 
 /// A contact of body A, the one with the lower GlobalId, and body B. Its manifold is kept for as long as the two hardly

@@ -70,8 +70,11 @@ pub enum SetupError {
     #[error("ghosts = \"frozen\" goes with exchange = \"step\" only: read-only copies are heard of once a step")]
     FrozenSubsteps,
     /// Inner loops compiled for what is not there.
-    #[error("instructions = \"avx2\": this processor has no AVX2; use \"auto\"")]
-    NoAvx2,
+    #[error("instructions = \"{wanted}\": this processor does not have them all; use \"auto\"")]
+    NoInstructions {
+        /// Those that were asked for.
+        wanted: &'static str,
+    },
     /// A tile outside the grid, or named twice.
     #[error("tile {tile}: outside the grid, or given twice")]
     BadTile {

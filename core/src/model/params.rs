@@ -70,6 +70,20 @@ pub enum Instructions {
     Portable,
     /// AVX2, of x86-64; refused where there is none.
     Avx2,
+    /// AVX-512 (F, VL, BW, DQ), of x86-64; refused where there is none.
+    Avx512,
+}
+
+impl Instructions {
+    /// As configurations have it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Portable => "portable",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
 }
 
 /// How a ghost takes part in the contacts of a tile that does not own it.

@@ -1,8 +1,8 @@
 //! Eight numbers at once, the same bits on every machine.
 //!
-//! A kernel is written once, generic over [`Lanes`], and compiled twice: for plain x86-64 (or any other target) with
-//! arrays, and for AVX2 with vector registers. Every operation is the IEEE one, lane by lane, so both give the same
-//! bits; how many lanes a register has never decides how work is grouped.
+//! A kernel is written once, generic over [`Lanes`], and compiled for plain x86-64 (or any other target) with arrays, for
+//! AVX2 with vector registers, and for AVX-512 with twice as many of them. Every operation is the IEEE one, lane by lane, so
+//! all give the same bits; how many lanes a register has never decides how work is grouped.
 
 use crate::model::params::Instructions;
 use std::cell::Cell;
@@ -43,6 +43,15 @@ pub(crate) trait Lanes: Copy {
     fn load_quads(from: &[Quad; LANES]) -> [Self; 4];
     /// The inverse of [`Lanes::load_quads`].
     fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]);
+    /// As [`Lanes::gather`], of quads that nobody changes.
+    #[inline(always)]
+    fn gather_fixed(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
+        let mut quads = [[0.0; 4]; LANES];
+        for (quad, &i) in quads.iter_mut().zip(index) {
+            *quad = from[i as usize];
+        }
+        Self::load_quads(&quads)
+    }
 }
 
 /// Plain arrays: the reference, and what other processors run.
@@ -131,7 +140,7 @@ pub(crate) use avx2::Avx2;
 mod avx2 {
     //! Eight lanes in one 256-bit register.
     //!
-    //! Every method is inlined into a function compiled for AVX2, which [`super::LaneSet::run`] calls only after the
+    //! Every method is inlined into a function compiled for AVX2 or more, which [`super::LaneSet::run`] calls only after the
     //! processor was asked; no other code names this type.
     use super::{LANES, Lanes, Quad, Row};
     use std::arch::x86_64::*;
@@ -281,12 +290,15 @@ pub(crate) trait Kernel {
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(crate) struct LaneSet(Set);
 
+/// Sets of instructions.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-enum Set {
+pub(crate) enum Set {
     #[default]
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl LaneSet {
@@ -294,18 +306,33 @@ impl LaneSet {
     pub(crate) fn of(wanted: Instructions) -> Option<Self> {
         match wanted {
             Instructions::Portable => Some(Self(Set::Portable)),
-            Instructions::Auto => Some(Self::of(Instructions::Avx2).unwrap_or_default()),
+            Instructions::Auto => {
+                let wide = [Instructions::Avx512, Instructions::Avx2].into_iter().find_map(Self::of);
+                Some(wide.unwrap_or_default())
+            }
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => is_x86_feature_detected!("avx2").then_some(Self(Set::Avx2)),
+            Instructions::Avx2 => {
+                let all = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt");
+                all.then_some(Self(Set::Avx2))
+            }
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => {
+                let all = Self::of(Instructions::Avx2).is_some()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq");
+                all.then_some(Self(Set::Avx512))
+            }
             #[cfg(not(target_arch = "x86_64"))]
-            Instructions::Avx2 => None,
+            Instructions::Avx2 | Instructions::Avx512 => None,
         }
     }
 
-    /// Whether the processor has AVX2, and it is wanted.
+    /// Which instructions the processor has that are wanted.
     #[cfg(target_arch = "x86_64")]
-    pub(crate) fn has_avx2(self) -> bool {
-        self.0 == Set::Avx2
+    pub(crate) fn set(self) -> Set {
+        self.0
     }
 
     /// Runs a kernel. The result does not depend on which lanes these are.
@@ -321,6 +348,16 @@ impl LaneSet {
                 }
                 // SAFETY: the processor has said that it has AVX2, or this would not be this set.
                 unsafe { with_avx2(kernel) }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => {
+                // Eight lanes as well, and 32 registers for them.
+                #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq")]
+                fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+                    kernel.run::<Avx2>()
+                }
+                // SAFETY: the processor has said that it has all of these, or this would not be this set.
+                unsafe { with_avx512(kernel) }
             }
         }
     }

@@ -2,6 +2,8 @@
 //!
 //! None of it shows in a result: work is cut by what is to be done, never by who does it.
 
+#[allow(unsafe_code)]
+pub(crate) mod ahead;
 pub(crate) mod crew;
 #[allow(unsafe_code)]
 pub(crate) mod lanes;

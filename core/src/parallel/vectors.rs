@@ -1,6 +1,6 @@
 //! Eight vectors of the plane at once.
 
-use super::lanes::Lanes;
+use super::lanes::{LANES, Lanes, Row};
 
 /// A vector in every lane; or a rotation, by its cosine and its sine.
 #[derive(Clone, Copy)]
@@ -64,4 +64,18 @@ impl<V: Lanes> Vectors<V> {
     pub(crate) fn pick(positive: V, yes: Self, no: Self) -> Self {
         Self { x: positive.if_positive(yes.x, no.x), y: positive.if_positive(yes.y, no.y) }
     }
+}
+
+/// Without its sign.
+#[inline(always)]
+pub(crate) fn absolute<V: Lanes>(x: V) -> V {
+    x.max(V::splat(0.0).sub(x))
+}
+
+/// Whether a number is positive in some lane.
+#[inline(always)]
+pub(crate) fn any<V: Lanes>(v: V) -> bool {
+    let mut row: Row = [0.0; LANES];
+    v.store(&mut row);
+    row.iter().fold(false, |any, &lane| any | (lane > 0.0))
 }

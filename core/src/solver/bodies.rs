@@ -36,7 +36,8 @@ pub(crate) struct SolverBodies {
     index: Vec<SolverIndex>,
     /// Contacts between bodies that move, as nodes: bodies with contacts, in the order of the tile.
     links: Vec<Pair>,
-    nodes: usize,
+    /// For each node which body of the tile it is.
+    touched: Vec<u32>,
     /// The first node that is a ghost.
     pub(crate) first_ghost: usize,
     pub(crate) frozen: bool,
@@ -62,16 +63,20 @@ impl SolverBodies {
             self.node[a as usize] = GraphNode::STATIC;
             self.node[b as usize] = GraphNode::STATIC;
         }
-        let mut nodes = 0;
-        let (owned, ghosts) = self.node[..dynamic].split_at_mut(tile.owned);
-        for bodies in [owned, ghosts] {
-            self.first_ghost = nodes as usize;
-            for node in bodies.iter_mut().filter(|node| **node == GraphNode::STATIC) {
-                *node = GraphNode::new(nodes);
-                nodes += 1;
+        // Every body is written down, and counted if it has a contact: a branch here would be a coin toss.
+        self.touched.resize(dynamic, 0);
+        let mut count = 0;
+        for bodies in [0..tile.owned, tile.owned..dynamic] {
+            self.first_ghost = count;
+            for body in bodies {
+                let node = &mut self.node[body];
+                self.touched[count] = body as u32;
+                let has_contact = *node == GraphNode::STATIC;
+                *node = if has_contact { GraphNode::new(count as u32) } else { GraphNode::NO_CONTACT };
+                count += usize::from(has_contact);
             }
         }
-        self.nodes = nodes as usize;
+        self.touched.truncate(count);
         self.links.clear();
         for &[a, b] in contacts {
             if let (Some(a), Some(b)) = (self.node[a as usize].number(), self.node[b as usize].number()) {
@@ -87,7 +92,7 @@ impl SolverBodies {
 
     /// How many bodies have contacts, and which of them touch.
     pub(crate) fn graph(&self) -> (usize, &[Pair]) {
-        (self.nodes, &self.links)
+        (self.touched.len(), &self.links)
     }
 
     /// For each body of the tile which of these it is.
@@ -106,7 +111,8 @@ impl SolverBodies {
         self.ghosts.clear();
         self.frozen = setup.params.ghosts == Ghosts::Frozen;
         let bodies = &tile.bodies;
-        for i in 0..tile.owned + tile.ghosts() {
+        for node in 0..self.touched.len() {
+            let i = self.touched[node] as usize;
             let place = self.index[i];
             if place == SolverIndex::NOT_SOLVED {
                 continue;

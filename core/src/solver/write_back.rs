@@ -3,24 +3,27 @@
 use super::bodies::SolverBodies;
 use super::index::SolverIndex;
 use super::motion::Motion;
-use crate::model::id::GlobalId;
+use crate::exchange::rim::{Rim, RimBody};
+use crate::model::body::Body;
+use crate::model::id::{GlobalId, KindId};
 use crate::model::math::Rot;
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
 use crate::parallel::team::Team;
+use crate::parallel::vectors::Vectors;
 use crate::tiling::blueprint::Setup;
+use crate::tiling::partition::Region;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 4096;
 
-/// Bodies sorted into solved and flown at a time.
-const BLOCK: usize = 256;
-
 /// Writes the solved bodies' new state back, and moves those without contacts. Ghosts' results are scratch: their
-/// owners' stand. Who sleeps is left alone.
+/// owners' stand. Who sleeps is left alone. Notes who may concern other tiles from now on.
 pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, team: Team) {
     let motion = Motion::new(setup);
+    let mut rim = std::mem::take(&mut tile.rim.bodies);
+    rim.clear();
     let (bodies, owned) = (&mut tile.bodies, tile.owned);
     let mut rest = Owned {
         position: &mut bodies.position[..owned],
@@ -28,14 +31,30 @@ pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, 
         velocity: &mut bodies.velocity[..owned],
         angular_velocity: &mut bodies.angular_velocity[..owned],
         id: &bodies.id[..owned],
+        kind: &bodies.kind[..owned],
         place: &solved.places()[..owned],
         asleep: tile.sleep.asleep(),
-        not_finite: None,
     };
-    let parts = team.ranges(owned, GRAIN).map(|range| rest.split_off(range.len())).collect();
-    let substeps = setup.params.integrations();
-    let not_finite = team.for_each(parts, |part| setup.lanes.run(WriteBack { owned: part, solved, motion, substeps }));
-    tile.counts.not_finite = not_finite.into_iter().flatten().min();
+    let (region, interior) = (&tile.region, &tile.interior);
+    let parts = team.ranges(owned, GRAIN).map(|range| WriteBack {
+        owned: rest.split_off(range.len()),
+        first: range.start,
+        solved,
+        motion,
+        region,
+        interior,
+        setup,
+        rim: if range.start == 0 { std::mem::take(&mut rim) } else { Vec::new() },
+        not_finite: None,
+    });
+    let mut ends = team.for_each(parts.collect(), |part| setup.lanes.run(part)).into_iter();
+    let (mut rim, mut not_finite) = ends.next().expect("one range at least");
+    for (more, other) in ends {
+        rim.extend(more);
+        not_finite = not_finite.into_iter().chain(other).min();
+    }
+    tile.rim = Rim { bodies: rim, is_known: true };
+    tile.counts.not_finite = not_finite;
 }
 
 /// Owned bodies of a tile, to be given their new state: columns of one length, so that an index is checked once.
@@ -45,11 +64,11 @@ struct Owned<'a> {
     velocity: &'a mut [Vec2],
     angular_velocity: &'a mut [f32],
     id: &'a [GlobalId],
+    kind: &'a [KindId],
     /// Among the solver's bodies.
     place: &'a [SolverIndex],
     /// Empty where nobody sleeps.
     asleep: &'a [bool],
-    not_finite: Option<GlobalId>,
 }
 
 impl<'a> Owned<'a> {
@@ -62,107 +81,252 @@ impl<'a> Owned<'a> {
             velocity: self.velocity.split_off_mut(..count).expect(ENOUGH),
             angular_velocity: self.angular_velocity.split_off_mut(..count).expect(ENOUGH),
             id: self.id.split_off(..count).expect(ENOUGH),
+            kind: self.kind.split_off(..count).expect(ENOUGH),
             place: self.place.split_off(..count).expect(ENOUGH),
             asleep: self.asleep.split_off(..count.min(self.asleep.len())).expect(ENOUGH),
-            not_finite: None,
         }
     }
 
-    /// Gives a body its new state, and notes if it is no longer finite.
+    /// Reads up to eight bodies.
     #[inline(always)]
-    fn place(&mut self, i: usize, moved: Vec2, turned: Rot, velocity: Vec2, angular_velocity: f32) {
-        let position = self.position[i] + DVec2::new(f64::from(moved.x), f64::from(moved.y));
-        let rotation = turned.after(self.rotation[i]).normalized();
-        self.position[i] = position;
-        self.rotation[i] = rotation;
-        self.velocity[i] = velocity;
-        self.angular_velocity[i] = angular_velocity;
-        // Zero times a finite number is zero; one test instead of seven.
-        let probe = (rotation.c + rotation.s + velocity.x + velocity.y + angular_velocity) * 0.0;
-        if (position.x + position.y) * 0.0 != 0.0 || probe != 0.0 {
-            let id = self.id[i];
-            self.not_finite = Some(self.not_finite.map_or(id, |lowest| lowest.min(id)));
+    fn read(&self, first: usize, count: usize) -> Eight {
+        let mut eight = Eight::default();
+        let (position, rotation) = (&self.position[first..][..count], &self.rotation[first..][..count]);
+        let (velocity, spin) = (&self.velocity[first..][..count], &self.angular_velocity[first..][..count]);
+        for lane in 0..count {
+            eight.position[lane] = position[lane];
+            eight.moves[lane] = bytemuck::cast([velocity[lane].to_array(), bytemuck::cast(rotation[lane])]);
+            eight.spin[lane] = spin[lane];
         }
+        eight
     }
 
-    /// A body with contacts, from its solver body.
+    /// Writes up to eight bodies, but those that sleep.
     #[inline(always)]
-    fn store(&mut self, i: usize, solved: &SolverBodies) {
-        let place = self.place[i].get();
-        let [_, _, root_inv_inertia, root_inv_mass] = solved.weight[place];
-        let [x, y, c, s] = solved.pose[place];
-        let [vx, vy, w, _] = solved.velocity[place];
-        let turned = Rot { c: c + 1.0, s: s * root_inv_inertia };
-        let (moved, velocity) = (Vec2::new(x, y) * root_inv_mass, Vec2::new(vx, vy) * root_inv_mass);
-        self.place(i, moved, turned, velocity, w * root_inv_inertia);
+    fn write(&mut self, first: usize, count: usize, eight: &Eight) {
+        let (position, rotation) = (&mut self.position[first..][..count], &mut self.rotation[first..][..count]);
+        let (velocity, spin) = (&mut self.velocity[first..][..count], &mut self.angular_velocity[first..][..count]);
+        for lane in 0..count {
+            if !self.asleep.is_empty() && self.asleep[first + lane] {
+                continue;
+            }
+            let [moves, turn]: [[f32; 2]; 2] = bytemuck::cast(eight.moves[lane]);
+            position[lane] = eight.position[lane];
+            (velocity[lane], rotation[lane]) = (moves.into(), bytemuck::cast(turn));
+            spin[lane] = eight.spin[lane];
+        }
     }
 }
 
+/// Eight bodies: position, velocity and rotation, angular velocity.
+#[derive(Clone, Copy, Default)]
+struct Eight {
+    position: [DVec2; LANES],
+    moves: [Quad; LANES],
+    spin: Row,
+}
+
+impl Eight {
+    /// Zero times a finite number is zero: a test for all of them, in integers, as their order does not matter.
+    #[inline(always)]
+    fn is_finite(&self) -> bool {
+        let (mut places, mut others) = (0, 0);
+        for lane in 0..LANES {
+            let ([vx, vy, c, s], position) = (self.moves[lane], self.position[lane]);
+            places |= ((position.x + position.y) * 0.0).to_bits();
+            others |= ((vx + vy + c + s + self.spin[lane]) * 0.0).to_bits();
+        }
+        // But for their signs.
+        places << 1 == 0 && others << 1 == 0
+    }
+
+    fn is_finite_in(&self, lane: usize) -> bool {
+        self.position[lane].is_finite() && self.moves[lane].iter().all(|v| v.is_finite()) && self.spin[lane].is_finite()
+    }
+}
+
+/// Some of the bodies, from the first of them on.
 struct WriteBack<'a> {
     owned: Owned<'a>,
+    first: usize,
     solved: &'a SolverBodies,
     motion: Motion,
-    substeps: u32,
+    region: &'a Region,
+    interior: &'a Region,
+    setup: &'a Setup,
+    rim: Vec<RimBody>,
+    /// The lowest of those whose state is no longer finite.
+    not_finite: Option<GlobalId>,
 }
 
 impl Kernel for WriteBack<'_> {
-    type Output = Option<GlobalId>;
+    type Output = (Vec<RimBody>, Option<GlobalId>);
+
     #[inline(always)]
-    fn run<V: Lanes>(self) -> Option<GlobalId> {
-        let Self { mut owned, solved, motion, substeps } = self;
-        let (mut flown, mut stored) = ([0_u32; BLOCK], [0_u32; BLOCK]);
-        for first in (0..owned.id.len()).step_by(BLOCK) {
-            let end = owned.id.len().min(first + BLOCK);
-            // Written down in both lists and counted in one: a branch here would be a coin toss.
-            let (mut flying, mut storing) = (0, 0);
-            for (i, &place) in (first..end).zip(&owned.place[first..end]) {
-                (flown[flying], stored[storing]) = (i as u32, i as u32);
-                let flies = place == SolverIndex::NOT_SOLVED;
-                flying += usize::from(flies);
-                storing += usize::from(!flies);
-            }
-            if !owned.asleep.is_empty() {
-                let mut awake = 0;
-                for k in 0..flying {
-                    flown[awake] = flown[k];
-                    awake += usize::from(!owned.asleep[flown[k] as usize]);
-                }
-                flying = awake;
-            }
-            for &i in &stored[..storing] {
-                owned.store(i as usize, solved);
-            }
-            for block in flown[..flying].chunks(LANES) {
-                fly::<V>(&mut owned, block, &motion, substeps);
-            }
+    fn run<V: Lanes>(mut self) -> Self::Output {
+        let all = self.owned.id.len();
+        // Blocks of eight, four at a time: roots and quotients take long, and none need wait for those of another.
+        let (fours, ones) = (all / (4 * LANES) * (4 * LANES), all / LANES * LANES);
+        for first in (0..fours).step_by(4 * LANES) {
+            self.blocks::<V, 4>(first, LANES);
         }
-        owned.not_finite
+        for first in (fours..ones).step_by(LANES) {
+            self.blocks::<V, 1>(first, LANES);
+        }
+        self.blocks::<V, 1>(ones, all - ones);
+        (self.rim, self.not_finite)
     }
 }
 
-/// Moves up to eight bodies through all substeps at once.
-#[inline(always)]
-fn fly<V: Lanes>(owned: &mut Owned<'_>, block: &[u32], motion: &Motion, substeps: u32) {
-    let mut rows: [Row; 3] = [[0.0; LANES]; 3];
-    for (lane, &i) in block.iter().enumerate() {
-        let i = i as usize;
-        let velocity = owned.velocity[i];
-        (rows[0][lane], rows[1][lane], rows[2][lane]) = (velocity.x, velocity.y, owned.angular_velocity[i]);
+/// What the step did to eight bodies: where they have gone, how they have turned, and their velocities now.
+#[derive(Clone, Copy)]
+struct Motions<V> {
+    moved: Vectors<V>,
+    turned: Vectors<V>,
+    velocity: Vectors<V>,
+    spin: V,
+}
+
+/// Which of eight bodies were solved.
+#[derive(Clone, Copy)]
+struct Solved {
+    /// Among the solver's bodies. Who is not solved is a static here: its own result is taken in the end.
+    index: [u32; LANES],
+    /// One for who is not.
+    flies: Row,
+    flying: usize,
+}
+
+impl WriteBack<'_> {
+    /// Blocks of up to eight bodies. Those that were solved and those that flew lie in no order, so both is done for all of them where
+    /// there are some of either.
+    #[inline(always)]
+    fn blocks<V: Lanes, const N: usize>(&mut self, first: usize, count: usize) {
+        let mut all = [Eight::default(); N];
+        let mut solved = [Solved { index: [0; LANES], flies: [1.0; LANES], flying: LANES - count }; N];
+        let mut flying = 0;
+        let zero = Vectors::new(V::splat(0.0), V::splat(0.0));
+        let mut motions = [Motions { moved: zero, turned: zero, velocity: zero, spin: zero.x }; N];
+        let mut rotations = [zero; N];
+        for block in 0..N {
+            all[block] = self.owned.read(first + block * LANES, count);
+            let solved = &mut solved[block];
+            for (lane, &place) in self.owned.place[first + block * LANES..][..count].iter().enumerate() {
+                let is_solved = place != SolverIndex::NOT_SOLVED;
+                solved.index[lane] = if is_solved { place.get() as u32 } else { SolverIndex::STATIC.get() as u32 };
+                solved.flies[lane] = if is_solved { 0.0 } else { 1.0 };
+                solved.flying += usize::from(!is_solved);
+            }
+            flying += solved.flying;
+            let [vx, vy, c, s] = V::load_quads(&all[block].moves);
+            motions[block].velocity = Vectors::new(vx, vy);
+            motions[block].spin = V::load(&all[block].spin);
+            rotations[block] = Vectors::new(c, s);
+        }
+        if flying > 0 {
+            self.fly(&mut motions);
+        }
+        if flying < N * LANES {
+            for (motions, solved) in motions.iter_mut().zip(&solved) {
+                *motions = Motions::pick(V::load(&solved.flies), *motions, self.solved(&solved.index));
+            }
+        }
+        for block in 0..N {
+            let (motions, eight) = (&motions[block], &mut all[block]);
+            let turned = motions.turned.rotate(rotations[block]);
+            let rotation = turned.scaled(V::splat(1.0).div(turned.dot(turned).sqrt()));
+            let (mut x, mut y): (Row, Row) = Default::default();
+            motions.moved.x.store(&mut x);
+            motions.moved.y.store(&mut y);
+            for lane in 0..LANES {
+                eight.position[lane] += DVec2::new(f64::from(x[lane]), f64::from(y[lane]));
+            }
+            motions.spin.store(&mut eight.spin);
+            V::store_quads([motions.velocity.x, motions.velocity.y, rotation.x, rotation.y], &mut eight.moves);
+        }
+        for (block, eight) in all.iter().enumerate() {
+            let first = first + block * LANES;
+            self.owned.write(first, count, eight);
+            self.note_rim(first, count, eight);
+            if !eight.is_finite() {
+                self.note_not_finite(first, count, eight);
+            }
+        }
     }
-    let (h, one, zero) = (V::splat(motion.h), V::splat(1.0), V::splat(0.0));
-    let mut velocity = [V::load(&rows[0]), V::load(&rows[1]), V::load(&rows[2])];
-    let (mut x, mut y, mut c, mut s) = (zero, zero, one, zero);
-    for _ in 0..substeps {
-        velocity = motion.accelerate(velocity, one, one);
-        (x, y) = (x.add(h.mul(velocity[0])), y.add(h.mul(velocity[1])));
-        (c, s) = motion.turn(c, s, velocity[2]);
+
+    /// Bodies without contacts, through all substeps.
+    #[inline(always)]
+    fn fly<V: Lanes, const N: usize>(&self, blocks: &mut [Motions<V>; N]) {
+        let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
+        for block in &mut *blocks {
+            (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
+        }
+        for _ in 0..self.setup.params.integrations() {
+            for block in &mut *blocks {
+                let velocity = [block.velocity.x, block.velocity.y, block.spin];
+                let [vx, vy, spin] = self.motion.accelerate(velocity, one, one);
+                (block.velocity, block.spin) = (Vectors::new(vx, vy), spin);
+                block.moved = Vectors::new(block.moved.x.add(h.mul(vx)), block.moved.y.add(h.mul(vy)));
+                let (c, s) = self.motion.turn(block.turned.x, block.turned.y, spin);
+                block.turned = Vectors::new(c, s);
+            }
+        }
     }
-    let mut out: [Row; 7] = [[0.0; LANES]; 7];
-    for (row, value) in out.iter_mut().zip([velocity[0], velocity[1], velocity[2], x, y, c, s]) {
-        value.store(row);
+
+    #[inline(always)]
+    fn note_rim(&mut self, first: usize, count: usize, eight: &Eight) {
+        let mut outside = 0;
+        for (lane, (&position, [vx, vy, ..])) in (0..).zip(eight.position.iter().zip(eight.moves)) {
+            let concerns = !self.interior.contains(position) | self.setup.goes_far(Vec2::new(vx, vy));
+            outside |= u32::from(concerns) << lane;
+        }
+        outside &= (1 << count) - 1;
+        while outside != 0 {
+            let lane = outside.trailing_zeros() as usize;
+            let (i, [moves, turn]): (usize, [[f32; 2]; 2]) = (first + lane, bytemuck::cast(eight.moves[lane]));
+            let body = Body {
+                id: self.owned.id[i],
+                position: eight.position[lane],
+                rotation: bytemuck::cast(turn),
+                velocity: moves.into(),
+                angular_velocity: eight.spin[lane],
+                kind: self.owned.kind[i],
+            };
+            self.rim.extend(RimBody::of(body, (self.first + i) as u32, self.region, self.setup));
+            outside &= outside - 1;
+        }
     }
-    for (lane, &i) in block.iter().enumerate() {
-        let [vx, vy, w, x, y, c, s] = out.each_ref().map(|row| row[lane]);
-        owned.place(i as usize, Vec2::new(x, y), Rot { c, s }, Vec2::new(vx, vy), w);
+
+    #[cold]
+    fn note_not_finite(&mut self, first: usize, count: usize, eight: &Eight) {
+        let lanes = (0..count).filter(|&lane| !eight.is_finite_in(lane));
+        self.not_finite = self.not_finite.into_iter().chain(lanes.map(|lane| self.owned.id[first + lane])).min();
+    }
+
+    /// Bodies with contacts, as the solver left them.
+    #[inline(always)]
+    fn solved<V: Lanes>(&self, index: &[u32; LANES]) -> Motions<V> {
+        let [_, _, root_inv_inertia, root_inv_mass] = V::gather_fixed(&self.solved.weight, index);
+        let [x, y, c, s] = V::gather_fixed(&self.solved.pose, index);
+        let [vx, vy, w, _] = V::gather_fixed(&self.solved.velocity, index);
+        Motions {
+            moved: Vectors::new(x, y).scaled(root_inv_mass),
+            turned: Vectors::new(c.add(V::splat(1.0)), s.mul(root_inv_inertia)),
+            velocity: Vectors::new(vx, vy).scaled(root_inv_mass),
+            spin: w.mul(root_inv_inertia),
+        }
+    }
+}
+
+impl<V: Lanes> Motions<V> {
+    /// `yes` where a number is positive, else `no`.
+    #[inline(always)]
+    fn pick(positive: V, yes: Self, no: Self) -> Self {
+        Self {
+            moved: Vectors::pick(positive, yes.moved, no.moved),
+            turned: Vectors::pick(positive, yes.turned, no.turned),
+            velocity: Vectors::pick(positive, yes.velocity, no.velocity),
+            spin: positive.if_positive(yes.spin, no.spin),
+        }
     }
 }

@@ -119,7 +119,8 @@ impl Setup {
             inset: 2.0 * halo_width,
             overlap: overlap::depth(&params).map(|part| part * halo_width),
             h: params.substep(),
-            lanes: LaneSet::of(params.instructions).ok_or(SetupError::NoAvx2)?,
+            lanes: LaneSet::of(params.instructions)
+                .ok_or(SetupError::NoInstructions { wanted: params.instructions.name() })?,
             softness: Softness::contact(&params),
             static_softness: Softness::static_contact(&params),
             totals: bouncy || params.exchange == Exchange::Substep,

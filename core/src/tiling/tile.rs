@@ -2,6 +2,7 @@
 
 use crate::collide::broad_phase::quadtree::Quadtree;
 use crate::exchange::record::Unseen;
+use crate::exchange::rim::Rim;
 use crate::islands::sleep::Sleep;
 use crate::model::body::Bodies;
 use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
@@ -28,6 +29,8 @@ pub(crate) struct Tile {
     pub(crate) owned: usize,
     /// Owned bodies from here on came in this step.
     pub(crate) arrived: usize,
+    /// Owned bodies that may concern other tiles, for the next step.
+    pub(crate) rim: Rim,
     /// One per ghost: the impulse it is given in every substep.
     pub(crate) unseen: Vec<Unseen>,
     /// One per ghost, ascending.
@@ -97,6 +100,7 @@ impl Tile {
             bodies: Bodies::default(),
             owned: 0,
             arrived: 0,
+            rim: Rim::default(),
             unseen: Vec::new(),
             ghost_owners: Vec::new(),
             statics,
@@ -133,6 +137,7 @@ impl Tile {
         self.bodies = Bodies::default();
         self.contacts = ContactCache::default();
         self.strays = Strays::default();
+        self.rim = Rim::default();
         self.unseen = Vec::new();
         self.ghost_owners = Vec::new();
         self.violation = Violation::default();

@@ -19,8 +19,12 @@ pub(super) const MPI_EXCHANGE: Words<MpiExchange> =
     &[("alltoallv", MpiExchange::Alltoallv), ("sparse", MpiExchange::Sparse)];
 
 /// `run.instructions`
-pub(super) const INSTRUCTIONS: Words<Instructions> =
-    &[("auto", Instructions::Auto), ("portable", Instructions::Portable), ("avx2", Instructions::Avx2)];
+pub(super) const INSTRUCTIONS: Words<Instructions> = &[
+    ("auto", Instructions::Auto),
+    ("portable", Instructions::Portable),
+    ("avx2", Instructions::Avx2),
+    ("avx512", Instructions::Avx512),
+];
 
 /// `physics.broad_phase`
 pub(super) const BROAD_PHASE: Words<BroadPhase> = &[("grid", BroadPhase::Grid), ("quadtree", BroadPhase::Quadtree)];

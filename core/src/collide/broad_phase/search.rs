@@ -1,12 +1,15 @@
 //! The inner loop of the grid: each body against the rest of its cell and the next, and three cells of the row above.
 //!
 //! Both are runs of memory of a few bodies. Loops over them would cost more in mispredicted branches than in
-//! comparisons, so with AVX2 each run is compared whole, eight bodies at once. Compared are bounding circles and speeds,
-//! a little more generously than [`Proxies::is_pair`] does, which has the last word.
+//! comparisons, so each run is compared whole, eight bodies at once; with AVX-512, both runs. Nor is it asked who was found:
+//! all of them are written down, and as many are counted as there are. Compared are circles, a little more generously than
+//! [`Cull`](crate::collide::cull::Cull) does, which has the last word.
 
 use super::Pair;
-use crate::collide::proxies::Proxies;
+use super::grid::Level;
 use crate::parallel::lanes::LaneSet;
+#[cfg(target_arch = "x86_64")]
+use crate::parallel::lanes::Set;
 use std::ops::Range;
 
 /// Bodies in cell order: copies of what the search compares, so that it reads memory in order.
@@ -14,9 +17,7 @@ use std::ops::Range;
 pub(super) struct Sorted {
     x: Vec<f32>,
     y: Vec<f32>,
-    velocity_x: Vec<f32>,
-    velocity_y: Vec<f32>,
-    reach: Vec<f32>,
+    radius: Vec<f32>,
     pub(super) body: Vec<u32>,
     cell: Vec<u32>,
     pub(super) len: usize,
@@ -26,33 +27,26 @@ pub(super) struct Sorted {
 const PADDING: usize = 8;
 
 impl Sorted {
-    /// Lays bodies out by cell. `start[c + 1]` holds where cell `c` begins; afterwards, where it ends.
-    pub(super) fn fill(&mut self, proxies: &Proxies, bodies: &[u32], cells: &[u32], start: &mut [u32]) {
-        self.len = bodies.len();
-        let (all, padded) = (proxies.len(), self.len + PADDING);
-        for column in [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach] {
+    /// Lays bodies out by cell, but for so many, which are in the last. `start[c + 1]` holds where cell `c` begins; afterwards, where
+    /// it ends.
+    pub(super) fn fill(&mut self, level: &Level<'_>, cells: &[u32], start: &mut [u32], without: usize) {
+        self.len = level.body.len() - without;
+        let padded = level.body.len() + PADDING;
+        for column in [&mut self.x, &mut self.y, &mut self.radius] {
             column.resize(padded, 0.0);
         }
         self.body.resize(padded, 0);
         self.cell.resize(padded, 0);
-        // One length for all columns on either side: each index is checked once, not once per column.
-        let from = [&proxies.x, &proxies.y, &proxies.velocity_x, &proxies.velocity_y, &proxies.reach, &proxies.slack];
-        let from = from.map(|column| &column[..all]);
-        let to = [&mut self.x, &mut self.y, &mut self.velocity_x, &mut self.velocity_y, &mut self.reach];
-        let [x, y, velocity_x, velocity_y, reach] = to.map(|column| &mut column[..padded]);
+        // One length for all columns: each place is checked once, not once per column.
+        let [x, y, radius] = [&mut self.x, &mut self.y, &mut self.radius].map(|column| &mut column[..padded]);
         let (to_body, to_cell) = (&mut self.body[..padded], &mut self.cell[..padded]);
-        for (&body, &cell) in bodies.iter().zip(cells) {
+        let from = level.x.iter().zip(level.y).zip(level.radius).zip(level.body).zip(cells);
+        for ((((&from_x, &from_y), &from_radius), &body), &cell) in from {
             let next = &mut start[cell as usize + 1];
-            let (i, place) = (body as usize, *next as usize);
+            let place = *next as usize;
             *next += 1;
-            x[place] = from[0][i];
-            y[place] = from[1][i];
-            velocity_x[place] = from[2][i];
-            velocity_y[place] = from[3][i];
-            // Distances here come from local coordinates.
-            reach[place] = from[4][i] + 2.0 * from[5][i];
-            to_body[place] = body;
-            to_cell[place] = cell;
+            (x[place], y[place], radius[place]) = (from_x, from_y, from_radius);
+            (to_body[place], to_cell[place]) = (body, cell);
         }
     }
 }
@@ -62,16 +56,15 @@ pub(super) struct Search<'a> {
     pub(super) sorted: &'a Sorted,
     /// Pairs of two bodies from here on are not wanted.
     pub(super) pairing: usize,
-    /// Length of a step, in seconds.
-    pub(super) dt: f32,
+    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code))]
     pub(super) lanes: LaneSet,
     /// Whose neighbours are looked for, as places in cell order.
     pub(super) places: Range<usize>,
     pub(super) pairs: &'a mut Vec<Pair>,
 }
 
-/// Room for the rounding of everything that follows from the coordinates.
-const MORE: f32 = 1.001;
+/// Room for the rounding of everything that follows from the coordinates, for squares.
+const MORE: f32 = 1.002;
 
 /// Appends a pair, lower index first, if that is wanted.
 #[inline(always)]
@@ -91,17 +84,21 @@ fn runs(start: &[u32], columns: usize, cell: usize, place: usize) -> [(usize, us
 
 impl Search<'_> {
     /// Every pair of neighbours of which one, the first in cell order, is among `places`. `start` holds where each cell begins, `columns` how many cells a row has.
-    pub(super) fn neighbours(mut self, start: &[u32], columns: usize) {
+    pub(super) fn neighbours(self, start: &[u32], columns: usize) {
         #[cfg(target_arch = "x86_64")]
-        if self.lanes.has_avx2() {
+        match self.lanes.set() {
+            // SAFETY: the processor has AVX-512, or these lanes would not be there.
+            Set::Avx512 => return unsafe { self.neighbours_avx512(start, columns) },
             // SAFETY: the processor has AVX2, or these lanes would not be there.
-            return unsafe { self.neighbours_avx2(start, columns) };
+            Set::Avx2 => return unsafe { self.neighbours_avx2(start, columns) },
+            Set::Portable => {}
         }
+        let Sorted { body, cell, .. } = self.sorted;
         for place in self.places.clone() {
-            for (first, end) in runs(start, columns, self.sorted.cell[place] as usize, place) {
+            for (first, end) in runs(start, columns, cell[place] as usize, place) {
                 for other in first..end {
                     if self.may_touch(place, other) {
-                        self.emit(place, other);
+                        emit(self.pairs, self.pairing, body[place], body[other]);
                     }
                 }
             }
@@ -110,62 +107,160 @@ impl Search<'_> {
 
     #[inline(always)]
     fn may_touch(&self, a: usize, b: usize) -> bool {
-        let Sorted { x, y, velocity_x, velocity_y, reach, .. } = self.sorted;
-        let length = |x: f32, y: f32| (x * x + y * y).sqrt();
-        let distance = length(x[b] - x[a], y[b] - y[a]);
-        let speed = length(velocity_x[b] - velocity_x[a], velocity_y[b] - velocity_y[a]);
-        distance <= (reach[a] + reach[b] + self.dt * speed) * MORE
+        let Sorted { x, y, radius, .. } = self.sorted;
+        let (x, y, within) = (x[b] - x[a], y[b] - y[a], radius[a] + radius[b]);
+        x * x + y * y <= within * within * MORE
     }
+}
 
+/// Vectors of the processor, for the search.
+#[cfg(target_arch = "x86_64")]
+mod wide {
+    use super::{MORE, PADDING, Pair, Search, runs};
+    use std::arch::x86_64::*;
+
+    /// Room for so many more pairs, and where they go.
     #[inline(always)]
-    fn emit(&mut self, a: usize, b: usize) {
-        emit(self.pairs, self.pairing, self.sorted.body[a], self.sorted.body[b]);
+    fn room(pairs: &mut Vec<Pair>, more: usize) -> *mut Pair {
+        if pairs.capacity() - pairs.len() < more {
+            pairs.reserve(more.max(pairs.len()));
+        }
+        pairs.spare_capacity_mut().as_mut_ptr().cast()
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn neighbours_avx2(mut self, start: &[u32], columns: usize) {
-        use std::arch::x86_64::*;
-        let sorted = self.sorted;
-        // One length for all: each place is checked once, not once per column.
-        let padded = sorted.len + PADDING;
-        let (xs, ys, reaches) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.reach[..padded]);
-        let (velocities_x, velocities_y) = (&sorted.velocity_x[..padded], &sorted.velocity_y[..padded]);
-        let cells = &sorted.cell[..padded];
-        let (dt, more) = (_mm256_set1_ps(self.dt), _mm256_set1_ps(MORE));
-        for place in self.places.clone() {
-            let one = |column: &[f32]| _mm256_set1_ps(column[place]);
-            let (x, y, reach) = (one(xs), one(ys), one(reaches));
-            let (velocity_x, velocity_y) = (one(velocities_x), one(velocities_y));
-            for (first, end) in runs(start, columns, cells[place] as usize, place) {
-                let mut first = first;
-                loop {
-                    let eight = |column: &[f32]| {
-                        let run: &[f32; 8] = column[first..first + 8].try_into().expect("eight");
-                        // SAFETY: the pointer covers eight floats.
-                        unsafe { _mm256_loadu_ps(run.as_ptr()) }
-                    };
-                    let length =
-                        |x: __m256, y: __m256| _mm256_sqrt_ps(_mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y)));
-                    let distance = length(_mm256_sub_ps(eight(xs), x), _mm256_sub_ps(eight(ys), y));
-                    let speed = length(
-                        _mm256_sub_ps(eight(velocities_x), velocity_x),
-                        _mm256_sub_ps(eight(velocities_y), velocity_y),
-                    );
-                    let within = _mm256_add_ps(_mm256_add_ps(reach, eight(reaches)), _mm256_mul_ps(dt, speed));
-                    let near = _mm256_cmp_ps::<_CMP_LE_OQ>(distance, _mm256_mul_ps(within, more));
-                    let hits = _mm256_movemask_ps(near) as u32;
-                    // Lanes behind the end of the run are not meant.
-                    let left = end.saturating_sub(first).min(8) as u32;
-                    let mut hits = hits & ((1 << left) - 1);
-                    while hits != 0 {
-                        self.emit(place, first + hits.trailing_zeros() as usize);
-                        hits &= hits - 1;
+    /// For each set of lanes which of them those are that come first, when they are put together.
+    static TOGETHER: [[u32; 8]; 256] = {
+        let mut together = [[0; 8]; 256];
+        let mut set = 0;
+        while set < 256 {
+            let (mut lane, mut count) = (0, 0);
+            while lane < 8 {
+                if set >> lane & 1 == 1 {
+                    together[set][count] = lane;
+                    count += 1;
+                }
+                lane += 1;
+            }
+            set += 1;
+        }
+        together
+    };
+
+    /// The lowest lanes, as many as are left of eight.
+    #[inline(always)]
+    fn lowest(left: usize) -> u32 {
+        (1 << left.min(8)) - 1
+    }
+
+    impl Search<'_> {
+        #[target_feature(enable = "avx2,popcnt")]
+        pub(super) fn neighbours_avx2(self, start: &[u32], columns: usize) {
+            let Self { sorted, pairing, places, pairs, .. } = self;
+            // One length for all: each place is checked once, not once per column.
+            let padded = sorted.len + PADDING;
+            let (xs, ys, radii) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.radius[..padded]);
+            let (bodies, cells) = (&sorted.body[..padded], &sorted.cell[..padded]);
+            let (more, pairing) = (_mm256_set1_ps(MORE), _mm256_set1_epi32(pairing as i32));
+            for place in places {
+                let (x, y) = (_mm256_set1_ps(xs[place]), _mm256_set1_ps(ys[place]));
+                let (radius, body) = (_mm256_set1_ps(radii[place]), _mm256_set1_epi32(bodies[place] as i32));
+                for (mut first, end) in runs(start, columns, cells[place] as usize, place) {
+                    loop {
+                        let all = first..first + 8;
+                        // SAFETY: each of these slices has eight numbers.
+                        let (other_x, other_y, other_radius, other) = unsafe {
+                            (
+                                _mm256_loadu_ps(xs[all.clone()].as_ptr()),
+                                _mm256_loadu_ps(ys[all.clone()].as_ptr()),
+                                _mm256_loadu_ps(radii[all.clone()].as_ptr()),
+                                _mm256_loadu_si256(bodies[all].as_ptr().cast()),
+                            )
+                        };
+                        let (apart_x, apart_y) = (_mm256_sub_ps(other_x, x), _mm256_sub_ps(other_y, y));
+                        let square = _mm256_add_ps(_mm256_mul_ps(apart_x, apart_x), _mm256_mul_ps(apart_y, apart_y));
+                        let within = _mm256_add_ps(radius, other_radius);
+                        let within = _mm256_mul_ps(_mm256_mul_ps(within, within), more);
+                        let near = _mm256_cmp_ps::<_CMP_LE_OQ>(square, within);
+                        let (low, high) = (_mm256_min_epi32(body, other), _mm256_max_epi32(body, other));
+                        let wanted = _mm256_and_ps(near, _mm256_castsi256_ps(_mm256_cmpgt_epi32(pairing, low)));
+                        // Lanes behind the end of the run are not meant.
+                        let hits = _mm256_movemask_ps(wanted) as u32 & lowest(end.saturating_sub(first));
+                        let to = room(pairs, 8);
+                        // SAFETY: there is room for eight pairs, and as many are there as there were hits.
+                        unsafe {
+                            let together = _mm256_loadu_si256(TOGETHER[hits as usize].as_ptr().cast());
+                            let low = _mm256_permutevar8x32_epi32(low, together);
+                            let high = _mm256_permutevar8x32_epi32(high, together);
+                            let (a, b) = (_mm256_unpacklo_epi32(low, high), _mm256_unpackhi_epi32(low, high));
+                            _mm256_storeu_si256(to.cast(), _mm256_permute2x128_si256::<0x20>(a, b));
+                            _mm256_storeu_si256(to.add(4).cast(), _mm256_permute2x128_si256::<0x31>(a, b));
+                            pairs.set_len(pairs.len() + hits.count_ones() as usize);
+                        }
+                        first += 8;
+                        if first >= end {
+                            break;
+                        }
                     }
-                    first += 8;
-                    if first >= end {
+                }
+            }
+        }
+
+        #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq,popcnt")]
+        pub(super) fn neighbours_avx512(self, start: &[u32], columns: usize) {
+            let Self { sorted, pairing, places, pairs, .. } = self;
+            let padded = sorted.len + PADDING;
+            let (xs, ys, radii) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.radius[..padded]);
+            let (bodies, cells) = (&sorted.body[..padded], &sorted.cell[..padded]);
+            let (more, pairing) = (_mm512_set1_ps(MORE), _mm512_set1_epi32(pairing as i32));
+            // Of two vectors of sixteen, their first eight in turn, and their last eight.
+            let first_half = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+            let last_half = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+            for place in places {
+                let (x, y) = (_mm512_set1_ps(xs[place]), _mm512_set1_ps(ys[place]));
+                let (radius, body) = (_mm512_set1_ps(radii[place]), _mm512_set1_epi32(bodies[place] as i32));
+                let [(mut a, end_a), (mut b, end_b)] = runs(start, columns, cells[place] as usize, place);
+                loop {
+                    let (all_a, all_b) = (a..a + 8, b..b + 8);
+                    let both = |column: &[f32]| {
+                        let (a, b) = (&column[all_a.clone()], &column[all_b.clone()]);
+                        // SAFETY: each of these slices has eight numbers.
+                        unsafe {
+                            let (a, b) = (_mm256_loadu_ps(a.as_ptr()), _mm256_loadu_ps(b.as_ptr()));
+                            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(a), b)
+                        }
+                    };
+                    let (apart_x, apart_y) = (_mm512_sub_ps(both(xs), x), _mm512_sub_ps(both(ys), y));
+                    let square = _mm512_add_ps(_mm512_mul_ps(apart_x, apart_x), _mm512_mul_ps(apart_y, apart_y));
+                    let within = _mm512_add_ps(radius, both(radii));
+                    let near =
+                        _mm512_cmp_ps_mask::<_CMP_LE_OQ>(square, _mm512_mul_ps(_mm512_mul_ps(within, within), more));
+                    // SAFETY: each of these slices has eight numbers.
+                    let other = unsafe {
+                        let a = _mm256_loadu_si256(bodies[all_a.clone()].as_ptr().cast());
+                        let b = _mm256_loadu_si256(bodies[all_b.clone()].as_ptr().cast());
+                        _mm512_inserti32x8::<1>(_mm512_castsi256_si512(a), b)
+                    };
+                    let (low, high) = (_mm512_min_epi32(body, other), _mm512_max_epi32(body, other));
+                    // Lanes behind the ends of the runs are not meant.
+                    let meant = lowest(end_a.saturating_sub(a)) | lowest(end_b.saturating_sub(b)) << 8;
+                    let hits = near & _mm512_cmplt_epi32_mask(low, pairing) & meant as u16;
+                    let to = room(pairs, 16);
+                    // SAFETY: there is room for sixteen pairs, and as many are there as there were hits.
+                    unsafe {
+                        let low = _mm512_maskz_compress_epi32(hits, low);
+                        let high = _mm512_maskz_compress_epi32(hits, high);
+                        _mm512_storeu_si512(to.cast(), _mm512_permutex2var_epi32(low, first_half, high));
+                        if hits.count_ones() > 8 {
+                            _mm512_storeu_si512(to.add(8).cast(), _mm512_permutex2var_epi32(low, last_half, high));
+                        }
+                        pairs.set_len(pairs.len() + hits.count_ones() as usize);
+                    }
+                    (a, b) = (a + 8, b + 8);
+                    if a >= end_a && b >= end_b {
                         break;
                     }
+                    // The shorter run ends before the longer; what is read behind it is not meant.
+                    (a, b) = (a.min(sorted.len), b.min(sorted.len));
                 }
             }
         }

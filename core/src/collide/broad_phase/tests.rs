@@ -22,10 +22,10 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// A tile, stuffed by hand, and its setup.
-pub(super) struct Stuffed {
-    setup: Setup,
-    pub(super) tile: Tile,
-    pub(super) proxies: Proxies,
+pub(in crate::collide) struct Stuffed {
+    pub(in crate::collide) setup: Setup,
+    pub(in crate::collide) tile: Tile,
+    pub(in crate::collide) proxies: Proxies,
 }
 
 impl Stuffed {
@@ -68,7 +68,7 @@ impl Stuffed {
     }
 
     fn is_pair(&self, pair: Pair) -> bool {
-        self.proxies.is_pair(self.offset(pair), pair)
+        self.proxies.is_pair(&self.tile.bodies, pair)
     }
 
     /// Every two bodies of which one is owned, the lower first.
@@ -149,7 +149,7 @@ pub(super) fn any_body() -> impl Strategy<Value = (prop::sample::Index, DVec2, R
     (any::<prop::sample::Index>(), place, any_rotation(), velocity, -47.0_f32..47.0)
 }
 
-fn any_tile(bodies: usize, statics: usize) -> impl Strategy<Value = Stuffed> {
+pub(in crate::collide) fn any_tile(bodies: usize, statics: usize) -> impl Strategy<Value = Stuffed> {
     let kinds = prop::collection::vec(any_kind(0.01, 100.0), 1..8);
     let size = (0.0_f32..2.0, 0.0_f32..2.0).prop_map(|(x, y)| Vec2::new(10.0_f32.powf(x), 10.0_f32.powf(y)));
     let bodies = prop::collection::vec(any_body(), 0..=bodies);

@@ -4,12 +4,13 @@
 //! and sends every body's ghosts on the new owner's behalf. So one exchange suffices, and a receiver needs to know
 //! nothing but the body: whose it is follows from where it is.
 
-use crate::exchange::far;
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::{ContactRecord, GhostRecord, Unseen};
+use crate::exchange::rim::Rim;
 use crate::model::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::model::id::{GlobalId, TileId};
+use crate::parallel::ahead::fetch;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -36,7 +37,8 @@ pub(crate) struct MigrateWork {
 /// An owned body that may concern other tiles.
 #[derive(Debug)]
 struct Border {
-    body: u32,
+    /// Among those of the rim.
+    rim: u32,
     /// The tile that owns it from now on.
     owner: TileId,
     /// Its part of `sends`.
@@ -47,7 +49,8 @@ struct Border {
 /// A ghost to be sent.
 #[derive(Debug)]
 struct Send {
-    body: u32,
+    /// Whose, among the bodies of the rim.
+    rim: u32,
     target: TileId,
     /// Whether it is near enough to the target that its contacts with others that are so are solved there as well.
     near: bool,
@@ -61,7 +64,7 @@ struct Parcel {
     what: What,
 }
 
-/// An index into the tile's bodies, `contacts` or `sends`.
+/// An index into the bodies of the tile's rim, `contacts` or `sends`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum What {
     Migrant(u32),
@@ -78,23 +81,25 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
     tile.counts.ghosts = sends.len() as u64;
     parcels.extend((0..).zip(&*sends).map(|(i, send)| Parcel { to: send.target, what: What::Ghost(i) }));
     parcels.extend((0..).zip(&*contacts).map(|(i, &(to, _))| Parcel { to, what: What::Contact(i) }));
-    for body in border.drain(..) {
-        mark[body.body as usize] = 0;
-        if body.owner != tile.id {
-            departures.push(body.body);
-            tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, body.owner));
-            parcels.push(Parcel { to: body.owner, what: What::Migrant(body.body) });
+    let rim = &tile.rim.bodies;
+    for Border { rim: place, owner, .. } in border.drain(..) {
+        let index = rim[place as usize].index;
+        mark[index as usize] = 0;
+        if owner != tile.id {
+            departures.push(index);
+            tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, owner));
+            parcels.push(Parcel { to: owner, what: What::Migrant(place) });
         }
     }
     parcels.sort_unstable();
     for Parcel { to, what } in parcels.drain(..) {
         bag.address(tile.id, to);
         match what {
-            What::Migrant(body) => bag.migrants.push(tile.bodies.get(body as usize)),
+            What::Migrant(place) => bag.migrants.push(rim[place as usize].body),
             What::Contact(contact) => bag.contacts.push(contacts[contact as usize].1),
             What::Ghost(send) => {
-                let Send { body, unseen, .. } = sends[send as usize];
-                bag.ghosts.push(GhostRecord { body: tile.bodies.get(body as usize), unseen, padding: 0 });
+                let Send { rim: place, unseen, .. } = sends[send as usize];
+                bag.ghosts.push(GhostRecord { body: rim[place as usize].body, unseen, padding: 0 });
             }
         }
     }
@@ -116,29 +121,22 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     if work.mark.len() < tile.owned {
         work.mark.resize(tile.owned, 0);
     }
-    let (bodies, grid) = (&tile.bodies, &setup.grid);
-    let any_far = far::any(&bodies.velocity[..tile.owned], setup);
-    for (i, &position) in bodies.position[..tile.owned].iter().enumerate() {
-        let goes_far = any_far && setup.goes_far(bodies.velocity[i]);
-        if tile.interior.contains(position) && !goes_far {
-            continue;
-        }
-        let half = setup.grown_half_extents(bodies.kind[i], bodies.rotation[i], bodies.velocity[i]);
-        let reach = half.as_dvec2() + glam::DVec2::splat(setup.halo_width);
-        if tile.region.contains(position - reach) & tile.region.contains(position + reach) {
-            continue;
-        }
+    Rim::find(tile, setup);
+    tile.rim.is_known = false;
+    let grid = &setup.grid;
+    for (place, rim) in (0..).zip(&tile.rim.bodies) {
+        let (position, goes_far) = (rim.body.position, setup.goes_far(rim.body.velocity));
         tile.counts.far |= goes_far;
-        let (owner, outline) = (grid.locate(position), Outline::of(tile, i, setup));
+        let (owner, outline) = (grid.locate(position), Outline::of_rim(rim));
         let first_send = work.sends.len() as u32;
-        for target in grid.reached(position, half, setup.halo_width).filter(|&target| target != owner) {
+        for target in grid.reached(position, rim.half, setup.halo_width).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);
-            work.sends.push(Send { body: i as u32, target, near, unseen: Unseen::default() });
+            work.sends.push(Send { rim: place, target, near, unseen: Unseen::default() });
         }
         let end_send = work.sends.len() as u32;
         if owner != tile.id || end_send > first_send {
-            work.border.push(Border { body: i as u32, owner, first_send, end_send });
-            work.mark[i] = work.border.len() as u32;
+            work.border.push(Border { rim: place, owner, first_send, end_send });
+            work.mark[rim.index as usize] = work.border.len() as u32;
         }
     }
 }
@@ -149,6 +147,7 @@ fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.strays.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
+        fetch(&tile.contacts.keys, i + 256);
         let key = tile.contacts.keys[i];
         let SlotKind::Owned(low) = key.low().kind() else {
             // Of others; they tell each other. Here it serves those who solve it with them.

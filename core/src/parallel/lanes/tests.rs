@@ -49,6 +49,7 @@ impl Kernel for Everything<'_> {
         let cells = Cell::from_mut(&mut quads[..]).as_slice_of_cells();
         let columns = V::gather(cells, self.index);
         columns.into_iter().for_each(|column| note("gather", column));
+        V::gather_fixed(self.quads, self.index).into_iter().for_each(|column| note("gather_fixed", column));
         let [p, q, r, s] = V::load_quads(self.quads[..LANES].try_into().unwrap());
         [p, q, r, s].into_iter().for_each(|column| note("load_quads", column));
         V::scatter([q, p, s, r], cells, self.index);
@@ -79,6 +80,7 @@ fn expected(Everything { a, b, quads, index }: Everything<'_>) -> Results {
     ];
     let column = |of: &dyn Fn(usize) -> Quad, column: usize| -> Row { std::array::from_fn(|l| of(l)[column]) };
     results.extend((0..4).map(|c| ("gather", column(&|l| quads[index[l] as usize], c))));
+    results.extend((0..4).map(|c| ("gather_fixed", column(&|l| quads[index[l] as usize], c))));
     results.extend((0..4).map(|c| ("load_quads", column(&|l| quads[l], c))));
     for c in 0..4 {
         results.push(("scatter", column(&|l| quads[l], [1, 0, 3, 2][c])));
@@ -112,7 +114,11 @@ fn every_operation_does_in_each_lane_what_plain_numbers_do() {
     let all = || Everything { a: &a, b: &b, quads: &quads, index: &[7, 0, 3, 9, 1, 8, 2, 5] };
     let right = expected(all());
     compare(all().run::<Portable>(), &right, "portable");
-    compare(LaneSet::of(Instructions::Auto).unwrap().run(all()), &right, "widest");
+    for instructions in [Instructions::Auto, Instructions::Avx2] {
+        if let Some(lanes) = LaneSet::of(instructions) {
+            compare(lanes.run(all()), &right, instructions.name());
+        }
+    }
 }
 
 /// A heap of discs and boxes that bounce, over four tiles.

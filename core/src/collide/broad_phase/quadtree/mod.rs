@@ -91,7 +91,7 @@ impl Quadtree {
 #[inline(always)]
 fn grown(proxies: &Proxies, body: u32, more: f32) -> Aabb {
     let i = body as usize;
-    let room = proxies.slack[i] + more;
-    let (x, y) = (proxies.half_x[i] * ROUNDING + room, proxies.half_y[i] * ROUNDING + room);
+    let room = proxies.slack(i) + more;
+    let [x, y] = proxies.half(i).map(|half| half * ROUNDING + room);
     Aabb { low: [proxies.x[i] - x, proxies.y[i] - y], high: [proxies.x[i] + x, proxies.y[i] + y] }
 }

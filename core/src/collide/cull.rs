@@ -1,0 +1,134 @@
+//! Which of the candidates that the broad phase names are pairs that may touch: eight at a time, as most do not.
+
+use super::broad_phase::Pair;
+use super::proxies::Proxies;
+use crate::model::body::Bodies;
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
+use crate::parallel::vectors::{Vectors, absolute};
+use crate::tiling::blueprint::Setup;
+
+/// Appends those of some candidates that are pairs which the tile solves, and come near each other within the step.
+pub(super) struct Cull<'a> {
+    pub(super) bodies: &'a Bodies,
+    pub(super) proxies: &'a Proxies,
+    pub(super) setup: &'a Setup,
+    pub(super) candidates: &'a [Pair],
+    pub(super) near: &'a mut Vec<Pair>,
+}
+
+impl Kernel for Cull<'_> {
+    type Output = ();
+
+    /// Every one is written down, and counted or not: a branch would be a coin toss.
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Self { bodies, proxies, setup, candidates, near } = self;
+        let mut kept = near.len();
+        near.resize(kept + candidates.len(), [0, 0]);
+        let (eights, rest) = candidates.as_chunks::<LANES>();
+        let mut keep = |pairs: &[Pair], apart: Row| {
+            for (&pair, apart) in pairs.iter().zip(apart) {
+                near[kept] = pair;
+                kept += usize::from(proxies.is_wanted(pair)) & usize::from(apart == 0.0);
+            }
+        };
+        for pairs in eights {
+            keep(pairs, are_apart::<V>(bodies, proxies, setup, pairs));
+        }
+        if let Some(&last) = rest.last() {
+            let mut pairs = [last; LANES];
+            pairs[..rest.len()].copy_from_slice(rest);
+            keep(rest, are_apart::<V>(bodies, proxies, setup, &pairs));
+        }
+        near.truncate(kept);
+    }
+}
+
+/// Zero for pairs that may touch within the step.
+///
+/// They are none unless their grown AABBs overlap, and their bounding circles may touch: if distance < reach + closing speed x dt,
+/// the contact rule with the greatest closing speed there can be. Of two round bodies that is known, of others only that it is no
+/// more than their relative speed. All is multiplied by the distance, which saves a division. Nor do fast ones touch that stay apart by
+/// where their centers are nearest within the step, as most of them do (see `Approach::pass_by`).
+///
+/// This reads the bodies' own bits, so two tiles that both see a pair agree on it.
+#[inline(always)]
+fn are_apart<V: Lanes>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs: &[Pair; LANES]) -> Row {
+    let mut ways: [Quad; LANES] = [[0.0; 4]; LANES];
+    let (mut a, mut b) = (ways, ways);
+    for (lane, pair) in pairs.iter().enumerate() {
+        let [first, second] = pair.map(|body| body as usize);
+        let offset = (bodies.position[second] - bodies.position[first]).as_vec2();
+        let between = bodies.velocity[second] - bodies.velocity[first];
+        ways[lane] = [offset.x, offset.y, between.x, between.y];
+        (a[lane], b[lane]) = (proxies.outline(first), proxies.outline(second));
+    }
+    let [x, y, vx, vy] = V::load_quads(&ways);
+    let (offset, between) = (Vectors::new(x, y), Vectors::new(vx, vy));
+    let [half_x_a, half_y_a, reach_a, bound_a] = V::load_quads(&a);
+    let [half_x_b, half_y_b, reach_b, bound_b] = V::load_quads(&b);
+    let (zero, one, dt) = (V::splat(0.0), V::splat(1.0), V::splat(setup.params.dt));
+    let beside = absolute(offset.x).sub(half_x_a.add(half_x_b));
+    let above = absolute(offset.y).sub(half_y_a.add(half_y_b));
+    let (square, squared_speed) = (offset.dot(offset), between.dot(between));
+    let (distance, speed) = (square.sqrt(), squared_speed.sqrt());
+    // Of two round ones, none.
+    let any_way = bound_a.if_positive(one, bound_b.if_positive(one, zero)).mul(speed.mul(distance));
+    let opening = offset.dot(between);
+    let closing = any_way.max(zero.sub(opening)).max(zero);
+    let within = reach_a.add(reach_b).mul(distance).add(dt.mul(closing));
+    let beyond = square.sub(within.mul(V::splat(1.0001)));
+    // Where speeds overflow nothing is known: then they do not pass.
+    let nearest = zero.sub(opening).div(squared_speed.max(V::splat(f32::MIN_POSITIVE)));
+    let gap = offset.plus(between.scaled(nearest.max(zero).min(dt)));
+    let near = absolute(bound_a).add(absolute(bound_b)).add(V::splat(setup.params.speculative_distance));
+    // Of slow ones their old contact may know better.
+    let is_slow = V::splat(setup.params.speculative_distance).sub(dt.mul(speed));
+    let passing = is_slow.if_positive(zero, gap.dot(gap).sub(near.mul(near)).if_positive(one, zero));
+    let mut apart = [0.0; LANES];
+    beside.if_positive(one, above.if_positive(one, beyond.if_positive(one, passing))).store(&mut apart);
+    apart
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::broad_phase::tests::{Stuffed, any_tile};
+    use crate::model::math::{dot, max, min};
+    use crate::model::params::Instructions;
+    use crate::parallel::lanes::LaneSet;
+    use crate::testing::cases;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(cases(256))]
+
+        /// As told one by one, in words of plain numbers.
+        #[test]
+        fn eight_at_once_are_culled_as_one_by_one(tile in any_tile(40, 3)) {
+            let Stuffed { setup, tile, proxies } = &tile;
+            let bodies = &tile.bodies;
+            let count = bodies.len() as u32;
+            let all: Vec<Pair> = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b])).collect();
+            let passes = |[a, b]: Pair| {
+                let (a, b) = (a as usize, b as usize);
+                let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
+                let between = bodies.velocity[b] - bodies.velocity[a];
+                let nearest = -dot(offset, between) / max(dot(between, between), f32::MIN_POSITIVE);
+                let gap = offset + between * min(max(nearest, 0.0), setup.params.dt);
+                let bound = |body: usize| setup.kind(bodies.kind[body]).bounding_radius;
+                let near = bound(a) + bound(b) + setup.params.speculative_distance;
+                let is_slow = setup.params.dt * dot(between, between).sqrt() < setup.params.speculative_distance;
+                !is_slow && dot(gap, gap) > near * near
+            };
+            let is_near = |&pair: &Pair| proxies.is_wanted(pair) && proxies.is_pair(bodies, pair) && !passes(pair);
+            let expected: Vec<Pair> = all.iter().copied().filter(is_near).collect();
+            for instructions in [Instructions::Auto, Instructions::Portable] {
+                let mut near = vec![[7, 8]];
+                let cull = Cull { bodies, proxies, setup, candidates: &all, near: &mut near };
+                LaneSet::of(instructions).unwrap().run(cull);
+                prop_assert_eq!(&near[1..], &expected);
+            }
+        }
+    }
+}
