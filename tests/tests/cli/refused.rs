@@ -27,12 +27,16 @@ fn file_refused(config: &str, expected: &str) {
 
 #[test]
 fn sizes_must_be_positive() {
-    for (option, key) in
-        [("--bodies", "scene.bodies"), ("--steps", "run.steps"), ("--ranks", "run.ranks"), ("--threads", "run.threads")]
-    {
+    let (number, or_auto) = ("a whole number within ", "\"auto\", or a whole number within 1 to 1024");
+    for (option, key, must) in [
+        ("--bodies", "scene.bodies", number),
+        ("--steps", "run.steps", number),
+        ("--ranks", "run.ranks", number),
+        ("--threads", "run.threads", or_auto),
+    ] {
         for value in ["0", "-3", "2.5", "nan", "inf", "1e30", "many", "2x2"] {
-            refused(&format!("{option} {value}"), &format!("{option} {value}: must be a whole number within "));
-            refused(&format!("--set {key}={value}"), &format!("--set {key}={value}: must be a whole number within "));
+            refused(&format!("{option} {value}"), &format!("{option} {value}: must be {must}"));
+            refused(&format!("--set {key}={value}"), &format!("--set {key}={value}: must be {must}"));
         }
     }
     refused("--bodies 99", "--bodies 99: must be a whole number within 100 to ");
