@@ -54,7 +54,7 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
     let folder = tempdir().unwrap();
     let [quick, pile, normal] = ["quickstart", "pile", "normal"].map(|name| format!("configs/{name}.toml --steps 3"));
     for (limit, what, fits) in [
-        (20_000, &*quick, false),
+        (24_000, &*quick, false),
         (30_000, &pile, false),
         (60_000, &quick, true),
         (60_000, &normal, false),
