@@ -342,24 +342,15 @@ impl World {
 
     /// A stage over the busy tiles, in parallel; their results in order.
     pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
-        self.each(false, |bench, _| stage(bench))
-    }
-
-    /// As [`each_tile`](Self::each_tile), from the last tile to the first.
-    pub(crate) fn each_tile_backwards(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(true, |bench, _| stage(bench));
+        self.each(|bench, _| stage(bench))
     }
 
     /// As [`each_tile`](Self::each_tile), with work that each tile keeps from stage to stage.
     pub(crate) fn each_tile_apart(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(false, |bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
+        self.each(|bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
     }
 
-    fn each<R: Send>(
-        &mut self,
-        backwards: bool,
-        stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync,
-    ) -> Vec<R> {
+    fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
         let apart = apart(self.busy.len());
         let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, .. } = self;
         let team = if apart { Team::ALONE } else { Team::of_pool() };
@@ -381,15 +372,10 @@ impl World {
             rest = (place + 1, tiles, works);
             (place, tile, work)
         });
-        // Which thread takes which is for the pool to decide, and no order is kept.
         if apart {
-            return tiles.collect::<Vec<_>>().into_par_iter().with_max_len(1).map(run).collect();
+            tiles.collect::<Vec<_>>().into_par_iter().with_max_len(1).map(run).collect()
+        } else {
+            tiles.map(run).collect()
         }
-        if !backwards {
-            return tiles.map(run).collect();
-        }
-        let mut results: Vec<R> = tiles.collect::<Vec<_>>().into_iter().rev().map(run).collect();
-        results.reverse();
-        results
     }
 }

@@ -59,35 +59,22 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
 fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, StepError<NotCarried>> {
     let _span = tracing::trace_span!("step", step = world.step).entered();
     world.begin_step();
-    let verdict = send(world, halo)?;
-    let Verdict { stop: stopped, meet, .. } = verdict;
+    let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
     // Whoever asked to meet alone knows of it where another asked to stop.
     let meeting = meet && !stopped;
     world.measures |= stopped;
     world.takes_figures |= stopped;
-    // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
-    let alone = |bench: &mut Bench<'_>| {
-        collide(bench);
-        prepare(bench);
-        solve(bench, 0..bench.setup.params.integrations());
-        finalize(bench);
-    };
     match world.setup.params.exchange {
-        Exchange::Step if !verdict.is_far() => {
-            world.each_tile(|bench| {
-                receive(bench);
-                if !bench.tile.is_idle() {
-                    alone(bench);
-                }
-            });
-            world.dismiss_idle();
-        }
+        // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
-            receive_all(world, halo, verdict)?;
-            world.each_tile(alone);
+            world.each_tile(|bench| {
+                collide(bench);
+                prepare(bench);
+                solve(bench, 0..bench.setup.params.integrations());
+                finalize(bench);
+            });
         }
         Exchange::Substep => {
-            receive_all(world, halo, verdict)?;
             world.each_tile_apart(|bench| {
                 collide(bench);
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
@@ -141,8 +128,7 @@ pub fn finish<H: Halo>(world: World, halo: &mut H) -> Result<Vec<TileFacts>, Ste
 
 fn close(mut world: World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepError<NotCarried>> {
     world.begin_step();
-    let verdict = send(&mut world, halo)?;
-    receive_all(&mut world, halo, verdict)?;
+    migrate(&mut world, halo)?;
     Ok(world.each_tile(|bench| {
         // Manifolds as they are, not as they were kept.
         bench.tile.contacts.clear();
@@ -152,11 +138,10 @@ fn close(mut world: World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepE
     }))
 }
 
-/// The first half of the first sync point: migrants, then ghosts. What all ranks together have to say comes back.
-fn send(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
+/// The first sync point: migrants, then ghosts; and another where bodies go far. What all ranks together have to say comes back.
+fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
     if !world.has_failed() {
-        // The tiles that the step before came to last are in the cache.
-        world.each_tile_backwards(|bench| {
+        world.each_tile(|bench| {
             bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
         });
         world.tell_of_far_bodies();
@@ -166,23 +151,17 @@ fn send(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<No
         return Err(StepError::NonFinite { step, id });
     }
     world.welcome_heirs();
-    Ok(verdict)
-}
-
-/// The other half; and another exchange where bodies go far.
-fn receive_all(world: &mut World, halo: &mut Carry<'_>, verdict: Verdict) -> Result<(), StepError<NotCarried>> {
-    world.each_tile(receive);
+    world.each_tile(|bench| {
+        let receive = |b: &mut Bench<'_>| migrate::receive(b.tile, b.mail, b.migrate, b.setup, b.step);
+        bench.stage(Phase::Migrate, receive);
+    });
     if verdict.is_far() {
         world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::send(b.tile, b.outgoing, b.setup)));
         world.exchange(halo)?;
         world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::receive(b.tile, b.mail, b.setup)));
     }
     world.dismiss_idle();
-    Ok(())
-}
-
-fn receive(bench: &mut Bench<'_>) {
-    bench.stage(Phase::Migrate, |b| migrate::receive(b.tile, b.mail, b.migrate, b.setup, b.step));
+    Ok(verdict)
 }
 
 /// Broad phase, narrow phase.
