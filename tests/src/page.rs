@@ -154,5 +154,14 @@ impl Page {
             }
             round += 1;
         }
+        // Whatever was wished last, time goes on as fast as it can; and that was heard, if something else is shown after it.
+        self.wish(&json!({ "do": "speed", "times": 0 }));
+        self.wish(&json!({ "do": "play" }));
+        for size in [[160, 120], [176, 120]] {
+            self.look(domain, size, "kind");
+            if self.frame().is_none() {
+                return;
+            }
+        }
     }
 }
