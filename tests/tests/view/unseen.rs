@@ -96,6 +96,7 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let summary = program::summary(&out.join("summary.json"));
     // The step under way when it was asked to stop.
     assert!((step + 3..=step + 5).contains(&(summary["steps"].as_u64().unwrap() as u32)), "{step} {summary:#}");
-    let resumed = program::run(program::command().args(["run", "--steps", "60", "--resume"]).arg(&out));
+    let more = (summary["steps"].as_u64().unwrap() + 60).to_string();
+    let resumed = program::run(program::command().args(["run", "--steps", &more, "--resume"]).arg(&out));
     assert_eq!(resumed.code, Some(0), "{resumed}");
 }
