@@ -78,16 +78,25 @@ fn are_apart<V: Lanes>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs:
     let closing = any_way.max(zero.sub(opening)).max(zero);
     let within = reach_a.add(reach_b).mul(distance).add(dt.mul(closing));
     let beyond = square.sub(within.mul(V::splat(1.0001)));
-    // Where speeds overflow nothing is known: then they do not pass.
-    let nearest = zero.sub(opening).div(squared_speed.max(V::splat(f32::MIN_POSITIVE)));
-    let gap = offset.plus(between.scaled(nearest.max(zero).min(dt)));
-    let near = absolute(bound_a).add(absolute(bound_b)).add(V::splat(setup.params.speculative_distance));
     // Of slow ones their old contact may know better.
     let is_slow = V::splat(setup.params.speculative_distance).sub(dt.mul(speed));
-    let passing = is_slow.if_positive(zero, gap.dot(gap).sub(near.mul(near)).if_positive(one, zero));
+    let bounds = absolute(bound_a).add(absolute(bound_b));
+    let passing = is_slow.if_positive(zero, passes(offset, between, bounds, setup));
     let mut apart = [0.0; LANES];
     beside.if_positive(one, above.if_positive(one, beyond.if_positive(one, passing))).store(&mut apart);
     apart
+}
+
+/// One for pairs that stay apart by where their centers are nearest within the step, given the sum of their bounding radii. Where
+/// speeds overflow nothing is known: then they do not pass.
+#[inline(always)]
+pub(super) fn passes<V: Lanes>(offset: Vectors<V>, between: Vectors<V>, bounds: V, setup: &Setup) -> V {
+    let zero = V::splat(0.0);
+    let squared_speed = between.dot(between).max(V::splat(f32::MIN_POSITIVE));
+    let nearest = zero.sub(offset.dot(between)).div(squared_speed);
+    let gap = offset.plus(between.scaled(nearest.max(zero).min(V::splat(setup.params.dt))));
+    let near = bounds.add(V::splat(setup.params.speculative_distance));
+    gap.dot(gap).sub(near.mul(near)).if_positive(V::splat(1.0), zero)
 }
 
 #[cfg(test)]
@@ -106,13 +115,12 @@ mod tests {
         /// As told one by one, in words of plain numbers.
         #[test]
         fn eight_at_once_are_culled_as_one_by_one(tile in any_tile(40, 3)) {
-            let Stuffed { setup, tile, proxies } = &tile;
-            let bodies = &tile.bodies;
+            let Stuffed { setup, tile: held, proxies } = &tile;
+            let bodies = &held.bodies;
             let count = bodies.len() as u32;
             let all: Vec<Pair> = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b])).collect();
             let passes = |[a, b]: Pair| {
-                let (a, b) = (a as usize, b as usize);
-                let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
+                let (offset, a, b) = (tile.offset([a, b]), a as usize, b as usize);
                 let between = bodies.velocity[b] - bodies.velocity[a];
                 let nearest = -dot(offset, between) / max(dot(between, between), f32::MIN_POSITIVE);
                 let gap = offset + between * min(max(nearest, 0.0), setup.params.dt);
@@ -121,7 +129,7 @@ mod tests {
                 let is_slow = setup.params.dt * dot(between, between).sqrt() < setup.params.speculative_distance;
                 !is_slow && dot(gap, gap) > near * near
             };
-            let is_near = |&pair: &Pair| proxies.is_wanted(pair) && proxies.is_pair(bodies, pair) && !passes(pair);
+            let is_near = |&pair: &Pair| proxies.is_wanted(pair) && tile.is_pair(pair) && !passes(pair);
             let expected: Vec<Pair> = all.iter().copied().filter(is_near).collect();
             for instructions in [Instructions::Auto, Instructions::Portable] {
                 let mut near = vec![[7, 8]];

@@ -4,7 +4,7 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::eight_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
-use crate::model::math::Rot;
+use crate::model::math::{Rot, side_by_side};
 use crate::parallel::lanes::{LANES, Lanes, Quad, Row};
 use crate::parallel::vectors::{Vectors, absolute, any};
 use crate::tiling::blueprint::Setup;
@@ -51,7 +51,7 @@ impl EightPairs {
     #[inline(always)]
     pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, is_known: bool, setup: &Setup) {
         let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
-        let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
+        let moves = |i: usize| side_by_side(bodies.velocity[i], bodies.rotation[i]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
         self.a[lane] = moves(a);
         self.b[lane] = moves(b);

@@ -3,6 +3,7 @@
 //!
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
+use super::cull::passes;
 use super::eight_pairs::{Eight, TOUCHING};
 use super::touch::{DEEP, NEAR, ROUNDS};
 use crate::parallel::lanes::Lanes;
@@ -203,7 +204,7 @@ impl<V: Lanes> Eight<V> {
         let touching = less(nearest, V::splat(TOUCHING)).mul(is_slow);
         let is_now = less(nearest, V::splat(NEAR)).max(touching);
         // Who passes by, who may touch later, and who is near anyway.
-        let passes = self.passes(setup);
+        let passes = passes(self.offset, self.between, self.bound[0].add(self.bound[1]), setup);
         let later = is_now.max(passes).if_positive(zero, one);
         let mut at = now;
         let mut meets = is_now.max(less(nearest, speculative));
@@ -233,17 +234,6 @@ impl<V: Lanes> Eight<V> {
             separation: at.separation,
             now: at.time.if_positive(before, at.separation),
         }
-    }
-
-    /// Who stays apart by where their centers are nearest within the step.
-    #[inline(always)]
-    fn passes(&self, setup: &Setup) -> V {
-        let zero = V::splat(0.0);
-        let squared_speed = self.between.dot(self.between).max(V::splat(f32::MIN_POSITIVE));
-        let nearest = zero.sub(self.offset.dot(self.between)).div(squared_speed);
-        let gap = self.offset.plus(self.between.scaled(nearest.max(zero).min(self.dt)));
-        let near = self.bound[0].add(self.bound[1]).add(V::splat(setup.params.speculative_distance));
-        less(near.mul(near), gap.dot(gap))
     }
 
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step.

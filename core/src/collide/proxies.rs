@@ -44,9 +44,6 @@ pub(crate) struct Proxies {
     pub(crate) dynamic: usize,
     /// Width and height of the tile, in meters.
     pub(crate) size: [f32; 2],
-    /// Length of a step, in seconds.
-    #[cfg(test)]
-    dt: f32,
     pub(crate) lanes: LaneSet,
 }
 
@@ -89,10 +86,6 @@ impl Proxies {
         self.weight.resize(total, 1);
         self.size = setup.grid.tile_size().as_vec2().to_array();
         self.lanes = setup.lanes;
-        #[cfg(test)]
-        {
-            self.dt = setup.params.dt;
-        }
     }
 
     /// Lets ghosts of the tile whose proxies these are be paired with each other, and with statics, where they are near.
@@ -141,25 +134,6 @@ impl Proxies {
     #[inline(always)]
     pub(super) fn outline(&self, body: usize) -> Quad {
         self.outline[body]
-    }
-
-    /// The definition of a pair, in plain numbers: that of [`Cull`](super::cull), but for who passes by. `bodies` are those that the
-    /// proxies were loaded from.
-    #[cfg(test)]
-    pub(crate) fn is_pair(&self, bodies: &Bodies, [a, b]: Pair) -> bool {
-        use crate::model::math::dot;
-        let (a, b) = (a as usize, b as usize);
-        let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
-        let between = bodies.velocity[b] - bodies.velocity[a];
-        let [half_x_a, half_y_a, reach_a, bound_a] = self.outline[a];
-        let [half_x_b, half_y_b, reach_b, bound_b] = self.outline[b];
-        let overlap = offset.x.abs() <= half_x_a + half_x_b && offset.y.abs() <= half_y_a + half_y_b;
-        let square = dot(offset, offset);
-        let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
-        let any = if bound_a > 0.0 || bound_b > 0.0 { speed * distance } else { 0.0 };
-        let closing = math::max(math::max(any, -dot(between, offset)), 0.0);
-        let within = (reach_a + reach_b) * distance + self.dt * closing;
-        overlap && square <= within * 1.0001
     }
 }
 
@@ -239,7 +213,7 @@ impl Load<'_> {
         for lane in 0..count {
             let local = (position[lane] - self.corner).as_vec2();
             (local_x[lane], local_y[lane]) = (local.x, local.y);
-            moves[lane] = bytemuck::cast([velocity[lane].to_array(), bytemuck::cast(rotation[lane])]);
+            moves[lane] = math::side_by_side(velocity[lane], rotation[lane]);
             kinds[lane] = self.setup.kind(kind[lane]).outline();
             spin[lane] = angular_velocity[lane];
             grows[lane] = if first + lane < self.dynamic { 1.0 } else { 0.0 };

@@ -214,11 +214,9 @@ impl ContactCache {
     }
 
     #[inline(always)]
-    pub(crate) fn push(&mut self, key: PairKey, contact: Contact) -> &mut Contact {
-        let place = self.contacts.len();
+    pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {
         self.keys.push(key);
         self.contacts.push(contact);
-        &mut self.contacts[place]
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = (PairKey, &Contact)> {

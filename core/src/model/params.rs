@@ -76,7 +76,7 @@ pub enum Instructions {
 
 impl Instructions {
     /// As configurations have it.
-    pub(crate) fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::Portable => "portable",

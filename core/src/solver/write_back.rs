@@ -6,7 +6,7 @@ use super::motion::Motion;
 use crate::exchange::rim::{Rim, RimBody};
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId};
-use crate::model::math::Rot;
+use crate::model::math::{Rot, apart, side_by_side};
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
 use crate::parallel::team::Team;
 use crate::parallel::vectors::Vectors;
@@ -95,7 +95,7 @@ impl<'a> Owned<'a> {
         let (velocity, spin) = (&self.velocity[first..][..count], &self.angular_velocity[first..][..count]);
         for lane in 0..count {
             eight.position[lane] = position[lane];
-            eight.moves[lane] = bytemuck::cast([velocity[lane].to_array(), bytemuck::cast(rotation[lane])]);
+            eight.moves[lane] = side_by_side(velocity[lane], rotation[lane]);
             eight.spin[lane] = spin[lane];
         }
         eight
@@ -110,9 +110,8 @@ impl<'a> Owned<'a> {
             if !self.asleep.is_empty() && self.asleep[first + lane] {
                 continue;
             }
-            let [moves, turn]: [[f32; 2]; 2] = bytemuck::cast(eight.moves[lane]);
             position[lane] = eight.position[lane];
-            (velocity[lane], rotation[lane]) = (moves.into(), bytemuck::cast(turn));
+            (velocity[lane], rotation[lane]) = apart(eight.moves[lane]);
             spin[lane] = eight.spin[lane];
         }
     }
@@ -283,12 +282,12 @@ impl WriteBack<'_> {
         outside &= (1 << count) - 1;
         while outside != 0 {
             let lane = outside.trailing_zeros() as usize;
-            let (i, [moves, turn]): (usize, [[f32; 2]; 2]) = (first + lane, bytemuck::cast(eight.moves[lane]));
+            let (i, (velocity, rotation)) = (first + lane, apart(eight.moves[lane]));
             let body = Body {
                 id: self.owned.id[i],
                 position: eight.position[lane],
-                rotation: bytemuck::cast(turn),
-                velocity: moves.into(),
+                rotation,
+                velocity,
                 angular_velocity: eight.spin[lane],
                 kind: self.owned.kind[i],
             };

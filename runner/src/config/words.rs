@@ -20,10 +20,10 @@ pub(super) const MPI_EXCHANGE: Words<MpiExchange> =
 
 /// `run.instructions`
 pub(super) const INSTRUCTIONS: Words<Instructions> = &[
-    ("auto", Instructions::Auto),
-    ("portable", Instructions::Portable),
-    ("avx2", Instructions::Avx2),
-    ("avx512", Instructions::Avx512),
+    (Instructions::Auto.name(), Instructions::Auto),
+    (Instructions::Portable.name(), Instructions::Portable),
+    (Instructions::Avx2.name(), Instructions::Avx2),
+    (Instructions::Avx512.name(), Instructions::Avx512),
 ];
 
 /// `physics.broad_phase`

@@ -53,7 +53,7 @@ impl Layout for Smash {
 
     fn domain(&self) -> (DVec2, DVec2) {
         let (size, around) = (self.size(), ROOM * self.size().max_element().max(LARGE));
-        let (low, high) = (START.x.min(AWAY - around), AWAY + size.x + around);
+        let (low, high) = ((START.x - SIDE).min(AWAY - around), AWAY + size.x + around);
         (DVec2::new(low - LARGE, -around), DVec2::new(high, around))
     }
 
@@ -97,7 +97,7 @@ mod tests {
             let (low, high) = smash.domain();
             for index in 0..bodies {
                 let place = smash.body(index, GlobalId(index), 1).position;
-                assert!((place - LARGE).cmpge(low).all() && (place + LARGE).cmple(high).all(), "{bodies}: {place}");
+                assert!((place - LARGE).cmpgt(low).all() && (place + LARGE).cmplt(high).all(), "{bodies}: {place}");
             }
         }
     }

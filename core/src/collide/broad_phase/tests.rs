@@ -7,7 +7,7 @@ use crate::collide::proxies::Proxies;
 use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
-use crate::model::math::Rot;
+use crate::model::math::{Rot, dot, max};
 use crate::model::params::{Instructions, Params};
 use crate::model::shape::{Kind, Shape};
 use crate::parallel::lanes::LaneSet;
@@ -63,12 +63,24 @@ impl Stuffed {
         Self { setup, tile, proxies }
     }
 
-    fn offset(&self, [a, b]: Pair) -> Vec2 {
+    pub(in crate::collide) fn offset(&self, [a, b]: Pair) -> Vec2 {
         (self.tile.bodies.position[b as usize] - self.tile.bodies.position[a as usize]).as_vec2()
     }
 
-    fn is_pair(&self, pair: Pair) -> bool {
-        self.proxies.is_pair(&self.tile.bodies, pair)
+    /// The definition of a pair, in plain numbers: that of `cull.rs`, but for who passes by.
+    pub(in crate::collide) fn is_pair(&self, [a, b]: Pair) -> bool {
+        let (bodies, offset) = (&self.tile.bodies, self.offset([a, b]));
+        let (a, b) = (a as usize, b as usize);
+        let between = bodies.velocity[b] - bodies.velocity[a];
+        let [half_x_a, half_y_a, reach_a, bound_a] = self.proxies.outline(a);
+        let [half_x_b, half_y_b, reach_b, bound_b] = self.proxies.outline(b);
+        let overlap = offset.x.abs() <= half_x_a + half_x_b && offset.y.abs() <= half_y_a + half_y_b;
+        let square = dot(offset, offset);
+        let (distance, speed) = (square.sqrt(), dot(between, between).sqrt());
+        let any_way = if bound_a > 0.0 || bound_b > 0.0 { speed * distance } else { 0.0 };
+        let closing = max(max(any_way, -dot(between, offset)), 0.0);
+        let within = (reach_a + reach_b) * distance + self.setup.params.dt * closing;
+        overlap && square <= within * 1.0001
     }
 
     /// Every two bodies of which one is owned, the lower first.

@@ -10,7 +10,6 @@ use crate::exchange::record::{ContactRecord, GhostRecord, Unseen};
 use crate::exchange::rim::Rim;
 use crate::model::contact::{Authority, PairKey, Slot, SlotKind, Stray};
 use crate::model::id::{GlobalId, TileId};
-use crate::parallel::ahead::fetch;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -147,7 +146,6 @@ fn sort_contacts_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.strays.clear();
     let mut kept = 0;
     for i in 0..tile.contacts.len() {
-        fetch(&tile.contacts.keys, i + 256);
         let key = tile.contacts.keys[i];
         let SlotKind::Owned(low) = key.low().kind() else {
             // Of others; they tell each other. Here it serves those who solve it with them.
