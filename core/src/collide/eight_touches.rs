@@ -7,7 +7,7 @@ use super::cull::passes;
 use super::eight_pairs::{Eight, TOUCHING};
 use super::touch::{DEEP, NEAR, ROUNDS};
 use crate::parallel::lanes::Lanes;
-use crate::parallel::vectors::{Vectors, any};
+use crate::parallel::vectors::{Vectors, any, less};
 use crate::tiling::blueprint::Setup;
 
 /// Manifolds of one point, and the moments in which they are those.
@@ -40,12 +40,6 @@ pub(super) struct Touches<V> {
     /// Of the contact, and as it is now.
     pub(super) separation: V,
     pub(super) now: V,
-}
-
-/// One where `a < b`, else zero.
-#[inline(always)]
-fn less<V: Lanes>(a: V, b: V) -> V {
-    b.sub(a).if_positive(V::splat(1.0), V::splat(0.0))
 }
 
 /// `yes` where a number is positive, else `no`, for the bodies A and B.
@@ -127,13 +121,20 @@ impl<V: Lanes> Eight<V> {
     /// What will be after some seconds if nothing else happens.
     #[inline(always)]
     fn at(&self, time: V) -> Moments<V> {
+        let (offset, turning) = self.moved(time);
+        self.manifolds(time, offset, turning)
+    }
+
+    /// From the center of A to that of B, and how both will have turned, after some seconds.
+    #[inline(always)]
+    pub(super) fn moved(&self, time: V) -> (Vectors<V>, [Vectors<V>; 2]) {
         let identity = Vectors::new(V::splat(1.0), V::splat(0.0));
         let offset = Vectors::pick(time, self.offset.plus(self.between.scaled(time)), self.offset);
         let turning = [
             Vectors::pick(time, self.turned_after(0, time), identity),
             Vectors::pick(time, self.turned_after(1, time), identity),
         ];
-        self.manifolds(time, offset, turning)
+        (offset, turning)
     }
 
     #[inline(always)]
@@ -174,20 +175,20 @@ impl<V: Lanes> Eight<V> {
         }
     }
 
-    /// Speed at which the surfaces come nearer at the points.
+    /// Speed at which the surfaces come nearer at some points.
     #[inline(always)]
-    fn closing(&self, at: &Moments<V>) -> V {
+    pub(super) fn closing(&self, anchor: Vectors<V>, offset: Vectors<V>, normal: Vectors<V>) -> V {
         let zero = V::splat(0.0);
         let turn = [self.spin[0], self.spin[1]];
-        let (arm_a, arm_b) = (at.anchor, at.anchor.minus(at.offset));
+        let (arm_a, arm_b) = (anchor, anchor.minus(offset));
         let velocity_a = Vectors::new(zero.sub(turn[0]).mul(arm_a.y), turn[0].mul(arm_a.x));
         let velocity_b = Vectors::new(zero.sub(turn[1]).mul(arm_b.y), turn[1].mul(arm_b.x));
-        zero.sub(self.between.plus(velocity_b).minus(velocity_a).dot(at.normal))
+        zero.sub(self.between.plus(velocity_b).minus(velocity_a).dot(normal))
     }
 
     /// How far a body's surface, at a point, comes along a normal as it turns so.
     #[inline(always)]
-    fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
+    pub(super) fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
         let way = turning.x.sub(V::splat(1.0)).mul(arm.dot(normal)).add(turning.y.mul(arm.cross(normal)));
         self.not_round(side).mul(way)
     }
@@ -215,7 +216,7 @@ impl<V: Lanes> Eight<V> {
             // One that was looked for in vain was looked for all the same.
             at.distance = at.distance.min(then.distance);
         }
-        let closing = self.closing(&at).max(zero);
+        let closing = self.closing(at.anchor, at.offset, at.normal).max(zero);
         let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
         let holds = less(at.separation, speculative.add(ahead));
         let moved = self.between.dot(at.normal).mul(at.time);
@@ -266,7 +267,7 @@ impl<V: Lanes> Eight<V> {
                     break;
                 }
                 // Half as if the fastest corner led, half as if the nearest point did.
-                let speed = V::splat(0.5).mul(bound.add(self.closing(&at).max(zero)));
+                let speed = V::splat(0.5).mul(bound.add(self.closing(at.anchor, at.offset, at.normal).max(zero)));
                 let next = self.at(at.time.add(at.separation.div(speed).min(left)));
                 at = Moments::pick(going, &next, &at);
                 let deep = less(at.separation, V::splat(DEEP)).mul(going);
@@ -276,7 +277,7 @@ impl<V: Lanes> Eight<V> {
                 going = near.max(deep).if_positive(zero, going);
             }
             ending = ending.max(going);
-            let closing = self.closing(&at);
+            let closing = self.closing(at.anchor, at.offset, at.normal);
             let closes = less(zero, closing).mul(ending);
             let time = at.time.add(at.separation.div(closing));
             let in_time = less(dt, time).if_positive(zero, closes);

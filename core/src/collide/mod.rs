@@ -2,6 +2,7 @@
 
 pub(crate) mod broad_phase;
 mod cull;
+mod eight_boxes;
 mod eight_pairs;
 mod eight_touches;
 pub(crate) mod manifold;

@@ -2,6 +2,7 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
+use crate::collide::eight_boxes::BoxOutlook;
 use crate::collide::eight_pairs::{EightPairs, Outlook};
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
@@ -144,8 +145,46 @@ struct Named<'a> {
     known: Option<&'a Contact>,
 }
 
-/// So many pairs are sorted into those with a round body and others at a time.
-const BLOCK: usize = 128;
+/// So many pairs are sorted by kinds at a time.
+const BLOCK: usize = 256;
+
+/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes; and of each those that had no contact in the last step
+/// before, and those that had one after: as most of these touch already, and most of those do not.
+struct Lists {
+    /// Places in the block.
+    places: [[u8; BLOCK]; LISTS],
+    count: [usize; LISTS],
+}
+
+const LISTS: usize = 6;
+
+/// Of boxes.
+const NEW_BOXES: usize = 4;
+const KNOWN_BOXES: usize = 5;
+
+impl Lists {
+    #[inline(always)]
+    fn new(pairs: &[Pair], named: &[Named<'_>; BLOCK], tile: &Tile, setup: &Setup) -> Self {
+        let mut lists = Self { places: [[0; BLOCK]; LISTS], count: [0; LISTS] };
+        for (place, (&pair, named)) in pairs.iter().zip(named).enumerate() {
+            let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).not_round);
+            let list = 2 * (a + b) as usize + usize::from(named.known.is_some());
+            lists.push(list, place as u8);
+        }
+        lists
+    }
+
+    #[inline(always)]
+    fn push(&mut self, list: usize, place: u8) {
+        self.places[list][self.count[list]] = place;
+        self.count[list] += 1;
+    }
+
+    #[inline(always)]
+    fn get(&self, list: usize) -> &[u8] {
+        &self.places[list][..self.count[list]]
+    }
+}
 
 /// Some pairs, and what was found of each: its contact and the separation of the points, if `makes_contact`.
 struct Block<'a> {
@@ -165,19 +204,13 @@ impl Kernel for FindAmong<'_> {
         let nothing = (Contact::zeroed(), [0.0; 2]);
         let mut block = Block { named: [nobody; BLOCK], found: [nothing; BLOCK], makes_contact: [false; BLOCK] };
         for pairs in sorted.chunks(BLOCK) {
-            // Each is written down in both lists and counted in one: kinds come in no order, and a branch would be a coin toss.
-            let (mut round, mut others) = ([0_u8; BLOCK], [0_u8; BLOCK]);
-            let (mut rounds, mut other) = (0, 0);
             names.name(pairs, &mut block.named);
-            for (i, &pair) in pairs.iter().enumerate() {
-                (round[rounds], others[other]) = (i as u8, i as u8);
-                let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).not_round);
-                let any_round = a * b == 0.0;
-                rounds += usize::from(any_round);
-                other += usize::from(!any_round);
+            let mut lists = Lists::new(pairs, &block.named, tile, setup);
+            for list in 0..NEW_BOXES {
+                block.find_round::<V>(lists.get(list), tile, setup);
             }
-            block.find_round::<V>(&round[..rounds], tile, setup);
-            block.find_others(&others[..other], tile, setup);
+            block.keep_known(&mut lists, tile, setup);
+            block.find_boxes::<V>(lists.get(NEW_BOXES), tile, setup);
             for i in 0..pairs.len() {
                 if block.makes_contact[i] {
                     let (Named { key, bodies, .. }, (contact, separation)) = (block.named[i], block.found[i]);
@@ -196,11 +229,7 @@ impl Block<'_> {
     fn find_round<V: Lanes>(&mut self, round: &[u8], tile: &Tile, setup: &Setup) {
         let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
         for places in round.chunks(LANES) {
-            for lane in 0..LANES {
-                let place = *places.get(lane).unwrap_or(&places[0]);
-                let Named { bodies, known, .. } = self.named[usize::from(place)];
-                eight.set(lane, tile, bodies, known.is_some(), setup);
-            }
+            self.load(&mut eight, places, tile, setup);
             eight.look::<V>(setup, &mut outlook);
             for (lane, &place) in places.iter().enumerate() {
                 let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
@@ -214,19 +243,48 @@ impl Block<'_> {
         }
     }
 
-    /// Finds the contacts of other pairs: that of before, if its manifold still serves.
+    /// Keeps the contacts of boxes whose manifold of before still serves, and leaves the others to be found anew.
     #[inline(always)]
-    fn find_others(&mut self, others: &[u8], tile: &Tile, setup: &Setup) {
-        for &place in others {
-            let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
+    fn keep_known(&mut self, lists: &mut Lists, tile: &Tile, setup: &Setup) {
+        for i in 0..lists.count[KNOWN_BOXES] {
+            let place = lists.places[KNOWN_BOXES][i];
+            let Named { bodies, known, .. } = self.named[usize::from(place)];
             if let Some(known) = known
                 && is_slow(tile, bodies, setup)
                 && let Some(separation) = recycle(tile, bodies, known, setup)
             {
-                self.keep(place, Some((*known, separation)));
+                self.keep(usize::from(place), Some((*known, separation)));
             } else {
-                self.keep(place, touch(tile, bodies, known, setup));
+                lists.push(NEW_BOXES, place);
             }
+        }
+    }
+
+    /// Finds the contacts of pairs of boxes.
+    #[inline(always)]
+    fn find_boxes<V: Lanes>(&mut self, boxes: &[u8], tile: &Tile, setup: &Setup) {
+        let (mut eight, mut outlook) = (EightPairs::default(), BoxOutlook::default());
+        for places in boxes.chunks(LANES) {
+            self.load(&mut eight, places, tile, setup);
+            eight.look_at_boxes::<V>(setup, &mut outlook);
+            for (lane, &place) in places.iter().enumerate() {
+                let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
+                if outlook.is_unsure(lane) {
+                    self.keep(place, touch(tile, bodies, known, setup));
+                } else {
+                    self.keep(place, outlook.meets(lane).then(|| outlook.contact(lane, known)));
+                }
+            }
+        }
+    }
+
+    /// Loads up to eight pairs; in lanes that are left over, the first of them again.
+    #[inline(always)]
+    fn load(&self, eight: &mut EightPairs, places: &[u8], tile: &Tile, setup: &Setup) {
+        for lane in 0..LANES {
+            let place = *places.get(lane).unwrap_or(&places[0]);
+            let Named { bodies, known, .. } = self.named[usize::from(place)];
+            eight.set(lane, tile, bodies, known.is_some(), setup);
         }
     }
 

@@ -46,6 +46,18 @@ impl<V: Lanes> Vectors<V> {
         Self { x: self.x.mul(v.x).sub(self.y.mul(v.y)), y: self.y.mul(v.x).add(self.x.mul(v.y)) }
     }
 
+    /// `v`, as it is seen from a frame turned so.
+    #[inline(always)]
+    pub(crate) fn unrotate(self, v: Self) -> Self {
+        Self { x: self.x.mul(v.x).add(self.y.mul(v.y)), y: self.x.mul(v.y).sub(self.y.mul(v.x)) }
+    }
+
+    /// The rotation that leads from this one to the other.
+    #[inline(always)]
+    pub(crate) fn to(self, other: Self) -> Self {
+        self.unrotate(other)
+    }
+
     /// The rotation that undoes this one.
     #[inline(always)]
     pub(crate) fn back(self) -> Self {
@@ -70,6 +82,12 @@ impl<V: Lanes> Vectors<V> {
 #[inline(always)]
 pub(crate) fn absolute<V: Lanes>(x: V) -> V {
     x.max(V::splat(0.0).sub(x))
+}
+
+/// One where `a < b`, else zero.
+#[inline(always)]
+pub(crate) fn less<V: Lanes>(a: V, b: V) -> V {
+    b.sub(a).if_positive(V::splat(1.0), V::splat(0.0))
 }
 
 /// Whether a number is positive in some lane.

@@ -3,7 +3,7 @@
 //! All of them see body A at the origin and body B at `offset`, in world directions. A new shape needs a line in [`collide`] for
 //! every pair it forms.
 
-mod box_box;
+pub(super) mod box_box;
 mod round;
 #[cfg(test)]
 mod tests;
