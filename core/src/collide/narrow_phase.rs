@@ -186,11 +186,22 @@ impl Lists {
     }
 }
 
-/// Some pairs, and what was found of each: its contact and the separation of the points, if `makes_contact`.
+/// Some pairs, and what comes of each: a contact, and the separation of its points now.
 struct Block<'a> {
     named: [Named<'a>; BLOCK],
-    found: [(Contact, [f32; 2]); BLOCK],
-    makes_contact: [bool; BLOCK],
+    outcome: [Outcome; BLOCK],
+    /// The contacts of those that are found anew.
+    found: [Contact; BLOCK],
+    separation: [[f32; 2]; BLOCK],
+}
+
+/// What comes of a pair.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Nothing,
+    /// The contact that is known, as it is.
+    Known,
+    Found,
 }
 
 impl Kernel for FindAmong<'_> {
@@ -201,8 +212,12 @@ impl Kernel for FindAmong<'_> {
         let Self { sorted, tile, setup, contacts } = self;
         let mut names = Names::new(tile, sorted);
         let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None };
-        let nothing = (Contact::zeroed(), [0.0; 2]);
-        let mut block = Block { named: [nobody; BLOCK], found: [nothing; BLOCK], makes_contact: [false; BLOCK] };
+        let mut block = Block {
+            named: [nobody; BLOCK],
+            outcome: [Outcome::Nothing; BLOCK],
+            found: [Contact::zeroed(); BLOCK],
+            separation: [[0.0; 2]; BLOCK],
+        };
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
@@ -212,12 +227,15 @@ impl Kernel for FindAmong<'_> {
             block.keep_known(&mut lists, tile, setup);
             block.find_boxes::<V>(lists.get(NEW_BOXES), tile, setup);
             for i in 0..pairs.len() {
-                if block.makes_contact[i] {
-                    let (Named { key, bodies, .. }, (contact, separation)) = (block.named[i], block.found[i]);
-                    contacts.cache.push(key, contact);
-                    contacts.bodies.push(bodies);
-                    contacts.separation.push(separation);
-                }
+                let Named { key, bodies, known } = block.named[i];
+                let contact = match (block.outcome[i], known) {
+                    (Outcome::Nothing, _) => continue,
+                    (Outcome::Known, Some(known)) => known,
+                    _ => &block.found[i],
+                };
+                contacts.cache.push(key, *contact);
+                contacts.bodies.push(bodies);
+                contacts.separation.push(block.separation[i]);
             }
         }
     }
@@ -236,8 +254,8 @@ impl Block<'_> {
                 if outlook.is_unsure(lane) {
                     self.keep(place, touch(tile, bodies, known, setup));
                 } else {
-                    self.makes_contact[place] = outlook.meets(lane);
-                    self.found[place] = outlook.contact(lane, known);
+                    self.outcome[place] = if outlook.meets(lane) { Outcome::Found } else { Outcome::Nothing };
+                    (self.found[place], self.separation[place]) = outlook.contact(lane, known);
                 }
             }
         }
@@ -253,7 +271,7 @@ impl Block<'_> {
                 && is_slow(tile, bodies, setup)
                 && let Some(separation) = recycle(tile, bodies, known, setup)
             {
-                self.keep(usize::from(place), Some((*known, separation)));
+                (self.outcome[usize::from(place)], self.separation[usize::from(place)]) = (Outcome::Known, separation);
             } else {
                 lists.push(NEW_BOXES, place);
             }
@@ -290,9 +308,9 @@ impl Block<'_> {
 
     #[inline(always)]
     fn keep(&mut self, place: usize, found: Option<(Contact, [f32; 2])>) {
-        self.makes_contact[place] = found.is_some();
+        self.outcome[place] = if found.is_some() { Outcome::Found } else { Outcome::Nothing };
         if let Some(found) = found {
-            self.found[place] = found;
+            (self.found[place], self.separation[place]) = found;
         }
     }
 }

@@ -197,8 +197,9 @@ impl Load<'_> {
     /// Fills in the proxies of up to eight bodies.
     #[inline(always)]
     fn eight<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) {
-        let (mut local_x, mut local_y, mut spin, mut grows): (Row, Row, Row, Row) = Default::default();
-        let (mut moves, mut kinds) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+        let (mut spin, mut grows): (Row, Row) = Default::default();
+        let (mut places, mut kinds) = ([[0.0; 2]; LANES], [[0.0; 4]; LANES]);
+        let (mut velocities, mut rotations) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);
         let Bodies { position, rotation, velocity, angular_velocity, kind, .. } = self.bodies;
         let (position, rotation) = (&position[first..][..count], &rotation[first..][..count]);
         let (velocity, angular_velocity) = (&velocity[first..][..count], &angular_velocity[first..][..count]);
@@ -211,17 +212,17 @@ impl Load<'_> {
         fetch(angular_velocity, AHEAD);
         fetch(kind, AHEAD);
         for lane in 0..count {
-            let local = (position[lane] - self.corner).as_vec2();
-            (local_x[lane], local_y[lane]) = (local.x, local.y);
-            moves[lane] = math::side_by_side(velocity[lane], rotation[lane]);
+            places[lane] = position[lane].to_array();
+            velocities[lane] = velocity[lane].to_array();
+            rotations[lane] = bytemuck::cast(rotation[lane]);
             kinds[lane] = self.setup.kind(kind[lane]).outline();
             spin[lane] = angular_velocity[lane];
             grows[lane] = if first + lane < self.dynamic { 1.0 } else { 0.0 };
         }
         let [x, y, extent, radius] = columns;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let (local_x, local_y, params) = (V::load(&local_x), V::load(&local_y), &self.setup.params);
-        let [vx, vy, c, s] = V::load_quads(&moves);
+        let ([local_x, local_y], params) = (V::seen_from(self.corner.to_array(), &places), &self.setup.params);
+        let ([vx, vy], [c, s]) = (V::load_pairs(&velocities), V::load_pairs(&rotations));
         let [width, height, rounding, bound] = V::load_quads(&kinds);
         let velocity = Vectors::new(vx, vy);
         let (dt, grows, not_round) = (V::splat(params.dt), V::load(&grows), width.if_positive(one, zero));

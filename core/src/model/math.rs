@@ -76,12 +76,6 @@ pub(crate) fn side_by_side(velocity: Vec2, rotation: Rot) -> [f32; 4] {
     bytemuck::cast([velocity.to_array(), bytemuck::cast(rotation)])
 }
 
-/// The inverse of [`side_by_side`].
-#[inline(always)]
-pub(crate) fn apart(both: [f32; 4]) -> (Vec2, Rot) {
-    let [velocity, rotation]: [[f32; 2]; 2] = bytemuck::cast(both);
-    (velocity.into(), bytemuck::cast(rotation))
-}
 
 /// Whether this thread computes as IEEE 754 has it by default: subnormal numbers kept, rounding to nearest. A library
 /// loaded into the process may have changed that.

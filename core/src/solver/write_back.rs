@@ -6,14 +6,15 @@ use super::motion::Motion;
 use crate::exchange::rim::{Rim, RimBody};
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId};
-use crate::model::math::{Rot, apart, side_by_side};
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
+use crate::model::math::Rot;
+use crate::parallel::lanes::{Kernel, LANES, Lanes, Pair, Place, Row};
 use crate::parallel::team::Team;
-use crate::parallel::vectors::Vectors;
+use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
 use crate::tiling::tile::Tile;
-use glam::{DVec2, Vec2};
+use bytemuck::cast_slice_mut;
+use std::ops::Range;
 
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 4096;
@@ -21,29 +22,26 @@ const GRAIN: usize = 4096;
 /// Writes the solved bodies' new state back, and moves those without contacts. Ghosts' results are scratch: their
 /// owners' stand. Who sleeps is left alone. Notes who may concern other tiles from now on.
 pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, team: Team) {
-    let motion = Motion::new(setup);
+    let mover = Mover { solved, motion: Motion::new(setup), interior: &tile.interior, setup };
     let mut rim = std::mem::take(&mut tile.rim.bodies);
     rim.clear();
     let (bodies, owned) = (&mut tile.bodies, tile.owned);
     let mut rest = Owned {
-        position: &mut bodies.position[..owned],
-        rotation: &mut bodies.rotation[..owned],
-        velocity: &mut bodies.velocity[..owned],
+        position: cast_slice_mut(&mut bodies.position[..owned]),
+        rotation: cast_slice_mut(&mut bodies.rotation[..owned]),
+        velocity: cast_slice_mut(&mut bodies.velocity[..owned]),
         angular_velocity: &mut bodies.angular_velocity[..owned],
         id: &bodies.id[..owned],
         kind: &bodies.kind[..owned],
         place: &solved.places()[..owned],
         asleep: tile.sleep.asleep(),
     };
-    let (region, interior) = (&tile.region, &tile.interior);
+    let region = &tile.region;
     let parts = team.ranges(owned, GRAIN).map(|range| WriteBack {
         owned: rest.split_off(range.len()),
         first: range.start,
-        solved,
-        motion,
+        mover,
         region,
-        interior,
-        setup,
         rim: if range.start == 0 { std::mem::take(&mut rim) } else { Vec::new() },
         not_finite: None,
     });
@@ -59,9 +57,9 @@ pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, 
 
 /// Owned bodies of a tile, to be given their new state: columns of one length, so that an index is checked once.
 struct Owned<'a> {
-    position: &'a mut [DVec2],
-    rotation: &'a mut [Rot],
-    velocity: &'a mut [Vec2],
+    position: &'a mut [Place],
+    rotation: &'a mut [Pair],
+    velocity: &'a mut [Pair],
     angular_velocity: &'a mut [f32],
     id: &'a [GlobalId],
     kind: &'a [KindId],
@@ -87,72 +85,57 @@ impl<'a> Owned<'a> {
         }
     }
 
-    /// Reads up to eight bodies.
+    /// Blocks of eight bodies from here on.
     #[inline(always)]
-    fn read(&self, first: usize, count: usize) -> Eight {
-        let mut eight = Eight::default();
-        let (position, rotation) = (&self.position[first..][..count], &self.rotation[first..][..count]);
-        let (velocity, spin) = (&self.velocity[first..][..count], &self.angular_velocity[first..][..count]);
-        for lane in 0..count {
-            eight.position[lane] = position[lane];
-            eight.moves[lane] = side_by_side(velocity[lane], rotation[lane]);
-            eight.spin[lane] = spin[lane];
+    fn eights<const N: usize>(&mut self, first: usize) -> Eights<'_, N> {
+        let range = first..first + N * LANES;
+        Eights {
+            position: blocks(&mut self.position[range.clone()]),
+            rotation: blocks(&mut self.rotation[range.clone()]),
+            velocity: blocks(&mut self.velocity[range.clone()]),
+            spin: blocks(&mut self.angular_velocity[range.clone()]),
+            place: self.place[range.clone()].as_chunks().0.try_into().expect("as many"),
+            asleep: if self.asleep.is_empty() { &[] } else { &self.asleep[range] },
         }
-        eight
     }
 
-    /// Writes up to eight bodies, but those that sleep.
-    #[inline(always)]
-    fn write(&mut self, first: usize, count: usize, eight: &Eight) {
-        let (position, rotation) = (&mut self.position[first..][..count], &mut self.rotation[first..][..count]);
-        let (velocity, spin) = (&mut self.velocity[first..][..count], &mut self.angular_velocity[first..][..count]);
-        for lane in 0..count {
-            if !self.asleep.is_empty() && self.asleep[first + lane] {
-                continue;
-            }
-            position[lane] = eight.position[lane];
-            (velocity[lane], rotation[lane]) = apart(eight.moves[lane]);
-            spin[lane] = eight.spin[lane];
+    fn body(&self, i: usize) -> Body {
+        let &Self { ref position, ref rotation, ref velocity, ref angular_velocity, id, kind, .. } = self;
+        let [c, s] = rotation[i];
+        Body {
+            id: id[i],
+            position: position[i].into(),
+            rotation: Rot { c, s },
+            velocity: velocity[i].into(),
+            angular_velocity: angular_velocity[i],
+            kind: kind[i],
         }
     }
 }
 
-/// Eight bodies: position, velocity and rotation, angular velocity.
-#[derive(Clone, Copy, Default)]
-struct Eight {
-    position: [DVec2; LANES],
-    moves: [Quad; LANES],
-    spin: Row,
+/// A column of so many blocks of eight.
+#[inline(always)]
+fn blocks<T, const N: usize>(column: &mut [T]) -> &mut [[T; LANES]; N] {
+    column.as_chunks_mut().0.try_into().expect("as many")
 }
 
-impl Eight {
-    /// Zero times a finite number is zero: a test for all of them, in integers, as their order does not matter.
-    #[inline(always)]
-    fn is_finite(&self) -> bool {
-        let (mut places, mut others) = (0, 0);
-        for lane in 0..LANES {
-            let ([vx, vy, c, s], position) = (self.moves[lane], self.position[lane]);
-            places |= ((position.x + position.y) * 0.0).to_bits();
-            others |= ((vx + vy + c + s + self.spin[lane]) * 0.0).to_bits();
-        }
-        // But for their signs.
-        places << 1 == 0 && others << 1 == 0
-    }
-
-    fn is_finite_in(&self, lane: usize) -> bool {
-        self.position[lane].is_finite() && self.moves[lane].iter().all(|v| v.is_finite()) && self.spin[lane].is_finite()
-    }
+/// Blocks of eight bodies: where they are, rotation, velocity, angular velocity; and which the solver has them as.
+struct Eights<'a, const N: usize> {
+    position: &'a mut [[Place; LANES]; N],
+    rotation: &'a mut [[Pair; LANES]; N],
+    velocity: &'a mut [[Pair; LANES]; N],
+    spin: &'a mut [Row; N],
+    place: &'a [[SolverIndex; LANES]; N],
+    /// Empty where nobody sleeps.
+    asleep: &'a [bool],
 }
 
 /// Some of the bodies, from the first of them on.
 struct WriteBack<'a> {
     owned: Owned<'a>,
     first: usize,
-    solved: &'a SolverBodies,
-    motion: Motion,
+    mover: Mover<'a>,
     region: &'a Region,
-    interior: &'a Region,
-    setup: &'a Setup,
     rim: Vec<RimBody>,
     /// The lowest of those whose state is no longer finite.
     not_finite: Option<GlobalId>,
@@ -167,12 +150,12 @@ impl Kernel for WriteBack<'_> {
         // Blocks of eight, four at a time: roots and quotients take long, and none need wait for those of another.
         let (fours, ones) = (all / (4 * LANES) * (4 * LANES), all / LANES * LANES);
         for first in (0..fours).step_by(4 * LANES) {
-            self.blocks::<V, 4>(first, LANES);
+            self.eights::<V, 4>(first);
         }
         for first in (fours..ones).step_by(LANES) {
-            self.blocks::<V, 1>(first, LANES);
+            self.eights::<V, 1>(first);
         }
-        self.blocks::<V, 1>(ones, all - ones);
+        self.last::<V>(ones);
         (self.rim, self.not_finite)
     }
 }
@@ -186,71 +169,142 @@ struct Motions<V> {
     spin: V,
 }
 
-/// Which of eight bodies were solved.
-#[derive(Clone, Copy)]
-struct Solved {
-    /// Among the solver's bodies. Who is not solved is a static here: its own result is taken in the end.
-    index: [u32; LANES],
-    /// One for who is not.
-    flies: Row,
-    flying: usize,
+impl WriteBack<'_> {
+    #[inline(always)]
+    fn eights<V: Lanes, const N: usize>(&mut self, first: usize) {
+        let [are_within, are_finite] = self.mover.go::<V, N>(self.owned.eights(first));
+        if !are_within {
+            self.note_rim(first..first + N * LANES);
+        }
+        if !are_finite {
+            self.note_not_finite(first..first + N * LANES);
+        }
+    }
+
+    /// Those that are too few for a block.
+    #[inline(always)]
+    fn last<V: Lanes>(&mut self, first: usize) {
+        let (owned, rest) = (&self.owned, first..self.owned.id.len());
+        let count = rest.len();
+        let (mut position, mut rotation, mut velocity) = ([[[0.0; 2]; LANES]], [[[1.0, 0.0]; LANES]], [[[0.0; 2]; LANES]]);
+        let (mut spin, mut place, mut asleep) = ([[0.0; LANES]], [[SolverIndex::NOT_SOLVED; LANES]], [false; LANES]);
+        position[0][..count].copy_from_slice(&owned.position[rest.clone()]);
+        rotation[0][..count].copy_from_slice(&owned.rotation[rest.clone()]);
+        velocity[0][..count].copy_from_slice(&owned.velocity[rest.clone()]);
+        spin[0][..count].copy_from_slice(&owned.angular_velocity[rest.clone()]);
+        place[0][..count].copy_from_slice(&owned.place[rest.clone()]);
+        if !owned.asleep.is_empty() {
+            asleep[..count].copy_from_slice(&owned.asleep[rest.clone()]);
+        }
+        let eight = Eights {
+            position: &mut position,
+            rotation: &mut rotation,
+            velocity: &mut velocity,
+            spin: &mut spin,
+            place: &place,
+            asleep: if owned.asleep.is_empty() { &[] } else { &asleep },
+        };
+        self.mover.go::<V, 1>(eight);
+        let owned = &mut self.owned;
+        owned.position[rest.clone()].copy_from_slice(&position[0][..count]);
+        owned.rotation[rest.clone()].copy_from_slice(&rotation[0][..count]);
+        owned.velocity[rest.clone()].copy_from_slice(&velocity[0][..count]);
+        owned.angular_velocity[rest.clone()].copy_from_slice(&spin[0][..count]);
+        self.note_rim(rest.clone());
+        self.note_not_finite(rest);
+    }
+
+    /// Notes those that may concern other tiles.
+    #[inline(always)]
+    fn note_rim(&mut self, bodies: Range<usize>) {
+        for i in bodies {
+            let (position, velocity) = (self.owned.position[i].into(), self.owned.velocity[i].into());
+            let Mover { interior, setup, .. } = self.mover;
+            if !interior.contains(position) | setup.goes_far(velocity) {
+                self.rim.extend(RimBody::of(self.owned.body(i), (self.first + i) as u32, self.region, setup));
+            }
+        }
+    }
+
+    #[cold]
+    fn note_not_finite(&mut self, bodies: Range<usize>) {
+        let named = bodies.map(|i| self.owned.body(i)).filter(|body| !body.is_finite()).map(|body| body.id);
+        self.not_finite = self.not_finite.into_iter().chain(named).min();
+    }
 }
 
-impl WriteBack<'_> {
-    /// Blocks of up to eight bodies. Those that were solved and those that flew lie in no order, so both is done for all of them where
-    /// there are some of either.
+/// What moves bodies by a step.
+#[derive(Clone, Copy)]
+struct Mover<'a> {
+    solved: &'a SolverBodies,
+    motion: Motion,
+    interior: &'a Region,
+    setup: &'a Setup,
+}
+
+impl Mover<'_> {
+    /// Moves blocks of eight bodies, but those that sleep. Those that were solved and those that flew lie in no order, so both is done
+    /// for all of them where there are some of either. Whether all of them concern no other tile now, and are finite.
     #[inline(always)]
-    fn blocks<V: Lanes, const N: usize>(&mut self, first: usize, count: usize) {
-        let mut all = [Eight::default(); N];
-        let mut solved = [Solved { index: [0; LANES], flies: [1.0; LANES], flying: LANES - count }; N];
-        let mut flying = 0;
-        let zero = Vectors::new(V::splat(0.0), V::splat(0.0));
-        let mut motions = [Motions { moved: zero, turned: zero, velocity: zero, spin: zero.x }; N];
-        let mut rotations = [zero; N];
+    fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>) -> [bool; 2] {
+        let Eights { position, rotation, velocity, spin, place, asleep } = eights;
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let nothing = Vectors::new(zero, zero);
+        let mut motions = [Motions { moved: nothing, turned: nothing, velocity: nothing, spin: zero }; N];
+        // Who is not solved is a static here: its own result is taken in the end.
+        let (mut index, mut flies, mut flying) = ([[0_u32; LANES]; N], [[0.0; LANES]; N], 0);
         for block in 0..N {
-            all[block] = self.owned.read(first + block * LANES, count);
-            let solved = &mut solved[block];
-            for (lane, &place) in self.owned.place[first + block * LANES..][..count].iter().enumerate() {
+            for (lane, &place) in place[block].iter().enumerate() {
                 let is_solved = place != SolverIndex::NOT_SOLVED;
-                solved.index[lane] = if is_solved { place.get() as u32 } else { SolverIndex::STATIC.get() as u32 };
-                solved.flies[lane] = if is_solved { 0.0 } else { 1.0 };
-                solved.flying += usize::from(!is_solved);
+                index[block][lane] = if is_solved { place.get() as u32 } else { SolverIndex::STATIC.get() as u32 };
+                flies[block][lane] = if is_solved { 0.0 } else { 1.0 };
+                flying += u32::from(!is_solved);
             }
-            flying += solved.flying;
-            let [vx, vy, c, s] = V::load_quads(&all[block].moves);
-            motions[block].velocity = Vectors::new(vx, vy);
-            motions[block].spin = V::load(&all[block].spin);
-            rotations[block] = Vectors::new(c, s);
+            let [vx, vy] = V::load_pairs(&velocity[block]);
+            (motions[block].velocity, motions[block].spin) = (Vectors::new(vx, vy), V::load(&spin[block]));
         }
         if flying > 0 {
             self.fly(&mut motions);
         }
-        if flying < N * LANES {
-            for (motions, solved) in motions.iter_mut().zip(&solved) {
-                *motions = Motions::pick(V::load(&solved.flies), *motions, self.solved(&solved.index));
+        if flying < (N * LANES) as u32 {
+            for block in 0..N {
+                let solved = self.solved(&index[block]);
+                motions[block] = Motions::pick(V::load(&flies[block]), motions[block], solved);
             }
         }
+        let (mut are_within, mut are_finite) = (true, true);
         for block in 0..N {
-            let (motions, eight) = (&motions[block], &mut all[block]);
-            let turned = motions.turned.rotate(rotations[block]);
-            let rotation = turned.scaled(V::splat(1.0).div(turned.dot(turned).sqrt()));
-            let (mut x, mut y): (Row, Row) = Default::default();
-            motions.moved.x.store(&mut x);
-            motions.moved.y.store(&mut y);
-            for lane in 0..LANES {
-                eight.position[lane] += DVec2::new(f64::from(x[lane]), f64::from(y[lane]));
+            let Motions { mut moved, turned, velocity: mut now, spin: mut turns } = motions[block];
+            let [c, s] = V::load_pairs(&rotation[block]);
+            let before = Vectors::new(c, s);
+            let turned = turned.rotate(before);
+            let mut after = turned.scaled(one.div(turned.dot(turned).sqrt()));
+            if !asleep.is_empty() {
+                let mut awake = [1.0; LANES];
+                for (awake, &asleep) in awake.iter_mut().zip(&asleep[block * LANES..][..LANES]) {
+                    *awake = if asleep { 0.0 } else { 1.0 };
+                }
+                let ([vx, vy], awake) = (V::load_pairs(&velocity[block]), V::load(&awake));
+                // Whoever goes so far stays where it is, to the sign of a zero.
+                let nowhere = Vectors::new(V::splat(-0.0), V::splat(-0.0));
+                moved = Vectors::pick(awake, moved, nowhere);
+                after = Vectors::pick(awake, after, before);
+                now = Vectors::pick(awake, now, Vectors::new(vx, vy));
+                turns = awake.if_positive(turns, V::load(&spin[block]));
             }
-            motions.spin.store(&mut eight.spin);
-            V::store_quads([motions.velocity.x, motions.velocity.y, rotation.x, rotation.y], &mut eight.moves);
+            V::advance([moved.x, moved.y], &mut position[block]);
+            V::store_pairs([after.x, after.y], &mut rotation[block]);
+            V::store_pairs([now.x, now.y], &mut velocity[block]);
+            turns.store(&mut spin[block]);
+            let Region { min, max } = *self.interior;
+            let fastest = absolute(now.x).max(absolute(now.y)).mul(V::splat(self.setup.params.dt));
+            are_within &= V::are_within(&position[block], min.into(), max.into());
+            are_within &= fastest.all_below(self.setup.params.margin_cap);
+            // A sum is finite only if all its parts are.
+            let sum = moved.x.add(moved.y).add(after.x).add(after.y).add(now.x).add(now.y).add(turns);
+            are_finite &= absolute(sum).all_below(f32::MAX);
         }
-        for (block, eight) in all.iter().enumerate() {
-            let first = first + block * LANES;
-            self.owned.write(first, count, eight);
-            self.note_rim(first, count, eight);
-            if !eight.is_finite() {
-                self.note_not_finite(first, count, eight);
-            }
-        }
+        [are_within, are_finite]
     }
 
     /// Bodies without contacts, through all substeps.
@@ -270,36 +324,6 @@ impl WriteBack<'_> {
                 block.turned = Vectors::new(c, s);
             }
         }
-    }
-
-    #[inline(always)]
-    fn note_rim(&mut self, first: usize, count: usize, eight: &Eight) {
-        let mut outside = 0;
-        for (lane, (&position, [vx, vy, ..])) in (0..).zip(eight.position.iter().zip(eight.moves)) {
-            let concerns = !self.interior.contains(position) | self.setup.goes_far(Vec2::new(vx, vy));
-            outside |= u32::from(concerns) << lane;
-        }
-        outside &= (1 << count) - 1;
-        while outside != 0 {
-            let lane = outside.trailing_zeros() as usize;
-            let (i, (velocity, rotation)) = (first + lane, apart(eight.moves[lane]));
-            let body = Body {
-                id: self.owned.id[i],
-                position: eight.position[lane],
-                rotation,
-                velocity,
-                angular_velocity: eight.spin[lane],
-                kind: self.owned.kind[i],
-            };
-            self.rim.extend(RimBody::of(body, (self.first + i) as u32, self.region, self.setup));
-            outside &= outside - 1;
-        }
-    }
-
-    #[cold]
-    fn note_not_finite(&mut self, first: usize, count: usize, eight: &Eight) {
-        let lanes = (0..count).filter(|&lane| !eight.is_finite_in(lane));
-        self.not_finite = self.not_finite.into_iter().chain(lanes.map(|lane| self.owned.id[first + lane])).min();
     }
 
     /// Bodies with contacts, as the solver left them.

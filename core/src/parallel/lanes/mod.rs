@@ -7,8 +7,13 @@
 use crate::model::params::Instructions;
 use std::cell::Cell;
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 #[cfg(test)]
 mod tests;
+
+#[cfg(target_arch = "x86_64")]
+use avx2::Avx2;
 
 /// How many numbers a [`Lanes`] holds. Part of the result's definition nowhere, of the memory layout everywhere.
 pub(crate) const LANES: usize = 8;
@@ -18,6 +23,12 @@ pub(crate) type Row = [f32; LANES];
 
 /// Four numbers of one body, read and written together.
 pub(crate) type Quad = [f32; 4];
+
+/// Two numbers of one body: a vector or a rotation.
+pub(crate) type Pair = [f32; 2];
+
+/// Where a body is, in m.
+pub(crate) type Place = [f64; 2];
 
 /// Arithmetic on eight lanes.
 pub(crate) trait Lanes: Copy {
@@ -44,14 +55,19 @@ pub(crate) trait Lanes: Copy {
     /// The inverse of [`Lanes::load_quads`].
     fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]);
     /// As [`Lanes::gather`], of quads that nobody changes.
-    #[inline(always)]
-    fn gather_fixed(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
-        let mut quads = [[0.0; 4]; LANES];
-        for (quad, &i) in quads.iter_mut().zip(index) {
-            *quad = from[i as usize];
-        }
-        Self::load_quads(&quads)
-    }
+    fn gather_fixed(from: &[Quad], index: &[u32; LANES]) -> [Self; 4];
+    /// The two columns of eight pairs in a row.
+    fn load_pairs(from: &[Pair; LANES]) -> [Self; 2];
+    /// The inverse of [`Lanes::load_pairs`].
+    fn store_pairs(columns: [Self; 2], to: &mut [Pair; LANES]);
+    /// From an origin to eight places, rounded once, in the end.
+    fn seen_from(origin: Place, places: &[Place; LANES]) -> [Self; 2];
+    /// Moves eight places on.
+    fn advance(by: [Self; 2], places: &mut [Place; LANES]);
+    /// Whether all places are at least `low` and less than `high`, in both directions.
+    fn are_within(places: &[Place; LANES], low: Place, high: Place) -> bool;
+    /// Whether all numbers are less than this.
+    fn all_below(self, most: f32) -> bool;
 }
 
 /// Plain arrays: the reference, and what other processors run.
@@ -131,152 +147,35 @@ impl Lanes for Portable {
             *quad = columns.map(|column| column.0[l]);
         }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-pub(crate) use avx2::Avx2;
-
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    //! Eight lanes in one 256-bit register.
-    //!
-    //! Every method is inlined into a function compiled for AVX2 or more, which [`super::LaneSet::run`] calls only after the
-    //! processor was asked; no other code names this type.
-    use super::{LANES, Lanes, Quad, Row};
-    use std::arch::x86_64::*;
-    use std::cell::Cell;
-
-    #[derive(Clone, Copy)]
-    pub(crate) struct Avx2(__m256);
-
-    /// Eight rows of four to four columns of eight. `rows[l]` holds quad `l` in its low half and quad `l + 4` in its
-    /// high half.
     #[inline(always)]
-    fn transpose(rows: [__m256; 4]) -> [__m256; 4] {
-        // SAFETY: AVX2 is there (see the module).
-        unsafe {
-            let a = _mm256_unpacklo_ps(rows[0], rows[1]);
-            let b = _mm256_unpackhi_ps(rows[0], rows[1]);
-            let c = _mm256_unpacklo_ps(rows[2], rows[3]);
-            let d = _mm256_unpackhi_ps(rows[2], rows[3]);
-            [
-                _mm256_shuffle_ps::<0b0100_0100>(a, c),
-                _mm256_shuffle_ps::<0b1110_1110>(a, c),
-                _mm256_shuffle_ps::<0b0100_0100>(b, d),
-                _mm256_shuffle_ps::<0b1110_1110>(b, d),
-            ]
+    fn gather_fixed(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
+        Self::load_quads(&index.map(|i| from[i as usize]))
+    }
+    #[inline(always)]
+    fn load_pairs(from: &[Pair; LANES]) -> [Self; 2] {
+        std::array::from_fn(|c| Self(std::array::from_fn(|l| from[l][c])))
+    }
+    #[inline(always)]
+    fn store_pairs([a, b]: [Self; 2], to: &mut [Pair; LANES]) {
+        *to = std::array::from_fn(|l| [a.0[l], b.0[l]]);
+    }
+    #[inline(always)]
+    fn seen_from(origin: Place, places: &[Place; LANES]) -> [Self; 2] {
+        std::array::from_fn(|c| Self(std::array::from_fn(|l| (places[l][c] - origin[c]) as f32)))
+    }
+    #[inline(always)]
+    fn advance([x, y]: [Self; 2], places: &mut [Place; LANES]) {
+        for (l, place) in places.iter_mut().enumerate() {
+            *place = [place[0] + f64::from(x.0[l]), place[1] + f64::from(y.0[l])];
         }
     }
-
     #[inline(always)]
-    fn two_quads(low: *const Quad, high: *const Quad) -> __m256 {
-        // SAFETY: AVX2 is there; each pointer comes from a reference and covers four floats.
-        unsafe { _mm256_loadu2_m128(high.cast(), low.cast()) }
+    fn are_within(places: &[Place; LANES], low: Place, high: Place) -> bool {
+        places.iter().all(|place| (0..2).all(|axis| place[axis] >= low[axis] && place[axis] < high[axis]))
     }
-
-    impl Lanes for Avx2 {
-        #[inline(always)]
-        fn splat(x: f32) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_set1_ps(x) })
-        }
-        #[inline(always)]
-        fn load(from: &Row) -> Self {
-            // SAFETY: AVX2 is there; the pointer covers eight floats.
-            Self(unsafe { _mm256_loadu_ps(from.as_ptr()) })
-        }
-        #[inline(always)]
-        fn store(self, to: &mut Row) {
-            // SAFETY: AVX2 is there; the pointer covers eight floats.
-            unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
-        }
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_add_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn div(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_div_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            Self(unsafe { _mm256_sqrt_ps(self.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there. `maxps` returns its second operand where they compare equal or not at all.
-            Self(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: AVX2 is there. `minps` returns its second operand where they compare equal or not at all.
-            Self(unsafe { _mm256_min_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn if_positive(self, yes: Self, no: Self) -> Self {
-            // SAFETY: AVX2 is there (see the module).
-            unsafe {
-                let mask = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps());
-                Self(_mm256_blendv_ps(no.0, yes.0, mask))
-            }
-        }
-        #[inline(always)]
-        fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
-            // Written out, here and below: closures that a library function calls might be compiled without AVX2.
-            let quad = |l: usize| from[index[l] as usize].as_ptr().cast_const();
-            let [a, b, c, d] = transpose([
-                two_quads(quad(0), quad(4)),
-                two_quads(quad(1), quad(5)),
-                two_quads(quad(2), quad(6)),
-                two_quads(quad(3), quad(7)),
-            ]);
-            [Self(a), Self(b), Self(c), Self(d)]
-        }
-        #[inline(always)]
-        fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
-            let [a, b, c, d] = columns;
-            for (l, row) in transpose([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
-                // SAFETY: AVX2 is there; the slices are bounds-checked and cover four floats each.
-                unsafe {
-                    _mm_storeu_ps(to[index[l] as usize].as_ptr().cast(), _mm256_castps256_ps128(row));
-                    _mm_storeu_ps(to[index[l + 4] as usize].as_ptr().cast(), _mm256_extractf128_ps::<1>(row));
-                }
-            }
-        }
-        #[inline(always)]
-        fn load_quads(from: &[Quad; LANES]) -> [Self; 4] {
-            let [a, b, c, d] = transpose([
-                two_quads(&from[0], &from[4]),
-                two_quads(&from[1], &from[5]),
-                two_quads(&from[2], &from[6]),
-                two_quads(&from[3], &from[7]),
-            ]);
-            [Self(a), Self(b), Self(c), Self(d)]
-        }
-        #[inline(always)]
-        fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]) {
-            let [a, b, c, d] = columns;
-            for (l, row) in transpose([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
-                // SAFETY: AVX2 is there; each quad covers four floats.
-                unsafe {
-                    _mm_storeu_ps(to[l].as_mut_ptr(), _mm256_castps256_ps128(row));
-                    _mm_storeu_ps(to[l + 4].as_mut_ptr(), _mm256_extractf128_ps::<1>(row));
-                }
-            }
-        }
+    #[inline(always)]
+    fn all_below(self, most: f32) -> bool {
+        self.0.iter().all(|&lane| lane < most)
     }
 }
 
