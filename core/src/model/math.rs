@@ -76,7 +76,6 @@ pub(crate) fn side_by_side(velocity: Vec2, rotation: Rot) -> [f32; 4] {
     bytemuck::cast([velocity.to_array(), bytemuck::cast(rotation)])
 }
 
-
 /// Whether this thread computes as IEEE 754 has it by default: subnormal numbers kept, rounding to nearest. A library
 /// loaded into the process may have changed that.
 pub(crate) fn float_mode_is_default() -> bool {

@@ -1,6 +1,6 @@
 //! Eight vectors of the plane at once.
 
-use super::lanes::{LANES, Lanes, Row};
+use super::lanes::{Arithmetic, LANES, Lanes, Row};
 
 /// A vector in every lane; or a rotation, by its cosine and its sine.
 #[derive(Clone, Copy)]
@@ -9,7 +9,7 @@ pub(crate) struct Vectors<V> {
     pub(crate) y: V,
 }
 
-impl<V: Lanes> Vectors<V> {
+impl<V: Arithmetic> Vectors<V> {
     #[inline(always)]
     pub(crate) fn new(x: V, y: V) -> Self {
         Self { x, y }
@@ -80,13 +80,13 @@ impl<V: Lanes> Vectors<V> {
 
 /// Without its sign.
 #[inline(always)]
-pub(crate) fn absolute<V: Lanes>(x: V) -> V {
+pub(crate) fn absolute<V: Arithmetic>(x: V) -> V {
     x.max(V::splat(0.0).sub(x))
 }
 
 /// One where `a < b`, else zero.
 #[inline(always)]
-pub(crate) fn less<V: Lanes>(a: V, b: V) -> V {
+pub(crate) fn less<V: Arithmetic>(a: V, b: V) -> V {
     b.sub(a).if_positive(V::splat(1.0), V::splat(0.0))
 }
 

@@ -20,8 +20,8 @@ const LARGE: u32 = 4096;
 /// Most pieces that contacts of one color are cut into, and so most threads that solve one island.
 pub(crate) const MOST_SLICES: u32 = 32;
 
-/// Groups of eight in a piece, at least: less is not worth waiting for another thread.
-const GROUPS_PER_SLICE: u32 = 16;
+/// Groups in a piece, at least: less is not worth waiting for another thread.
+const GROUPS_PER_SLICE: u32 = 8;
 
 /// One batch. Ranges are of the solver's buffers, where those of one batch lie together, in the order of batches.
 #[derive(Clone, Default, Debug)]

@@ -17,7 +17,7 @@ use super::constraint::kernels::{Normals, Pass, Table, WarmStart, pressing};
 use super::job::Job;
 use super::motion::Motion;
 use crate::parallel::crew::Member;
-use crate::parallel::lanes::Lanes;
+use crate::parallel::lanes::{Lanes, Wide};
 use crate::tiling::blueprint::Setup;
 
 /// One half of the step of a batch, with half of the iterations.
@@ -57,7 +57,7 @@ impl Iterate {
 
 impl Pass for Iterate {
     #[inline(always)]
-    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+    fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
         let normals = Normals::<V>::load(&group.sides);

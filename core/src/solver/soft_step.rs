@@ -10,7 +10,7 @@ use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;
 use crate::parallel::crew::Member;
-use crate::parallel::lanes::Lanes;
+use crate::parallel::lanes::{Lanes, Wide};
 use crate::tiling::blueprint::Setup;
 
 /// One substep of a batch.
@@ -52,7 +52,7 @@ impl Solve {
 
 impl Pass for Solve {
     #[inline(always)]
-    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+    fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
         let normals = Normals::<V>::load(&group.sides);
@@ -102,7 +102,7 @@ impl<const TOTALS: bool> Relax<TOTALS> {
 
 impl<const TOTALS: bool> Pass for Relax<TOTALS> {
     #[inline(always)]
-    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+    fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
         let pose_a = V::gather(bodies.pose, &group.sides.a);

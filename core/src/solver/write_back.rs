@@ -186,7 +186,8 @@ impl WriteBack<'_> {
     fn last<V: Lanes>(&mut self, first: usize) {
         let (owned, rest) = (&self.owned, first..self.owned.id.len());
         let count = rest.len();
-        let (mut position, mut rotation, mut velocity) = ([[[0.0; 2]; LANES]], [[[1.0, 0.0]; LANES]], [[[0.0; 2]; LANES]]);
+        let (mut position, mut rotation, mut velocity) =
+            ([[[0.0; 2]; LANES]], [[[1.0, 0.0]; LANES]], [[[0.0; 2]; LANES]]);
         let (mut spin, mut place, mut asleep) = ([[0.0; LANES]], [[SolverIndex::NOT_SOLVED; LANES]], [false; LANES]);
         position[0][..count].copy_from_slice(&owned.position[rest.clone()]);
         rotation[0][..count].copy_from_slice(&owned.rotation[rest.clone()]);

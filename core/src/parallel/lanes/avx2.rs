@@ -1,23 +1,42 @@
-//! Eight lanes in one 256-bit register.
+//! Eight lanes in one 256-bit register, and sixteen in two.
 //!
 //! Every method is inlined into a function compiled for AVX2 or more, which [`super::LaneSet::run`] calls only after the
 //! processor was asked; no other code names this type.
-use super::{LANES, Lanes, Pair, Place, Quad, Row};
+use super::{Arithmetic, LANES, Lanes, Pair, Place, Quad, Row, Twice, Wide};
 use std::arch::x86_64::*;
 use std::cell::Cell;
+use std::marker::PhantomData;
 
+/// A set of instructions that has those of AVX2: it decides what sixteen lanes are.
+pub(crate) trait Registers: Copy {
+    type Wide: Wide;
+}
+
+/// AVX2 alone.
 #[derive(Clone, Copy)]
-pub(crate) struct Avx2(__m256);
+pub(crate) struct Avx2;
+
+impl Registers for Avx2 {
+    type Wide = Twice<Eight<Self>>;
+}
+
+/// Eight lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Eight<S>(__m256, PhantomData<S>);
+
+impl<S> Eight<S> {
+    #[inline(always)]
+    fn of(register: __m256) -> Self {
+        Self(register, PhantomData)
+    }
+}
 
 /// Of eight pairs, four in each register, their first numbers and their second ones; and back.
 #[inline(always)]
 fn part(low: __m256, high: __m256) -> [__m256; 2] {
     // SAFETY: AVX2 is there (see the module).
     unsafe {
-        [
-            in_turn(_mm256_shuffle_ps::<0b10_00_10_00>(low, high)),
-            in_turn(_mm256_shuffle_ps::<0b11_01_11_01>(low, high)),
-        ]
+        [in_turn(_mm256_shuffle_ps::<0b10_00_10_00>(low, high)), in_turn(_mm256_shuffle_ps::<0b11_01_11_01>(low, high))]
     }
 }
 
@@ -60,64 +79,68 @@ fn two_quads(low: *const Quad, high: *const Quad) -> __m256 {
     unsafe { _mm256_loadu2_m128(high.cast(), low.cast()) }
 }
 
-impl Lanes for Avx2 {
+impl<S: Registers> Arithmetic for Eight<S> {
     #[inline(always)]
     fn splat(x: f32) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_set1_ps(x) })
-    }
-    #[inline(always)]
-    fn load(from: &Row) -> Self {
-        // SAFETY: AVX2 is there; the pointer covers eight floats.
-        Self(unsafe { _mm256_loadu_ps(from.as_ptr()) })
-    }
-    #[inline(always)]
-    fn store(self, to: &mut Row) {
-        // SAFETY: AVX2 is there; the pointer covers eight floats.
-        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
+        Self::of(unsafe { _mm256_set1_ps(x) })
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_add_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_add_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_sub_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_mul_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_div_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_div_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: AVX2 is there (see the module).
-        Self(unsafe { _mm256_sqrt_ps(self.0) })
+        Self::of(unsafe { _mm256_sqrt_ps(self.0) })
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         // SAFETY: AVX2 is there. `maxps` returns its second operand where they compare equal or not at all.
-        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_max_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: AVX2 is there. `minps` returns its second operand where they compare equal or not at all.
-        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+        Self::of(unsafe { _mm256_min_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {
         // SAFETY: AVX2 is there (see the module).
         unsafe {
             let mask = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps());
-            Self(_mm256_blendv_ps(no.0, yes.0, mask))
+            Self::of(_mm256_blendv_ps(no.0, yes.0, mask))
         }
+    }
+}
+
+impl<S: Registers> Lanes for Eight<S> {
+    type Wide = S::Wide;
+    #[inline(always)]
+    fn load(from: &Row) -> Self {
+        // SAFETY: AVX2 is there; the pointer covers eight floats.
+        Self::of(unsafe { _mm256_loadu_ps(from.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self, to: &mut Row) {
+        // SAFETY: AVX2 is there; the pointer covers eight floats.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
     }
     #[inline(always)]
     fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
@@ -129,7 +152,7 @@ impl Lanes for Avx2 {
             two_quads(quad(2), quad(6)),
             two_quads(quad(3), quad(7)),
         ]);
-        [Self(a), Self(b), Self(c), Self(d)]
+        [Self::of(a), Self::of(b), Self::of(c), Self::of(d)]
     }
     #[inline(always)]
     fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
@@ -150,7 +173,7 @@ impl Lanes for Avx2 {
             two_quads(&from[2], &from[6]),
             two_quads(&from[3], &from[7]),
         ]);
-        [Self(a), Self(b), Self(c), Self(d)]
+        [Self::of(a), Self::of(b), Self::of(c), Self::of(d)]
     }
     #[inline(always)]
     fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]) {
@@ -171,14 +194,14 @@ impl Lanes for Avx2 {
             two_quads(&from[index[2] as usize], &from[index[6] as usize]),
             two_quads(&from[index[3] as usize], &from[index[7] as usize]),
         ]);
-        [Self(a), Self(b), Self(c), Self(d)]
+        [Self::of(a), Self::of(b), Self::of(c), Self::of(d)]
     }
     #[inline(always)]
     fn load_pairs(from: &[Pair; LANES]) -> [Self; 2] {
         let from = from.as_ptr().cast::<f32>();
         // SAFETY: AVX2 is there; eight pairs are sixteen floats.
         let [a, b] = unsafe { part(_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))) };
-        [Self(a), Self(b)]
+        [Self::of(a), Self::of(b)]
     }
     #[inline(always)]
     fn store_pairs([a, b]: [Self; 2], to: &mut [Pair; LANES]) {
@@ -201,7 +224,7 @@ impl Lanes for Avx2 {
             let (a, b) = (_mm256_cvtpd_ps(_mm256_sub_pd(a, origin)), _mm256_cvtpd_ps(_mm256_sub_pd(b, origin)));
             let (c, d) = (_mm256_cvtpd_ps(_mm256_sub_pd(c, origin)), _mm256_cvtpd_ps(_mm256_sub_pd(d, origin)));
             let [a, b] = part(_mm256_set_m128(b, a), _mm256_set_m128(d, c));
-            [Self(a), Self(b)]
+            [Self::of(a), Self::of(b)]
         }
     }
     #[inline(always)]
@@ -232,7 +255,8 @@ impl Lanes for Avx2 {
             let mut all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
             for k in 0..4 {
                 let two = _mm256_loadu_pd(from.add(4 * k));
-                let within = _mm256_and_pd(_mm256_cmp_pd::<_CMP_GE_OQ>(two, low), _mm256_cmp_pd::<_CMP_LT_OQ>(two, high));
+                let within =
+                    _mm256_and_pd(_mm256_cmp_pd::<_CMP_GE_OQ>(two, low), _mm256_cmp_pd::<_CMP_LT_OQ>(two, high));
                 all = _mm256_and_pd(all, within);
             }
             _mm256_movemask_pd(all) == 0b1111

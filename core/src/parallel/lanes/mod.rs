@@ -6,14 +6,22 @@
 
 use crate::model::params::Instructions;
 use std::cell::Cell;
+use wide::Twice;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 #[cfg(test)]
 mod tests;
+mod wide;
+
+pub(crate) use wide::{WIDE, Wide, WideRow};
 
 #[cfg(target_arch = "x86_64")]
-use avx2::Avx2;
+use avx2::{Avx2, Eight};
+#[cfg(target_arch = "x86_64")]
+use avx512::Avx512;
 
 /// How many numbers a [`Lanes`] holds. Part of the result's definition nowhere, of the memory layout everywhere.
 pub(crate) const LANES: usize = 8;
@@ -30,11 +38,9 @@ pub(crate) type Pair = [f32; 2];
 /// Where a body is, in m.
 pub(crate) type Place = [f64; 2];
 
-/// Arithmetic on eight lanes.
-pub(crate) trait Lanes: Copy {
+/// Arithmetic, lane by lane.
+pub(crate) trait Arithmetic: Copy {
     fn splat(x: f32) -> Self;
-    fn load(from: &Row) -> Self;
-    fn store(self, to: &mut Row);
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
@@ -46,6 +52,14 @@ pub(crate) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     /// `yes` where `self > 0`, else `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
+}
+
+/// Arithmetic on eight lanes.
+pub(crate) trait Lanes: Arithmetic {
+    /// Sixteen lanes, of the same instructions.
+    type Wide: Wide;
+    fn load(from: &Row) -> Self;
+    fn store(self, to: &mut Row);
     /// The four columns of the eight quads at `index`.
     fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4];
     /// The inverse of [`Lanes::gather`].
@@ -81,18 +95,10 @@ impl Portable {
     }
 }
 
-impl Lanes for Portable {
+impl Arithmetic for Portable {
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self([x; LANES])
-    }
-    #[inline(always)]
-    fn load(from: &Row) -> Self {
-        Self(*from)
-    }
-    #[inline(always)]
-    fn store(self, to: &mut Row) {
-        *to = self.0;
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -125,6 +131,18 @@ impl Lanes for Portable {
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {
         Self(std::array::from_fn(|l| if self.0[l] > 0.0 { yes.0[l] } else { no.0[l] }))
+    }
+}
+
+impl Lanes for Portable {
+    type Wide = Twice<Self>;
+    #[inline(always)]
+    fn load(from: &Row) -> Self {
+        Self(*from)
+    }
+    #[inline(always)]
+    fn store(self, to: &mut Row) {
+        *to = self.0;
     }
     #[inline(always)]
     fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
@@ -243,17 +261,17 @@ impl LaneSet {
             Set::Avx2 => {
                 #[target_feature(enable = "avx2")]
                 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-                    kernel.run::<Avx2>()
+                    kernel.run::<Eight<Avx2>>()
                 }
                 // SAFETY: the processor has said that it has AVX2, or this would not be this set.
                 unsafe { with_avx2(kernel) }
             }
             #[cfg(target_arch = "x86_64")]
             Set::Avx512 => {
-                // Eight lanes as well, and 32 registers for them.
+                // Of eight lanes as well, and 32 registers for them; and sixteen lanes.
                 #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq")]
                 fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
-                    kernel.run::<Avx2>()
+                    kernel.run::<Eight<Avx512>>()
                 }
                 // SAFETY: the processor has said that it has all of these, or this would not be this set.
                 unsafe { with_avx512(kernel) }

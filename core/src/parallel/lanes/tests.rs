@@ -59,7 +59,72 @@ impl Kernel for Everything<'_> {
             results.push(("scatter", std::array::from_fn(|l| quads[self.index[l] as usize][column])));
             results.push(("store_quads", block.map(|quad| quad[column])));
         }
+        let pairs: [Pair; LANES] = std::array::from_fn(|l| [self.a[l], self.b[l]]);
+        let [first, second] = V::load_pairs(&pairs);
+        let mut block = [[0.0; 2]; LANES];
+        V::store_pairs([second, first], &mut block);
+        let mut places: [Place; LANES] = std::array::from_fn(|l| [0.1 * l as f64, 1e9 + self.quads[l][1] as f64]);
+        let [x, y] = V::seen_from([0.3, 1e9], &places);
+        V::advance([p, q], &mut places);
+        let within = V::are_within(&places, [0.0, 1e9], [self.quads[7][0] as f64 + 0.8, 2e9]);
+        let far = V::are_within(&places, [0.0, 1e9], [self.quads[7][0] as f64 + 0.7, 2e9]);
+        let below = [a.all_below(2.0), p.all_below(8.5), p.all_below(8.0)];
+        [first, second, x, y].into_iter().zip(["load_pairs", "load_pairs", "seen_from", "seen_from"]).for_each(
+            |(value, name)| {
+                let mut row = [0.0; LANES];
+                value.store(&mut row);
+                results.push((name, row));
+            },
+        );
+        results.extend((0..2).map(|c| ("store_pairs", block.map(|pair| pair[c]))));
+        results.extend((0..2).map(|c| ("advance", places.map(|place| (place[c] - [0.0, 1e9][c]) as f32))));
+        let told = [within, far, below[0], below[1], below[2], false, false, false];
+        results.push(("are_within, all_below", told.map(|is| if is { 1.0 } else { 0.0 })));
+        both::<V::Wide>(&self, &mut results);
         results
+    }
+}
+
+/// Two rows as one.
+fn joined<T: Copy + Default>(low: &[T; LANES], high: &[T; LANES]) -> [T; WIDE] {
+    let mut joined = [T::default(); WIDE];
+    joined[..LANES].copy_from_slice(low);
+    joined[LANES..].copy_from_slice(high);
+    joined
+}
+
+/// Every operation of sixteen lanes: of `a` and `b`, and the other way round.
+#[inline(always)]
+fn both<W: Wide>(of: &Everything<'_>, results: &mut Results) {
+    let (a, b) = (W::load(&joined(of.a, of.b)), W::load(&joined(of.b, of.a)));
+    let mut note = |name, value: W| {
+        let mut row = [0.0; WIDE];
+        value.store(&mut row);
+        results.extend(row.as_chunks().0.iter().map(|half| (name, *half)));
+    };
+    note("wide add", a.add(b));
+    note("wide sub", a.sub(b));
+    note("wide mul", a.mul(b));
+    note("wide div", a.div(b));
+    note("wide sqrt", a.sqrt());
+    note("wide max", a.max(b));
+    note("wide min", a.min(b));
+    note("wide if_positive", a.if_positive(b, a));
+    note("wide splat", W::splat(of.a[2]));
+    // Eighteen places, each of them once at most.
+    let mut quads: Vec<Quad> = of.quads.iter().chain(of.quads).copied().collect();
+    let length = of.quads.len() as u32;
+    let index = joined(of.index, &of.index.map(|i| length + i));
+    let sixteen: [Quad; WIDE] = std::array::from_fn(|l| quads[index[l] as usize]);
+    W::load_quads(&sixteen).into_iter().for_each(|column| note("wide load_quads", column));
+    let cells = Cell::from_mut(&mut quads[..]).as_slice_of_cells();
+    let [p, q, r, s] = W::gather(cells, &index);
+    [p, q, r, s].into_iter().for_each(|column| note("wide gather", column));
+    W::scatter([q, p, s, r], cells, &index);
+    for column in 0..4 {
+        for half in index.as_chunks::<LANES>().0 {
+            results.push(("wide scatter", half.map(|i| quads[i as usize][column])));
+        }
     }
 }
 
@@ -85,6 +150,34 @@ fn expected(Everything { a, b, quads, index }: Everything<'_>) -> Results {
     for c in 0..4 {
         results.push(("scatter", column(&|l| quads[l], [1, 0, 3, 2][c])));
         results.push(("store_quads", column(&|l| quads[l], [3, 2, 1, 0][c])));
+    }
+    results.extend([("load_pairs", *a), ("load_pairs", *b)]);
+    let y = |l: usize| 1e9 + f64::from(quads[l][1]);
+    results.push(("seen_from", std::array::from_fn(|l| (0.1 * l as f64 - 0.3) as f32)));
+    results.push(("seen_from", std::array::from_fn(|l| (y(l) - 1e9) as f32)));
+    results.extend([("store_pairs", *b), ("store_pairs", *a)]);
+    results.push(("advance", std::array::from_fn(|l| (0.1 * l as f64 + f64::from(quads[l][0])) as f32)));
+    results.push(("advance", std::array::from_fn(|l| (y(l) + f64::from(quads[l][1]) - 1e9) as f32)));
+    results.push(("are_within, all_below", [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]));
+    let two = |name, f: fn(f32, f32) -> f32| -> Results {
+        let other: Row = std::array::from_fn(|l| f(black_box(b[l]), black_box(a[l])));
+        vec![(name, each(f)), (name, other)]
+    };
+    results.extend(two("wide add", |a, b| a + b));
+    results.extend(two("wide sub", |a, b| a - b));
+    results.extend(two("wide mul", |a, b| a * b));
+    results.extend(two("wide div", |a, b| a / b));
+    results.extend(two("wide sqrt", |a, _| a.sqrt()));
+    results.extend(two("wide max", math::max));
+    results.extend(two("wide min", math::min));
+    results.extend(two("wide if_positive", |a, b| if a > 0.0 { b } else { a }));
+    results.extend([("wide splat", [a[2]; LANES]); 2]);
+    for (name, order) in
+        [("wide load_quads", [0, 1, 2, 3]), ("wide gather", [0, 1, 2, 3]), ("wide scatter", [1, 0, 3, 2])]
+    {
+        for c in order {
+            results.extend([(name, column(&|l| quads[index[l] as usize], c)); 2]);
+        }
     }
     results
 }

@@ -7,7 +7,7 @@
 use super::group::{Group, PointRows, Sides};
 use super::kernels::{Pass, Table};
 use crate::model::contact::Contact;
-use crate::parallel::lanes::{LANES, Lanes};
+use crate::parallel::lanes::{WIDE, Wide};
 use crate::parallel::shared::Shared;
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub(crate) const COLUMNS: usize = 2;
 pub(crate) type Each<T> = [T; COLUMNS];
 
 /// The contacts of a group, lane by lane, in canonical order, or [`NO_CONTACT`].
-pub(crate) type Members = [u32; LANES];
+pub(crate) type Members = [u32; WIDE];
 
 /// Marks a lane without a contact.
 pub(crate) const NO_CONTACT: u32 = u32::MAX;
@@ -114,7 +114,7 @@ impl<'a> Slices<'a> {
 
     /// One pass over all of them.
     #[inline(always)]
-    pub(crate) fn pass<V: Lanes>(self, pass: impl Pass, bodies: Table<'_>) {
+    pub(crate) fn pass<V: Wide>(self, pass: impl Pass, bodies: Table<'_>) {
         for group in self.single {
             pass.group::<V, 1>(group, bodies);
         }

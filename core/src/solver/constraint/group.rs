@@ -2,11 +2,11 @@
 
 use super::groups::Answer;
 use crate::model::math::max;
-use crate::parallel::lanes::{LANES, Quad, Row};
+use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
 /// Eight contacts of `N` points each that share no moving body. All rows are mass-weighted.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct Group<const N: usize> {
     pub(crate) sides: Sides,
     pub(crate) points: [PointRows; N],
@@ -14,48 +14,48 @@ pub(crate) struct Group<const N: usize> {
 
 /// What the points of a contact have in common, of eight contacts.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct Sides {
     /// Bodies, as places in their batch; that of its slice's static in a lane without a contact.
-    pub(crate) a: [u32; LANES],
-    pub(crate) b: [u32; LANES],
+    pub(crate) a: [u32; WIDE],
+    pub(crate) b: [u32; WIDE],
     /// The normal, times the root of the inverse mass of A and of B.
-    pub(crate) normal_ax: Row,
-    pub(crate) normal_ay: Row,
-    pub(crate) normal_bx: Row,
-    pub(crate) normal_by: Row,
-    pub(crate) friction: Row,
+    pub(crate) normal_ax: WideRow,
+    pub(crate) normal_ay: WideRow,
+    pub(crate) normal_bx: WideRow,
+    pub(crate) normal_by: WideRow,
+    pub(crate) friction: WideRow,
     /// One for a contact with a static, else zero.
-    pub(crate) fixed: Row,
+    pub(crate) fixed: WideRow,
 }
 
 /// One point of eight contacts.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct PointRows {
     /// Moment arms of the normal and the tangent about A and B, times the root of the inverse inertia.
-    pub(crate) normal_a: Row,
-    pub(crate) normal_b: Row,
-    pub(crate) tangent_a: Row,
-    pub(crate) tangent_b: Row,
+    pub(crate) normal_a: WideRow,
+    pub(crate) normal_b: WideRow,
+    pub(crate) tangent_a: WideRow,
+    pub(crate) tangent_b: WideRow,
     /// The anchor's length along the normal, from A and from B: what turning further shortens. Zero for a round body.
-    pub(crate) depth_a: Row,
-    pub(crate) depth_b: Row,
+    pub(crate) depth_a: WideRow,
+    pub(crate) depth_b: WideRow,
     /// Effective masses.
-    pub(crate) normal_mass: Row,
-    pub(crate) tangent_mass: Row,
+    pub(crate) normal_mass: WideRow,
+    pub(crate) tangent_mass: WideRow,
     /// Separation at the beginning of the step, and now.
-    pub(crate) first_separation: Row,
-    pub(crate) separation: Row,
+    pub(crate) first_separation: WideRow,
+    pub(crate) separation: WideRow,
     /// Accumulated impulses of the substep.
-    pub(crate) normal_impulse: Row,
-    pub(crate) tangent_impulse: Row,
+    pub(crate) normal_impulse: WideRow,
+    pub(crate) tangent_impulse: WideRow,
     /// Their sums over the step's substeps, kept only where somebody asks.
-    pub(crate) total_normal: Row,
-    pub(crate) total_tangent: Row,
+    pub(crate) total_normal: WideRow,
+    pub(crate) total_tangent: WideRow,
 }
 
-const ZERO: Row = [0.0; LANES];
+const ZERO: WideRow = [0.0; WIDE];
 
 impl PointRows {
     const EMPTY: Self = Self {
@@ -88,8 +88,8 @@ fn along(row: [f32; 3], v: Quad) -> f32 {
 /// One lane alone. Bodies are given as those of the batch.
 impl Sides {
     const EMPTY: Self = Self {
-        a: [0; LANES],
-        b: [0; LANES],
+        a: [0; WIDE],
+        b: [0; WIDE],
         normal_ax: ZERO,
         normal_ay: ZERO,
         normal_bx: ZERO,

@@ -1,7 +1,7 @@
 //! What the passes of both solvers do to a group of contacts, eight lanes at a time.
 
 use super::group::{Group, PointRows, Sides};
-use crate::parallel::lanes::{Lanes, Quad, Row};
+use crate::parallel::lanes::{Quad, Wide, WideRow};
 use std::cell::Cell;
 
 /// The bodies of a batch, as the contacts of one color see them: each lane reads and writes bodies of its own.
@@ -13,7 +13,7 @@ pub(crate) struct Table<'a> {
 
 /// What is done to one group of contacts.
 pub(crate) trait Pass: Copy {
-    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>);
+    fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>);
 }
 
 /// A direction at one point of eight contacts: how an impulse along it moves both bodies, and how their motion shows in
@@ -27,7 +27,7 @@ pub(crate) struct Axis<V> {
     bw: V,
 }
 
-impl<V: Lanes> Axis<V> {
+impl<V: Wide> Axis<V> {
     #[inline(always)]
     pub(crate) fn speed(&self, a: &[V; 4], b: &[V; 4]) -> V {
         let on_b = self.bx.mul(b[0]).add(self.by.mul(b[1])).add(self.bw.mul(b[2]));
@@ -64,7 +64,7 @@ pub(crate) struct Normals<V> {
     by: V,
 }
 
-impl<V: Lanes> Normals<V> {
+impl<V: Wide> Normals<V> {
     #[inline(always)]
     pub(crate) fn load(sides: &Sides) -> Self {
         Self {
@@ -90,7 +90,7 @@ impl<V: Lanes> Normals<V> {
     }
 }
 
-impl<V: Lanes> Normals<V> {
+impl<V: Wide> Normals<V> {
     /// Takes the separations that bodies have moved to.
     #[inline(always)]
     pub(crate) fn part<const N: usize>(&self, points: &mut [PointRows; N], pose_a: &[V; 4], pose_b: &[V; 4]) {
@@ -161,7 +161,7 @@ impl<V: Lanes> Normals<V> {
 impl PointRows {
     /// Adds the impulses of a substep to those of the step.
     #[inline(always)]
-    pub(crate) fn add_to_totals<V: Lanes>(&mut self) {
+    pub(crate) fn add_to_totals<V: Wide>(&mut self) {
         V::load(&self.total_normal).add(V::load(&self.normal_impulse)).store(&mut self.total_normal);
         V::load(&self.total_tangent).add(V::load(&self.tangent_impulse)).store(&mut self.total_tangent);
     }
@@ -169,19 +169,19 @@ impl PointRows {
 
 /// An impulse if it presses, else none. One that cannot be computed, as speeds overflow, stays so: the step then fails.
 #[inline(always)]
-pub(crate) fn pressing<V: Lanes>(impulse: V) -> V {
+pub(crate) fn pressing<V: Wide>(impulse: V) -> V {
     V::splat(0.0).max(impulse)
 }
 
 /// An impulse, but no more than this either way.
 #[inline(always)]
-fn within<V: Lanes>(impulse: V, most: V) -> V {
+fn within<V: Wide>(impulse: V, most: V) -> V {
     impulse.min(most).max(V::splat(0.0).sub(most))
 }
 
 /// Adds to an accumulated impulse and returns what was added.
 #[inline(always)]
-pub(crate) fn accumulate<V: Lanes>(row: &mut Row, old: V, new: V) -> V {
+pub(crate) fn accumulate<V: Wide>(row: &mut WideRow, old: V, new: V) -> V {
     new.store(row);
     new.sub(old)
 }
@@ -192,7 +192,7 @@ pub(crate) struct WarmStart;
 
 impl Pass for WarmStart {
     #[inline(always)]
-    fn group<V: Lanes, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
+    fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
         let normals = Normals::<V>::load(&group.sides);

@@ -3,7 +3,7 @@
 use super::columns::{COLUMNS, Color, Each, NO_CONTACT, column_of};
 use super::groups::{Groups, Lane};
 use crate::model::contact::Contact;
-use crate::parallel::lanes::LANES;
+use crate::parallel::lanes::WIDE;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::coloring::{COLORS, Coloring};
 
@@ -49,11 +49,11 @@ impl Groups {
             self.colors.push(Color { groups: std::array::from_fn(|column| begin[column]..end[column]), slices });
         };
         for (next, count) in next.iter_mut().zip(&counts).filter(|(_, count)| any(count)) {
-            *next = end.map(|groups| groups * LANES);
-            color(count.map(|contacts| contacts.div_ceil(LANES)), &mut end);
+            *next = end.map(|groups| groups * WIDE);
+            color(count.map(|contacts| contacts.div_ceil(WIDE)), &mut end);
         }
         // What overflows: a group, and a color, for each.
-        let mut overflow = end.map(|groups| groups * LANES);
+        let mut overflow = end.map(|groups| groups * WIDE);
         if any(&counts[COLORS]) {
             for (&contact, _) in own.iter().zip(colors).filter(|&(_, &color)| color as usize == COLORS) {
                 let mut groups = [0; COLUMNS];
@@ -62,16 +62,16 @@ impl Groups {
             }
         }
         for (column, members) in self.members.iter_mut().enumerate() {
-            members.resize(first[column] + end[column], [NO_CONTACT; LANES]);
+            members.resize(first[column] + end[column], [NO_CONTACT; WIDE]);
             batch.groups[column] = first[column]..members.len();
         }
         for (&contact, &color) in own.iter().zip(colors) {
             let column = column_of(contact);
             let (next, step) = match next.get_mut(color as usize) {
                 Some(next) => (&mut next[column], 1),
-                None => (&mut overflow[column], LANES),
+                None => (&mut overflow[column], WIDE),
             };
-            let (lane, group) = (*next % LANES, first[column] + *next / LANES);
+            let (lane, group) = (*next % WIDE, first[column] + *next / WIDE);
             *next += step;
             self.members[column][group][lane] = contact;
             self.lanes[contact as usize] = Lane::new(column, group, lane, batch.bodies.start);

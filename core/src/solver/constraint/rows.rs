@@ -5,7 +5,7 @@ use super::group::Group;
 use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::contact::{Contact, ContactPoint};
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
+use crate::parallel::lanes::{Kernel, Lanes, Quad, WIDE, Wide, WideRow};
 use crate::parallel::team::Team;
 use crate::parallel::vectors::Vectors;
 use crate::solver::batches::{Batch, Batches};
@@ -43,7 +43,7 @@ impl Kernel for Write<'_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Unit { groups, members, local } = self.unit;
-        groups.visit(members, &WriteRows::<V> { source: self.source, local, lanes: PhantomData });
+        groups.visit(members, &WriteRows::<V::Wide> { source: self.source, local, lanes: PhantomData });
     }
 }
 
@@ -54,7 +54,7 @@ struct WriteRows<'a, V> {
     lanes: PhantomData<V>,
 }
 
-impl<V: Lanes> Visitor for WriteRows<'_, V> {
+impl<V: Wide> Visitor for WriteRows<'_, V> {
     #[inline(always)]
     fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members) {
         write::<V, N>(group, &Inputs::collect(members, self.source, self.local));
@@ -77,19 +77,19 @@ impl Local {
 
 /// What the rows of eight contacts follow from; in a lane without one all zero, between its slice's static and itself.
 struct Inputs {
-    a: [u32; LANES],
-    b: [u32; LANES],
+    a: [u32; WIDE],
+    b: [u32; WIDE],
     /// The contacts, four numbers at a time; see [`Numbers`].
-    contact: [[Quad; LANES]; QUADS],
-    separation: [Row; 2],
+    contact: [[Quad; WIDE]; QUADS],
+    separation: [WideRow; 2],
     /// Roots of the masses of both bodies, as the solver has them.
-    weight_a: [Quad; LANES],
-    weight_b: [Quad; LANES],
-    friction_a: Row,
-    friction_b: Row,
+    weight_a: [Quad; WIDE],
+    weight_b: [Quad; WIDE],
+    friction_a: WideRow,
+    friction_b: WideRow,
     /// One for a shape that changes as it turns, zero for a round one.
-    not_round_a: Row,
-    not_round_b: Row,
+    not_round_a: WideRow,
+    not_round_b: WideRow,
 }
 
 /// A contact in fours.
@@ -98,9 +98,9 @@ const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
 /// The numbers of eight contacts, by where they lie in a [`Contact`].
 struct Numbers<V>([[V; 4]; QUADS]);
 
-impl<V: Lanes> Numbers<V> {
+impl<V: Wide> Numbers<V> {
     #[inline(always)]
-    fn load(contacts: &[[Quad; LANES]; QUADS]) -> Self {
+    fn load(contacts: &[[Quad; WIDE]; QUADS]) -> Self {
         let [a, b, c, d, e] = contacts;
         Self([V::load_quads(a), V::load_quads(b), V::load_quads(c), V::load_quads(d), V::load_quads(e)])
     }
@@ -130,11 +130,11 @@ impl<V: Lanes> Numbers<V> {
 impl Inputs {
     #[inline(always)]
     fn collect(members: &Members, source: Source<'_>, local: Local) -> Self {
-        const NONE: [Quad; LANES] = [[0.0; 4]; LANES];
-        const ZERO: Row = [0.0; LANES];
+        const NONE: [Quad; WIDE] = [[0.0; 4]; WIDE];
+        const ZERO: WideRow = [0.0; WIDE];
         let mut inputs = Self {
-            a: [local.slice; LANES],
-            b: [local.slice; LANES],
+            a: [local.slice; WIDE],
+            b: [local.slice; WIDE],
             contact: [NONE; QUADS],
             separation: [ZERO; 2],
             weight_a: NONE,
@@ -170,7 +170,7 @@ impl Inputs {
 }
 
 #[inline(always)]
-fn write<V: Lanes, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
+fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let (zero, half, one) = (V::splat(0.0), V::splat(0.5), V::splat(1.0));
     let contact = Numbers::<V>::load(&inputs.contact);
     let [_, _, root_a, root_mass_a] = V::load_quads(&inputs.weight_a);
