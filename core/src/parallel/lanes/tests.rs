@@ -121,11 +121,9 @@ fn both<W: Wide>(of: &Everything<'_>, results: &mut Results) {
     let [p, q, r, s] = W::gather(cells, &index);
     [p, q, r, s].into_iter().for_each(|column| note("wide gather", column));
     W::scatter([q, p, s, r], cells, &index);
-    for column in 0..4 {
-        for half in index.as_chunks::<LANES>().0 {
-            results.push(("wide scatter", half.map(|i| quads[i as usize][column])));
-        }
-    }
+    let halves = index.as_chunks::<LANES>().0;
+    let scattered = (0..4).flat_map(|column| halves.iter().map(move |half| (half, column)));
+    results.extend(scattered.map(|(half, column)| ("wide scatter", half.map(|i| quads[i as usize][column]))));
 }
 
 /// The same on plain numbers.
@@ -190,7 +188,7 @@ fn compare(results: Results, expected: &Results, lanes: &str) {
             assert!(
                 row[lane].to_bits() == right[lane].to_bits(),
                 "`{name}` of the {lanes} lanes gives {:?} in lane {lane}, where plain numbers give {:?}: mend it in \
-                 core/src/parallel/lanes.rs. Every lane does what plain f32 does, bit for bit; so machines agree.",
+                 core/src/parallel/lanes/. Every lane does what plain f32 does, bit for bit; so machines agree.",
                 row[lane],
                 right[lane]
             );

@@ -1,4 +1,4 @@
-//! Groups: eight contacts side by side, one in each lane.
+//! Groups: sixteen contacts side by side, one in each lane.
 
 use super::groups::Answer;
 use crate::model::math::max;
@@ -12,7 +12,7 @@ pub(crate) struct Group<const N: usize> {
     pub(crate) points: [PointRows; N],
 }
 
-/// What the points of a contact have in common, of eight contacts.
+/// What the points of a contact have in common, of sixteen contacts.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Sides {
@@ -29,7 +29,7 @@ pub(crate) struct Sides {
     pub(crate) fixed: WideRow,
 }
 
-/// One point of eight contacts.
+/// One point of sixteen contacts.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct PointRows {

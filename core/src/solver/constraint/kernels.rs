@@ -1,4 +1,4 @@
-//! What the passes of both solvers do to a group of contacts, eight lanes at a time.
+//! What the passes of both solvers do to a group of contacts, sixteen lanes at a time.
 
 use super::group::{Group, PointRows, Sides};
 use crate::parallel::lanes::{Quad, Wide, WideRow};
@@ -16,7 +16,7 @@ pub(crate) trait Pass: Copy {
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>);
 }
 
-/// A direction at one point of eight contacts: how an impulse along it moves both bodies, and how their motion shows in
+/// A direction at one point of sixteen contacts: how an impulse along it moves both bodies, and how their motion shows in
 /// it.
 pub(crate) struct Axis<V> {
     ax: V,

@@ -1,8 +1,8 @@
-//! Constraints between two bodies, laid out for vectors: groups of eight, their rows, and what a pass does to a group.
+//! Constraints between two bodies, laid out for vectors: groups of sixteen, their rows, and what a pass does to a group.
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `group.rs` | eight contacts side by side; one of them alone |
+//! | `group.rs` | sixteen contacts side by side; one of them alone |
 //! | `columns.rs` | one column of groups for each kind of constraint |
 //! | `layout.rs` | in which group and lane each contact goes |
 //! | `rows.rs` | how rows are made of contacts |

@@ -75,7 +75,7 @@ impl Local {
     }
 }
 
-/// What the rows of eight contacts follow from; in a lane without one all zero, between its slice's static and itself.
+/// What the rows of sixteen contacts follow from; in a lane without one all zero, between its slice's static and itself.
 struct Inputs {
     a: [u32; WIDE],
     b: [u32; WIDE],
@@ -95,7 +95,7 @@ struct Inputs {
 /// A contact in fours.
 const QUADS: usize = size_of::<Contact>() / size_of::<Quad>();
 
-/// The numbers of eight contacts, by where they lie in a [`Contact`].
+/// The numbers of sixteen contacts, by where they lie in a [`Contact`].
 struct Numbers<V>([[V; 4]; QUADS]);
 
 impl<V: Wide> Numbers<V> {
