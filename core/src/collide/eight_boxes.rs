@@ -4,7 +4,8 @@
 //! Where speeds overflow, it says so, and leaves the pair to those.
 
 use super::cull::passes;
-use super::eight_pairs::{Eight, EightPairs, TOUCHING};
+use super::eight_pairs::{Eight, EightPairs, Outlook, TOUCHING};
+use super::eight_touches::both;
 use super::manifold::box_box::PREFERENCE;
 use super::touch::{DEEP, NEAR, ROUNDS};
 use crate::model::contact::{Contact, ContactPoint};
@@ -51,6 +52,11 @@ fn negated<V: Lanes>(x: V) -> V {
     V::splat(-0.0).sub(x)
 }
 
+#[inline(always)]
+fn opposite<V: Lanes>(v: Vectors<V>) -> Vectors<V> {
+    Vectors::new(negated(v.x), negated(v.y))
+}
+
 /// Minus one for what is less than zero, else one.
 #[inline(always)]
 fn sign<V: Lanes>(x: V) -> V {
@@ -77,18 +83,14 @@ impl<V: Lanes> Moments<V> {
     /// `yes` where a number is positive, else `no`.
     #[inline(always)]
     fn pick(positive: V, yes: &Self, no: &Self) -> Self {
-        let vectors = Vectors::pick;
         Self {
             time: positive.if_positive(yes.time, no.time),
-            offset: vectors(positive, yes.offset, no.offset),
-            turning: [
-                vectors(positive, yes.turning[0], no.turning[0]),
-                vectors(positive, yes.turning[1], no.turning[1]),
-            ],
+            offset: Vectors::pick(positive, yes.offset, no.offset),
+            turning: both(positive, &yes.turning, &no.turning),
             some: positive.if_positive(yes.some, no.some),
             two: positive.if_positive(yes.two, no.two),
-            normal: vectors(positive, yes.normal, no.normal),
-            anchor: [vectors(positive, yes.anchor[0], no.anchor[0]), vectors(positive, yes.anchor[1], no.anchor[1])],
+            normal: Vectors::pick(positive, yes.normal, no.normal),
+            anchor: both(positive, &yes.anchor, &no.anchor),
             separation: [
                 positive.if_positive(yes.separation[0], no.separation[0]),
                 positive.if_positive(yes.separation[1], no.separation[1]),
@@ -109,12 +111,11 @@ impl<V: Lanes> Moments<V> {
     }
 }
 
-impl EightPairs {
-    /// Tells of all lanes, also of those that were not set.
+impl Outlook for BoxOutlook {
     #[inline(always)]
-    pub(super) fn look_at_boxes<V: Lanes>(&self, setup: &Setup, outlook: &mut BoxOutlook) {
+    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup) {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
-        let (eight, fixed) = (self.eight::<V>(setup), V::load(&self.fixed));
+        let (eight, fixed) = (pairs.eight::<V>(setup), V::load(&pairs.fixed));
         let (dt, speculative) = (eight.dt, V::splat(setup.params.speculative_distance));
         let far = eight.far();
         let reach = speculative.add(far);
@@ -140,19 +141,51 @@ impl EightPairs {
             let closing = eight.closing(anchor, at.offset, at.normal).max(zero);
             let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
-            less(separation, speculative.add(ahead)).mul(there).store(&mut outlook.holds[point]);
+            less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
             let on_a = eight.swing(0, at.turning[0], anchor, at.normal);
             let on_b = eight.swing(1, at.turning[1], anchor.minus(at.offset), at.normal);
             let before = separation.sub(moved.add(on_b.sub(on_a)));
             let now = at.time.if_positive(before, separation);
-            V::store_quads([anchor.x, anchor.y, separation, now], &mut outlook.points[point]);
-            at.feature[point].store(&mut outlook.feature[point]);
+            V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
+            at.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment.
-        less(far, V::splat(0.125 * f32::MAX)).if_positive(zero, one).store(&mut outlook.unsure);
+        less(far, V::splat(0.125 * f32::MAX)).if_positive(zero, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(eight.rotation[0]), at.turning[1].rotate(eight.rotation[1])];
-        V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut outlook.frames);
-        V::store_quads([a.x, a.y, b.x, b.y], &mut outlook.rotations);
+        V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
+        V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
+    }
+
+    #[inline(always)]
+    fn is_unsure(&self, lane: usize) -> bool {
+        self.unsure[lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn meets(&self, lane: usize) -> bool {
+        self.holds[0][lane] + self.holds[1][lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
+        // Of two points it may be the second alone that holds.
+        let first = usize::from(self.holds[0][lane] == 0.0);
+        let (mut contact, mut now) = (
+            Contact {
+                normal: Vec2::new(nx, ny),
+                offset: Vec2::new(x, y),
+                rotation_a: Rot { c: ca, s: sa },
+                rotation_b: Rot { c: cb, s: sb },
+                points: [self.point(lane, first, known), ContactPoint::NONE],
+            },
+            [self.points[first][lane][3], 0.0],
+        );
+        if first == 0 && self.holds[1][lane] > 0.0 {
+            contact.points[1] = self.point(lane, 1, known);
+            now[1] = self.points[1][lane][3];
+        }
+        (contact, now)
     }
 }
 
@@ -180,7 +213,7 @@ impl<V: Lanes> Eight<V> {
         let reference = Vectors::pick(from_b, self.half[1], self.half[0]);
         let incident = Vectors::pick(from_b, self.half[0], self.half[1]);
         let turn = Vectors::new(turn.x, from_b.if_positive(negated(turn.y), turn.y));
-        let center = Vectors::pick(from_b, Vectors::new(negated(in_b.x), negated(in_b.y)), in_a);
+        let center = Vectors::pick(from_b, opposite(in_b), in_a);
         let along = Vectors::pick(from_b, along_b, along_a);
         // The reference face, and a frame of normal `n` and tangent `t`, both along the axes.
         let by_x = less(along.y, along.x);
@@ -249,7 +282,7 @@ impl<V: Lanes> Eight<V> {
         // Back to the frame of the world, and of body A.
         let back = Vectors::pick(from_b, rotation[1], rotation[0]);
         let normal = back.rotate(at.normal);
-        at.normal = Vectors::pick(from_b, Vectors::new(negated(normal.x), negated(normal.y)), normal);
+        at.normal = Vectors::pick(from_b, opposite(normal), normal);
         for anchor in &mut at.anchor {
             let from_center = back.rotate(*anchor);
             *anchor = Vectors::pick(from_b, offset.plus(from_center), from_center);
@@ -302,41 +335,6 @@ impl<V: Lanes> Eight<V> {
 }
 
 impl BoxOutlook {
-    /// Whether it cannot be told here if a pair makes a contact.
-    #[inline(always)]
-    pub(super) fn is_unsure(&self, lane: usize) -> bool {
-        self.unsure[lane] > 0.0
-    }
-
-    /// Whether a pair makes a contact.
-    #[inline(always)]
-    pub(super) fn meets(&self, lane: usize) -> bool {
-        self.holds[0][lane] + self.holds[1][lane] > 0.0
-    }
-
-    /// The contact of a pair that makes one, with the impulses of the last one, and the separation of its points now.
-    #[inline(always)]
-    pub(super) fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
-        let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
-        // Of two points it may be the second alone that holds.
-        let first = usize::from(self.holds[0][lane] == 0.0);
-        let (mut contact, mut now) = (
-            Contact {
-                normal: Vec2::new(nx, ny),
-                offset: Vec2::new(x, y),
-                rotation_a: Rot { c: ca, s: sa },
-                rotation_b: Rot { c: cb, s: sb },
-                points: [self.point(lane, first, known), ContactPoint::NONE],
-            },
-            [self.points[first][lane][3], 0.0],
-        );
-        if first == 0 && self.holds[1][lane] > 0.0 {
-            contact.points[1] = self.point(lane, 1, known);
-            now[1] = self.points[1][lane][3];
-        }
-        (contact, now)
-    }
-
     #[inline(always)]
     fn point(&self, lane: usize, point: usize, known: Option<&Contact>) -> ContactPoint {
         let [x, y, separation, _] = self.points[point][lane];

@@ -4,7 +4,7 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::eight_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
-use crate::model::math::{Rot, side_by_side};
+use crate::model::math::Rot;
 use crate::parallel::lanes::{LANES, Lanes, Quad, Row};
 use crate::parallel::vectors::{Vectors, absolute, any};
 use crate::tiling::blueprint::Setup;
@@ -34,9 +34,24 @@ pub(super) struct EightPairs {
     kind_b: [Quad; LANES],
 }
 
-/// What can be said of them.
+/// What can be said of eight pairs of some kind.
+pub(super) trait Outlook: Default {
+    /// Tells of all lanes, also of those that were not set.
+    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup);
+
+    /// Whether it cannot be told here if a pair makes a contact.
+    fn is_unsure(&self, lane: usize) -> bool;
+
+    /// Whether a pair makes a contact.
+    fn meets(&self, lane: usize) -> bool;
+
+    /// The contact of a pair, if it makes one, with the impulses of the last one, and the separation of its points now.
+    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]);
+}
+
+/// What can be said of pairs with a round body.
 #[derive(Default, Debug)]
-pub(super) struct Outlook {
+pub(super) struct RoundOutlook {
     /// Positive if they make a contact, of which the others tell.
     meets: Row,
     /// Positive if that cannot be told here.
@@ -51,7 +66,7 @@ impl EightPairs {
     #[inline(always)]
     pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, is_known: bool, setup: &Setup) {
         let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
-        let moves = |i: usize| side_by_side(bodies.velocity[i], bodies.rotation[i]);
+        let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
         self.a[lane] = moves(a);
         self.b[lane] = moves(b);
@@ -80,30 +95,6 @@ impl EightPairs {
             spin: [w_a, w_b],
             dt: V::splat(setup.params.dt),
         }
-    }
-
-    /// Tells of all lanes, also of those that were not set.
-    #[inline(always)]
-    pub(super) fn look<V: Lanes>(&self, setup: &Setup, outlook: &mut Outlook) {
-        let (eight, zero) = (self.eight::<V>(setup), V::splat(0.0));
-        let is_slow = V::splat(setup.params.speculative_distance).sub(eight.far());
-        let known = is_slow.if_positive(V::load(&self.known), zero);
-        // No closures here: they might be compiled without the lanes' instructions.
-        let (one, mut others) = (V::splat(1.0), V::splat(1.0));
-        let mut touches = Touches::none();
-        if any(known) {
-            touches = eight.roll();
-            others = known.if_positive(touches.meets, zero).if_positive(zero, one);
-        }
-        if any(others) {
-            touches = Touches::pick(others, &eight.touch(V::load(&self.fixed), setup), &touches);
-        }
-        touches.meets.store(&mut outlook.meets);
-        touches.unsure.store(&mut outlook.unsure);
-        let Touches { normal, offset, rotation: [a, b], anchor, separation, now, .. } = touches;
-        V::store_quads([normal.x, normal.y, offset.x, offset.y], &mut outlook.frames);
-        V::store_quads([a.x, a.y, b.x, b.y], &mut outlook.rotations);
-        V::store_quads([anchor.x, anchor.y, separation, now], &mut outlook.points);
     }
 }
 
@@ -192,22 +183,42 @@ impl<V: Lanes> Eight<V> {
     }
 }
 
-impl Outlook {
-    /// Whether it cannot be told here if a pair makes a contact.
+impl Outlook for RoundOutlook {
     #[inline(always)]
-    pub(super) fn is_unsure(&self, lane: usize) -> bool {
+    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup) {
+        let (eight, zero) = (pairs.eight::<V>(setup), V::splat(0.0));
+        let is_slow = V::splat(setup.params.speculative_distance).sub(eight.far());
+        let known = is_slow.if_positive(V::load(&pairs.known), zero);
+        // No closures here: they might be compiled without the lanes' instructions.
+        let (one, mut others) = (V::splat(1.0), V::splat(1.0));
+        let mut touches = Touches::none();
+        if any(known) {
+            touches = eight.roll();
+            others = known.if_positive(touches.meets, zero).if_positive(zero, one);
+        }
+        if any(others) {
+            touches = Touches::pick(others, &eight.touch(V::load(&pairs.fixed), setup), &touches);
+        }
+        touches.meets.store(&mut self.meets);
+        touches.unsure.store(&mut self.unsure);
+        let Touches { normal, offset, rotation: [a, b], anchor, separation, now, .. } = touches;
+        V::store_quads([normal.x, normal.y, offset.x, offset.y], &mut self.frames);
+        V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
+        V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points);
+    }
+
+    #[inline(always)]
+    fn is_unsure(&self, lane: usize) -> bool {
         self.unsure[lane] > 0.0
     }
 
-    /// Whether a pair makes a contact.
     #[inline(always)]
-    pub(super) fn meets(&self, lane: usize) -> bool {
+    fn meets(&self, lane: usize) -> bool {
         self.meets[lane] > 0.0
     }
 
-    /// The contact of a pair, with the impulses of the last one, and the separation of its points now.
     #[inline(always)]
-    pub(super) fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
         let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
         let [anchor_x, anchor_y, separation, now] = self.points[lane];
         let (normal_impulse, tangent_impulse) =
@@ -252,15 +263,15 @@ mod tests {
         type Output = Option<Option<(Contact, [f32; 2])>>;
         fn run<V: Lanes>(self) -> Self::Output {
             let Self(eight, setup) = self;
-            let (mut round, mut boxes) = (Outlook::default(), BoxOutlook::default());
-            if [eight.kind_a, eight.kind_b].iter().all(|kind| kind[LANE][0] > 0.0) {
-                eight.look_at_boxes::<V>(setup, &mut boxes);
-                (!boxes.is_unsure(LANE)).then(|| boxes.meets(LANE).then(|| boxes.contact(LANE, None)))
-            } else {
-                eight.look::<V>(setup, &mut round);
-                (!round.is_unsure(LANE)).then(|| round.meets(LANE).then(|| round.contact(LANE, None)))
-            }
+            let are_boxes = [eight.kind_a, eight.kind_b].iter().all(|kind| kind[LANE][0] > 0.0);
+            if are_boxes { told::<V, BoxOutlook>(eight, setup) } else { told::<V, RoundOutlook>(eight, setup) }
         }
+    }
+
+    fn told<V: Lanes, O: Outlook>(eight: &EightPairs, setup: &Setup) -> Option<Option<(Contact, [f32; 2])>> {
+        let mut outlook = O::default();
+        outlook.look::<V>(eight, setup);
+        (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, None)))
     }
 
     proptest! {

@@ -44,7 +44,7 @@ pub(super) struct Touches<V> {
 
 /// `yes` where a number is positive, else `no`, for the bodies A and B.
 #[inline(always)]
-fn both<V: Lanes>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
+pub(super) fn both<V: Lanes>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
     [Vectors::pick(positive, yes[0], no[0]), Vectors::pick(positive, yes[1], no[1])]
 }
 

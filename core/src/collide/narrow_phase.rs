@@ -3,7 +3,7 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
 use crate::collide::eight_boxes::BoxOutlook;
-use crate::collide::eight_pairs::{EightPairs, Outlook};
+use crate::collide::eight_pairs::{EightPairs, Outlook, RoundOutlook};
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
@@ -148,8 +148,8 @@ struct Named<'a> {
 /// So many pairs are sorted by kinds at a time.
 const BLOCK: usize = 256;
 
-/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes; and of each those that had no contact in the last step
-/// before, and those that had one after: as most of these touch already, and most of those do not.
+/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes. Of each kind there are two lists: first those that had
+/// no contact in the last step, most of whom do not touch yet, then those that had one, most of whom do.
 struct Lists {
     /// Places in the block.
     places: [[u8; BLOCK]; LISTS],
@@ -196,7 +196,7 @@ struct Block<'a> {
 }
 
 /// What comes of a pair.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 enum Outcome {
     Nothing,
     /// The contact that is known, as it is.
@@ -222,10 +222,10 @@ impl Kernel for FindAmong<'_> {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
             for list in 0..NEW_BOXES {
-                block.find_round::<V>(lists.get(list), tile, setup);
+                block.find::<V, RoundOutlook>(lists.get(list), tile, setup);
             }
             block.keep_known(&mut lists, tile, setup);
-            block.find_boxes::<V>(lists.get(NEW_BOXES), tile, setup);
+            block.find::<V, BoxOutlook>(lists.get(NEW_BOXES), tile, setup);
             for i in 0..pairs.len() {
                 let Named { key, bodies, known } = block.named[i];
                 let contact = match (block.outcome[i], known) {
@@ -242,21 +242,28 @@ impl Kernel for FindAmong<'_> {
 }
 
 impl Block<'_> {
-    /// Finds the contacts of pairs with a round body.
+    /// Finds the contacts of pairs of one kind.
     #[inline(always)]
-    fn find_round<V: Lanes>(&mut self, round: &[u8], tile: &Tile, setup: &Setup) {
-        let (mut eight, mut outlook) = (EightPairs::default(), Outlook::default());
-        for places in round.chunks(LANES) {
-            self.load(&mut eight, places, tile, setup);
-            eight.look::<V>(setup, &mut outlook);
+    fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {
+        let (mut eight, mut outlook) = (EightPairs::default(), O::default());
+        for places in list.chunks(LANES) {
+            for lane in 0..LANES {
+                // In lanes that are left over, the first of them again.
+                let place = *places.get(lane).unwrap_or(&places[0]);
+                let Named { bodies, known, .. } = self.named[usize::from(place)];
+                eight.set(lane, tile, bodies, known.is_some(), setup);
+            }
+            outlook.look::<V>(&eight, setup);
             for (lane, &place) in places.iter().enumerate() {
                 let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
+                // What there is no contact of is written down as well: a branch would be a coin toss.
+                let (mut meets, mut found) = (outlook.meets(lane), outlook.contact(lane, known));
                 if outlook.is_unsure(lane) {
-                    self.keep(place, touch(tile, bodies, known, setup));
-                } else {
-                    self.outcome[place] = if outlook.meets(lane) { Outcome::Found } else { Outcome::Nothing };
-                    (self.found[place], self.separation[place]) = outlook.contact(lane, known);
+                    let touch = touch(tile, bodies, known, setup);
+                    (meets, found) = (touch.is_some(), touch.unwrap_or(found));
                 }
+                self.outcome[place] = if meets { Outcome::Found } else { Outcome::Nothing };
+                (self.found[place], self.separation[place]) = found;
             }
         }
     }
@@ -275,42 +282,6 @@ impl Block<'_> {
             } else {
                 lists.push(NEW_BOXES, place);
             }
-        }
-    }
-
-    /// Finds the contacts of pairs of boxes.
-    #[inline(always)]
-    fn find_boxes<V: Lanes>(&mut self, boxes: &[u8], tile: &Tile, setup: &Setup) {
-        let (mut eight, mut outlook) = (EightPairs::default(), BoxOutlook::default());
-        for places in boxes.chunks(LANES) {
-            self.load(&mut eight, places, tile, setup);
-            eight.look_at_boxes::<V>(setup, &mut outlook);
-            for (lane, &place) in places.iter().enumerate() {
-                let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
-                if outlook.is_unsure(lane) {
-                    self.keep(place, touch(tile, bodies, known, setup));
-                } else {
-                    self.keep(place, outlook.meets(lane).then(|| outlook.contact(lane, known)));
-                }
-            }
-        }
-    }
-
-    /// Loads up to eight pairs; in lanes that are left over, the first of them again.
-    #[inline(always)]
-    fn load(&self, eight: &mut EightPairs, places: &[u8], tile: &Tile, setup: &Setup) {
-        for lane in 0..LANES {
-            let place = *places.get(lane).unwrap_or(&places[0]);
-            let Named { bodies, known, .. } = self.named[usize::from(place)];
-            eight.set(lane, tile, bodies, known.is_some(), setup);
-        }
-    }
-
-    #[inline(always)]
-    fn keep(&mut self, place: usize, found: Option<(Contact, [f32; 2])>) {
-        self.outcome[place] = if found.is_some() { Outcome::Found } else { Outcome::Nothing };
-        if let Some(found) = found {
-            (self.found[place], self.separation[place]) = found;
         }
     }
 }

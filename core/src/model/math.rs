@@ -70,12 +70,6 @@ impl Rot {
     }
 }
 
-/// Velocity and rotation of a body side by side, as vectors take them in.
-#[inline(always)]
-pub(crate) fn side_by_side(velocity: Vec2, rotation: Rot) -> [f32; 4] {
-    bytemuck::cast([velocity.to_array(), bytemuck::cast(rotation)])
-}
-
 /// Whether this thread computes as IEEE 754 has it by default: subnormal numbers kept, rounding to nearest. A library
 /// loaded into the process may have changed that.
 pub(crate) fn float_mode_is_default() -> bool {

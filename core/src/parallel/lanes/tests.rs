@@ -111,7 +111,7 @@ fn both<W: Wide>(of: &Everything<'_>, results: &mut Results) {
     note("wide min", a.min(b));
     note("wide if_positive", a.if_positive(b, a));
     note("wide splat", W::splat(of.a[2]));
-    // Eighteen places, each of them once at most.
+    // The quads twice over, each named once at most.
     let mut quads: Vec<Quad> = of.quads.iter().chain(of.quads).copied().collect();
     let length = of.quads.len() as u32;
     let index = joined(of.index, &of.index.map(|i| length + i));

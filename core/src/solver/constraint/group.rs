@@ -4,7 +4,7 @@ use super::groups::Answer;
 use crate::model::math::max;
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
-/// Eight contacts of `N` points each that share no moving body. All rows are mass-weighted.
+/// Sixteen contacts of `N` points each that share no moving body. All rows are mass-weighted.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Group<const N: usize> {
