@@ -61,6 +61,8 @@ pub(crate) struct NarrowPhase {
     sorted: Vec<Pair>,
     /// Per body that may be a pair's first where its pairs begin in `sorted`.
     start: Vec<u32>,
+    /// For each body whether its contacts are known by name alone.
+    by_name: Vec<bool>,
     /// What each of several threads finds.
     parts: Vec<Contacts>,
 }
@@ -78,16 +80,17 @@ impl NarrowPhase {
     ) {
         self.cull(tile, proxies, candidates, setup, team);
         self.sort(proxies.pairing);
+        self.mark_newcomers(tile);
         contacts.clear();
-        let sorted = &self.sorted[..];
+        let (sorted, by_name) = (&self.sorted[..], &self.by_name[..]);
         let pieces = team.pieces(sorted.len(), GRAIN);
         if pieces == 1 {
-            return setup.lanes.run(FindAmong { sorted, tile, setup, contacts });
+            return setup.lanes.run(FindAmong { sorted, by_name, tile, setup, contacts });
         }
         self.parts.resize_with(pieces, Contacts::default);
         let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
         team.for_each(parts, |(range, part): (Range<usize>, &mut Contacts)| {
-            setup.lanes.run(FindAmong { sorted: &sorted[range], tile, setup, contacts: part });
+            setup.lanes.run(FindAmong { sorted: &sorted[range], by_name, tile, setup, contacts: part });
         });
         self.parts.iter_mut().for_each(|part| contacts.append(part));
     }
@@ -103,6 +106,14 @@ impl NarrowPhase {
         for pair in &self.near {
             self.start[pair[0] as usize + 2] += 1;
         }
+    }
+
+    fn mark_newcomers(&mut self, tile: &Tile) {
+        self.by_name.clear();
+        self.by_name.resize(tile.owned, false);
+        tile.newcomers.iter().for_each(|&newcomer| self.by_name[newcomer as usize] = true);
+        self.by_name.resize(tile.owned + tile.ghosts(), true);
+        self.by_name.resize(tile.bodies.len(), false);
     }
 
     /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
@@ -131,6 +142,7 @@ impl NarrowPhase {
 /// Appends the contacts among some sorted pairs.
 struct FindAmong<'a> {
     sorted: &'a [Pair],
+    by_name: &'a [bool],
     tile: &'a Tile,
     setup: &'a Setup,
     contacts: &'a mut Contacts,
@@ -209,8 +221,8 @@ impl Kernel for FindAmong<'_> {
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { sorted, tile, setup, contacts } = self;
-        let mut names = Names::new(tile, sorted);
+        let Self { sorted, by_name, tile, setup, contacts } = self;
+        let mut names = Names::new(tile, by_name, sorted);
         let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None };
         let mut block = Block {
             named: [nobody; BLOCK],
@@ -289,14 +301,15 @@ impl Block<'_> {
 /// Names pairs that ascend: one pass over the contacts of the last step serves them all.
 struct Names<'a> {
     tile: &'a Tile,
+    by_name: &'a [bool],
     ghosts: usize,
     /// The first contact of the last step that is not before the pairs so far.
     old: usize,
 }
 
 impl<'a> Names<'a> {
-    fn new(tile: &'a Tile, sorted: &[Pair]) -> Self {
-        let mut names = Self { tile, ghosts: tile.ghosts(), old: 0 };
+    fn new(tile: &'a Tile, by_name: &'a [bool], sorted: &[Pair]) -> Self {
+        let mut names = Self { tile, by_name, ghosts: tile.ghosts(), old: 0 };
         if let Some(&first) = sorted.first() {
             let first = names.key(first);
             names.old = tile.contacts.keys.partition_point(|&key| key < first);
@@ -330,11 +343,10 @@ impl<'a> Names<'a> {
         for ((named, &[low, high]), &known) in named.iter_mut().zip(pairs).zip(&known) {
             let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
             let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
-            let strange = named.key.is_border()
-                || low as usize >= tile.arrived
-                || (high as usize) < tile.owned && high as usize >= tile.arrived;
-            let stray = if strange { tile.strays.find(pair, named.key.is_own()) } else { None };
-            (named.bodies, named.known) = (bodies, stray.or_else(|| tile.contacts.contacts.get(known)));
+            let by_name = self.by_name[low as usize] | self.by_name[high as usize];
+            let known =
+                if by_name { tile.strays.find(pair, named.key.is_own()) } else { tile.contacts.contacts.get(known) };
+            (named.bodies, named.known) = (bodies, known);
         }
     }
 }

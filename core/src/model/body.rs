@@ -143,6 +143,16 @@ impl Bodies {
         self.kind.push(body.kind);
     }
 
+    /// Puts one in the place of another.
+    pub(crate) fn set(&mut self, index: usize, body: Body) {
+        self.id[index] = body.id;
+        self.position[index] = body.position;
+        self.rotation[index] = body.rotation;
+        self.velocity[index] = body.velocity;
+        self.angular_velocity[index] = body.angular_velocity;
+        self.kind[index] = body.kind;
+    }
+
     /// Puts one before the body at `index`.
     pub(crate) fn insert(&mut self, index: usize, body: Body) {
         self.id.insert(index, body.id);
@@ -155,21 +165,6 @@ impl Bodies {
 
     pub(crate) fn truncate(&mut self, length: usize) {
         each_column!(self, column => column.truncate(length));
-    }
-
-    /// Removes the bodies at the given ascending indices; the others keep their order.
-    pub(crate) fn remove_sorted(&mut self, gone: &[u32]) {
-        let Some(&first) = gone.first() else { return };
-        each_column!(self, column => {
-            // What lies between two gaps moves as one block.
-            let mut write = first as usize;
-            for (i, &gap) in gone.iter().enumerate() {
-                let block = gap as usize + 1..gone.get(i + 1).map_or(column.len(), |&next| next as usize);
-                column.copy_within(block.clone(), write);
-                write += block.len();
-            }
-            column.truncate(write);
-        });
     }
 
     /// Reorders the first `order.len()` bodies: the one at `order[i]` comes to `i`. `self` must hold no others.

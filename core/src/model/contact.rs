@@ -129,6 +129,11 @@ impl Slot {
         }
     }
 
+    #[inline(always)]
+    pub(crate) fn is_ghost(self) -> bool {
+        self.0 & Self::GHOST != 0
+    }
+
     /// Back to an index into owned, ghosts and statics, one after the other.
     #[inline(always)]
     pub(crate) fn index(self, owned: usize, ghosts: usize) -> usize {

@@ -27,8 +27,10 @@ pub(crate) struct Tile {
     /// Owned bodies, then ghosts, then statics.
     pub(crate) bodies: Bodies,
     pub(crate) owned: usize,
-    /// Owned bodies from here on came in this step.
-    pub(crate) arrived: usize,
+    /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays. Ascending.
+    pub(crate) newcomers: Vec<u32>,
+    /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
+    pub(crate) gaps: Vec<u32>,
     /// Owned bodies that may concern other tiles, for the next step.
     pub(crate) rim: Rim,
     /// One per ghost: the impulse it is given in every substep.
@@ -37,8 +39,7 @@ pub(crate) struct Tile {
     pub(crate) ghost_owners: Vec<TileId>,
     /// Rows of the setup's statics.
     pub(crate) statics: Vec<u32>,
-    /// What was solved last. Between the two halves of the first sync point: only contacts of bodies that stay owned
-    /// here, or of those and statics.
+    /// What was solved last. From the first sync point on those of newcomers and ghosts mean nothing.
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
     pub(crate) strays: Strays,
@@ -99,7 +100,8 @@ impl Tile {
             corner: setup.grid.corner(id),
             bodies: Bodies::default(),
             owned: 0,
-            arrived: 0,
+            newcomers: Vec::new(),
+            gaps: Vec::new(),
             rim: Rim::default(),
             unseen: Vec::new(),
             ghost_owners: Vec::new(),
@@ -138,6 +140,8 @@ impl Tile {
         self.contacts = ContactCache::default();
         self.strays = Strays::default();
         self.rim = Rim::default();
+        self.newcomers = Vec::new();
+        self.gaps = Vec::new();
         self.unseen = Vec::new();
         self.ghost_owners = Vec::new();
         self.violation = Violation::default();

@@ -1,0 +1,88 @@
+//! Contacts of the last step that concern other tiles.
+
+use super::MigrateWork;
+use crate::exchange::overlap::Outline;
+use crate::exchange::record::ContactRecord;
+use crate::model::contact::{Authority, Slot, SlotKind, Stray};
+use crate::parallel::ahead::fetch;
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+
+/// Contacts are asked for so many before they are read.
+const AHEAD: usize = 8;
+
+/// Sums unseen impulses, finds the contacts of departing bodies, and copies those that cannot be found by slot any more to the
+/// strays.
+pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
+    tile.strays.clear();
+    find_concerned(tile, work);
+    let MigrateWork { mark, border, sends, concerned, contacts, .. } = work;
+    let border_of = |mark: u32| border.get((mark as usize).checked_sub(1)?);
+    for (place, &i) in concerned.iter().enumerate() {
+        if let Some(&next) = concerned.get(place + AHEAD) {
+            fetch(&tile.contacts.contacts, next as usize);
+        }
+        let (key, contact) = (tile.contacts.keys[i as usize], &tile.contacts.contacts[i as usize]);
+        let (low, high, pair) = (key.low(), key.high(), tile.pair_of(key));
+        let SlotKind::Owned(low_index) = low.kind() else {
+            // Of others; they tell each other. Here it serves those who solve it with them.
+            tile.strays.push(Stray { pair, authority: Authority::Overlap, contact: *contact });
+            continue;
+        };
+        let (high_mark, high_owner) = match high.kind() {
+            SlotKind::Owned(index) => (mark[index], Some(tile.id)),
+            SlotKind::Ghost(ghost) => (0, Some(tile.ghost_owners[ghost])),
+            SlotKind::Static(_) => (0, None),
+        };
+        let is_near = |slot: Slot, target| match slot.kind() {
+            // Whoever is no ghost of any tile is near to none.
+            SlotKind::Owned(index) => border_of(mark[index])
+                .is_some_and(|border| Outline::of_rim(&tile.rim.bodies[border.rim as usize]).is_near(target, setup)),
+            // Judged by where it was: what comes of it is put right with the first refresh.
+            SlotKind::Ghost(_) => Outline::of(tile, tile.index(slot), setup).is_near(target, setup),
+            SlotKind::Static(_) => true,
+        };
+        let with_ghost = high_owner.is_some_and(|owner| owner != tile.id);
+        let low_is_a = tile.bodies.id[low_index] == pair.0;
+        let (mut stray, mut heir, mut impulse) = (with_ghost, tile.id, None);
+        let sides = [(mark[low_index], low_is_a, high_owner, high), (high_mark, !low_is_a, Some(tile.id), low)];
+        for (mark, is_a, owner, partner) in sides {
+            let Some(border) = border_of(mark) else { continue };
+            for send in &mut sends[border.first_send as usize..border.end_send as usize] {
+                if owner != Some(send.target) && !(send.near && is_near(partner, send.target)) {
+                    let (linear, on_a, on_b) = *impulse.get_or_insert_with(|| contact.impulse());
+                    if is_a {
+                        send.unseen.add(-linear, on_a);
+                    } else {
+                        send.unseen.add(linear, on_b);
+                    }
+                }
+            }
+            // Both bodies may leave for one tile: one record is enough.
+            if border.owner != tile.id && border.owner != heir {
+                heir = border.owner;
+                let from_owner_of_low = u64::from(low_is_a || !with_ghost);
+                contacts
+                    .push((heir, ContactRecord { low: pair.0, high: pair.1, from_owner_of_low, contact: *contact }));
+            }
+            stray |= border.owner != tile.id;
+        }
+        if stray {
+            tile.strays.push(Stray { pair, authority: Authority::Own, contact: *contact });
+        }
+    }
+}
+
+/// Lists the contacts that have a ghost, or a body near the border. Every one is written down, and counted or not.
+fn find_concerned(tile: &Tile, MigrateWork { mark, concerned, .. }: &mut MigrateWork) {
+    let mark_of = |slot: Slot| mark[slot.index(tile.owned, 0).min(tile.owned)];
+    let is_concerned = |low: Slot, high: Slot| low.is_ghost() | high.is_ghost() | (mark_of(low) | mark_of(high) != 0);
+    concerned.clear();
+    concerned.resize(tile.contacts.len(), 0);
+    let mut count = 0;
+    for (i, key) in (0..).zip(&tile.contacts.keys) {
+        concerned[count] = i;
+        count += usize::from(is_concerned(key.low(), key.high()));
+    }
+    concerned.truncate(count);
+}
