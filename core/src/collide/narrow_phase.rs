@@ -329,6 +329,7 @@ impl<'a> Names<'a> {
         let (tile, mut known) = (self.tile, [NOT_KNOWN; BLOCK]);
         for (named, &pair) in named.iter_mut().zip(pairs) {
             named.key = self.key(pair);
+            // Nobody has asked for names since the last step.
         }
         // Two ascending lists are merged; which of them goes on is not for a branch to foresee.
         let (keys, mut pair, mut old) = (&tile.contacts.keys[..], 0, self.old);

@@ -211,6 +211,7 @@ impl Load<'_> {
         fetch(rotation, AHEAD);
         fetch(angular_velocity, AHEAD);
         fetch(kind, AHEAD);
+        fetch(&self.bodies.id[first..], AHEAD);
         for lane in 0..count {
             places[lane] = position[lane].to_array();
             velocities[lane] = velocity[lane].to_array();
