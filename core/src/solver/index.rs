@@ -58,6 +58,12 @@ impl SolverIndex {
         self.0 as usize
     }
 
+    /// Itself, or a static in the place of one that is not solved.
+    #[inline(always)]
+    pub(crate) fn solved_or_static(self) -> Self {
+        if self == Self::NOT_SOLVED { Self::STATIC } else { self }
+    }
+
     /// Within its batch, of which `base` comes first; a static is where the batch has `statics`.
     #[inline(always)]
     pub(crate) fn within(self, base: u32, statics: u32) -> u32 {

@@ -8,6 +8,7 @@ use super::motion::Motion;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{LANES, Lanes, Quad};
 use crate::parallel::shared::Shared;
+use crate::parallel::vectors::Vectors;
 use std::ops::Range;
 
 /// Bodies in a piece of a stage.
@@ -133,7 +134,8 @@ impl<'a> Job<'a> {
                 let [vx, vy, w, _] = V::load_quads(velocity);
                 let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
                 let [x, y, c, s] = V::load_quads(pose);
-                let (c, s) = motion.turn(c.add(one), s.mul(root_inv_inertia), w.mul(root_inv_inertia));
+                let before = Vectors::new(c.add(one), s.mul(root_inv_inertia));
+                let Vectors { x: c, y: s } = motion.turn(before, w.mul(root_inv_inertia));
                 V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::model::math::min;
 use crate::parallel::lanes::Lanes;
+use crate::parallel::vectors::Vectors;
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
@@ -10,12 +11,17 @@ use glam::Vec2;
 const PARTS: u32 = 4;
 const MOST_TURN: f32 = std::f32::consts::FRAC_PI_4;
 
+/// In so many parts the length of a rotation may grow: to a few hundred at most.
+const MOST_PARTS: u32 = 24;
+
 /// What moves a body in a substep, but contacts.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion {
     pub(crate) h: f32,
     /// In so many parts turning is followed in a substep.
     parts: u32,
+    /// Whether there are so many parts in a step that the length of what is turned must be seen to.
+    grows_long: bool,
     /// Velocity gained.
     gravity: Vec2,
     linear_damping: f32,
@@ -31,6 +37,7 @@ impl Motion {
         Self {
             h,
             parts,
+            grows_long: parts * params.integrations() > MOST_PARTS,
             gravity: params.gravity * h,
             linear_damping: 1.0 / (1.0 + h * params.linear_damping),
             angular_damping: 1.0 / (1.0 + h * params.angular_damping),
@@ -59,14 +66,34 @@ impl Motion {
 
     /// A rotation turned on for a substep, at length one again.
     #[inline(always)]
-    pub(crate) fn turn<V: Lanes>(&self, mut c: V, mut s: V, speed: V) -> (V, V) {
-        let angle = V::splat(self.h / self.parts as f32).mul(speed);
+    pub(crate) fn turn<V: Lanes>(&self, mut rotation: Vectors<V>, speed: V) -> Vectors<V> {
         for _ in 0..self.parts {
-            let turned_c = c.sub(angle.mul(s));
-            let turned_s = s.add(angle.mul(c));
-            let scale = V::splat(1.0).div(turned_c.mul(turned_c).add(turned_s.mul(turned_s)).sqrt());
-            (c, s) = (turned_c.mul(scale), turned_s.mul(scale));
+            rotation = at_length_one(self.turn_part(rotation, speed));
         }
-        (c, s)
+        rotation
     }
+
+    /// As [`turn`](Self::turn), but at any length within reason: for who asks for length one in the end.
+    #[inline(always)]
+    pub(crate) fn turn_on<V: Lanes>(&self, mut rotation: Vectors<V>, speed: V) -> Vectors<V> {
+        if self.grows_long {
+            return self.turn(rotation, speed);
+        }
+        for _ in 0..self.parts {
+            rotation = self.turn_part(rotation, speed);
+        }
+        rotation
+    }
+
+    /// Turned by a tangent: longer than before, by half at most.
+    #[inline(always)]
+    fn turn_part<V: Lanes>(&self, rotation: Vectors<V>, speed: V) -> Vectors<V> {
+        let (angle, Vectors { x: c, y: s }) = (V::splat(self.h / self.parts as f32).mul(speed), rotation);
+        Vectors::new(c.sub(angle.mul(s)), s.add(angle.mul(c)))
+    }
+}
+
+#[inline(always)]
+fn at_length_one<V: Lanes>(rotation: Vectors<V>) -> Vectors<V> {
+    rotation.scaled(V::splat(1.0).div(rotation.dot(rotation).sqrt()))
 }

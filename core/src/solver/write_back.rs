@@ -172,9 +172,12 @@ struct Motions<V> {
 impl WriteBack<'_> {
     #[inline(always)]
     fn eights<V: Lanes, const N: usize>(&mut self, first: usize) {
-        let [are_within, are_finite] = self.mover.go::<V, N>(self.owned.eights(first));
-        if !are_within {
-            self.note_rim(first..first + N * LANES);
+        let (are_within, are_finite) = self.mover.go::<V, N>(self.owned.eights(first));
+        for (block, are_within) in are_within.into_iter().enumerate() {
+            if !are_within {
+                let first = first + block * LANES;
+                self.note_rim(first..first + LANES);
+            }
         }
         if !are_finite {
             self.note_not_finite(first..first + N * LANES);
@@ -245,9 +248,9 @@ struct Mover<'a> {
 
 impl Mover<'_> {
     /// Moves blocks of eight bodies, but those that sleep. Those that were solved and those that flew lie in no order, so both is done
-    /// for all of them where there are some of either. Whether all of them concern no other tile now, and are finite.
+    /// for all of them where there are some of either. Whether those of each block concern no other tile now, and all are finite.
     #[inline(always)]
-    fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>) -> [bool; 2] {
+    fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>) -> ([bool; N], bool) {
         let Eights { position, rotation, velocity, spin, place, asleep } = eights;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let nothing = Vectors::new(zero, zero);
@@ -255,11 +258,15 @@ impl Mover<'_> {
         // Who is not solved is a static here: its own result is taken in the end.
         let (mut index, mut flies, mut flying) = ([[0_u32; LANES]; N], [[0.0; LANES]; N], 0);
         for block in 0..N {
-            for (lane, &place) in place[block].iter().enumerate() {
-                let is_solved = place != SolverIndex::NOT_SOLVED;
-                index[block][lane] = if is_solved { place.get() as u32 } else { SolverIndex::STATIC.get() as u32 };
-                flies[block][lane] = if is_solved { 0.0 } else { 1.0 };
-                flying += u32::from(!is_solved);
+            // One loop for each, so that all of them are vectors.
+            for (index, place) in index[block].iter_mut().zip(&place[block]) {
+                *index = place.solved_or_static().get() as u32;
+            }
+            for (flies, place) in flies[block].iter_mut().zip(&place[block]) {
+                *flies = if *place == SolverIndex::NOT_SOLVED { 1.0 } else { 0.0 };
+            }
+            for place in &place[block] {
+                flying += u32::from(*place == SolverIndex::NOT_SOLVED);
             }
             let [vx, vy] = V::load_pairs(&velocity[block]);
             (motions[block].velocity, motions[block].spin) = (Vectors::new(vx, vy), V::load(&spin[block]));
@@ -273,7 +280,7 @@ impl Mover<'_> {
                 motions[block] = Motions::pick(V::load(&flies[block]), motions[block], solved);
             }
         }
-        let (mut are_within, mut are_finite) = (true, true);
+        let (mut are_within, mut are_finite) = ([true; N], true);
         for block in 0..N {
             let Motions { mut moved, turned, velocity: mut now, spin: mut turns } = motions[block];
             let [c, s] = V::load_pairs(&rotation[block]);
@@ -299,13 +306,13 @@ impl Mover<'_> {
             turns.store(&mut spin[block]);
             let Region { min, max } = *self.interior;
             let fastest = absolute(now.x).max(absolute(now.y)).mul(V::splat(self.setup.params.dt));
-            are_within &= V::are_within(&position[block], min.into(), max.into());
-            are_within &= fastest.all_below(self.setup.params.margin_cap);
+            are_within[block] = V::are_within(&position[block], min.into(), max.into())
+                & fastest.all_below(self.setup.params.margin_cap);
             // A sum is finite only if all its parts are.
             let sum = moved.x.add(moved.y).add(after.x).add(after.y).add(now.x).add(now.y).add(turns);
             are_finite &= absolute(sum).all_below(f32::MAX);
         }
-        [are_within, are_finite]
+        (are_within, are_finite)
     }
 
     /// Bodies without contacts, through all substeps.
@@ -321,8 +328,7 @@ impl Mover<'_> {
                 let [vx, vy, spin] = self.motion.accelerate(velocity, one, one);
                 (block.velocity, block.spin) = (Vectors::new(vx, vy), spin);
                 block.moved = Vectors::new(block.moved.x.add(h.mul(vx)), block.moved.y.add(h.mul(vy)));
-                let (c, s) = self.motion.turn(block.turned.x, block.turned.y, spin);
-                block.turned = Vectors::new(c, s);
+                block.turned = self.motion.turn_on(block.turned, spin);
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::parallel::ahead::fetch;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
-/// Contacts are asked for so many before they are read.
+/// Contacts, and the names of their bodies, are asked for so many before they are read.
 const AHEAD: usize = 8;
 
 /// Sums unseen impulses, finds the contacts of departing bodies, and copies those that cannot be found by slot any more to the
@@ -20,7 +20,10 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     let border_of = |mark: u32| border.get((mark as usize).checked_sub(1)?);
     for (place, &i) in concerned.iter().enumerate() {
         if let Some(&next) = concerned.get(place + AHEAD) {
+            let key = tile.contacts.keys[next as usize];
             fetch(&tile.contacts.contacts, next as usize);
+            fetch(&tile.bodies.id, tile.index(key.low()));
+            fetch(&tile.bodies.id, tile.index(key.high()));
         }
         let (key, contact) = (tile.contacts.keys[i as usize], &tile.contacts.contacts[i as usize]);
         let (low, high, pair) = (key.low(), key.high(), tile.pair_of(key));
