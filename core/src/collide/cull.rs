@@ -3,7 +3,7 @@
 use super::broad_phase::Pair;
 use super::proxies::Proxies;
 use crate::model::body::Bodies;
-use crate::parallel::lanes::{Kernel, LANES, Lanes, Quad, Row};
+use crate::parallel::lanes::{Arithmetic, Kernel, LANES, Lanes, Quad, Row};
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 
@@ -90,7 +90,7 @@ fn are_apart<V: Lanes>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs:
 /// One for pairs that stay apart by where their centers are nearest within the step, given the sum of their bounding radii. Where
 /// speeds overflow nothing is known: then they do not pass.
 #[inline(always)]
-pub(super) fn passes<V: Lanes>(offset: Vectors<V>, between: Vectors<V>, bounds: V, setup: &Setup) -> V {
+pub(super) fn passes<V: Arithmetic>(offset: Vectors<V>, between: Vectors<V>, bounds: V, setup: &Setup) -> V {
     let zero = V::splat(0.0);
     let squared_speed = between.dot(between).max(V::splat(f32::MIN_POSITIVE));
     let nearest = zero.sub(offset.dot(between)).div(squared_speed);

@@ -2,10 +2,10 @@
 
 pub(crate) mod broad_phase;
 mod cull;
-mod eight_boxes;
-mod eight_pairs;
-mod eight_touches;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
 pub(crate) mod proxies;
 mod touch;
+mod wide_boxes;
+mod wide_pairs;
+mod wide_touches;

@@ -2,13 +2,13 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
-use crate::collide::eight_boxes::BoxOutlook;
-use crate::collide::eight_pairs::{EightPairs, Outlook, RoundOutlook};
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
+use crate::collide::wide_boxes::BoxOutlook;
+use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
 use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
 use crate::parallel::ahead::fetch;
-use crate::parallel::lanes::{Kernel, LANES, Lanes};
+use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -257,15 +257,15 @@ impl Block<'_> {
     /// Finds the contacts of pairs of one kind.
     #[inline(always)]
     fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {
-        let (mut eight, mut outlook) = (EightPairs::default(), O::default());
-        for places in list.chunks(LANES) {
-            for lane in 0..LANES {
+        let (mut wide, mut outlook) = (WidePairs::default(), O::default());
+        for places in list.chunks(WIDE) {
+            for lane in 0..WIDE {
                 // In lanes that are left over, the first of them again.
                 let place = *places.get(lane).unwrap_or(&places[0]);
                 let Named { bodies, known, .. } = self.named[usize::from(place)];
-                eight.set(lane, tile, bodies, known.is_some(), setup);
+                wide.set(lane, tile, bodies, known.is_some(), setup);
             }
-            outlook.look::<V>(&eight, setup);
+            outlook.look::<V::Wide>(&wide, setup);
             for (lane, &place) in places.iter().enumerate() {
                 let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
                 // What there is no contact of is written down as well: a branch would be a coin toss.

@@ -181,11 +181,11 @@ impl Kernel for Part<'_> {
         let (outline, outline_rest) = outline.as_chunks_mut::<LANES>();
         let mut first = range.start;
         for ((((x, y), extent), radius), outline) in x.iter_mut().zip(y).zip(extent).zip(radius).zip(outline) {
-            load.eight::<V>(first, LANES, [x, y, extent, radius], outline);
+            load.load::<V>(first, LANES, [x, y, extent, radius], outline);
             first += LANES;
         }
         let (mut rows, mut quads) = ([[0.0; LANES]; 4], [[0.0; 4]; LANES]);
-        load.eight::<V>(first, range.end - first, rows.each_mut(), &mut quads);
+        load.load::<V>(first, range.end - first, rows.each_mut(), &mut quads);
         for (rest, row) in [x_rest, y_rest, extent_rest, radius_rest].into_iter().zip(&rows) {
             rest.copy_from_slice(&row[..rest.len()]);
         }
@@ -196,7 +196,7 @@ impl Kernel for Part<'_> {
 impl Load<'_> {
     /// Fills in the proxies of up to eight bodies.
     #[inline(always)]
-    fn eight<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) {
+    fn load<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) {
         let (mut spin, mut grows): (Row, Row) = Default::default();
         let (mut places, mut kinds) = ([[0.0; 2]; LANES], [[0.0; 4]; LANES]);
         let (mut velocities, mut rotations) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);

@@ -7,8 +7,8 @@
 //! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::eight_pairs::TOUCHING;
 use crate::collide::manifold::{Manifold, collide};
+use crate::collide::wide_pairs::TOUCHING;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::{Rot, cross, dot, max, min, turn};
 use crate::model::shape::KindRow;

@@ -1,6 +1,6 @@
-//! Eight vectors of the plane at once.
+//! Vectors of the plane, one in each lane.
 
-use super::lanes::{Arithmetic, LANES, Lanes, Row};
+use super::lanes::Arithmetic;
 
 /// A vector in every lane; or a rotation, by its cosine and its sine.
 #[derive(Clone, Copy)]
@@ -88,12 +88,4 @@ pub(crate) fn absolute<V: Arithmetic>(x: V) -> V {
 #[inline(always)]
 pub(crate) fn less<V: Arithmetic>(a: V, b: V) -> V {
     b.sub(a).if_positive(V::splat(1.0), V::splat(0.0))
-}
-
-/// Whether a number is positive in some lane.
-#[inline(always)]
-pub(crate) fn any<V: Lanes>(v: V) -> bool {
-    let mut row: Row = [0.0; LANES];
-    v.store(&mut row);
-    row.iter().fold(false, |any, &lane| any | (lane > 0.0))
 }

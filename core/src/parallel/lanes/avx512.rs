@@ -145,4 +145,21 @@ impl Wide for Sixteen {
         ]);
         [Self(a), Self(b), Self(c), Self(d)]
     }
+    #[inline(always)]
+    fn store_quads([a, b, c, d]: [Self; 4], to: &mut [Quad; WIDE]) {
+        for (l, row) in transpose([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
+            // SAFETY: AVX-512 is there; the slices are bounds-checked and cover four floats each.
+            unsafe {
+                _mm_storeu_ps(to[l].as_mut_ptr(), _mm512_castps512_ps128(row));
+                _mm_storeu_ps(to[l + 4].as_mut_ptr(), _mm512_extractf32x4_ps::<1>(row));
+                _mm_storeu_ps(to[l + 8].as_mut_ptr(), _mm512_extractf32x4_ps::<2>(row));
+                _mm_storeu_ps(to[l + 12].as_mut_ptr(), _mm512_extractf32x4_ps::<3>(row));
+            }
+        }
+    }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        // SAFETY: AVX-512 is there (see the module).
+        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps()) != 0 }
+    }
 }

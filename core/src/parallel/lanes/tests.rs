@@ -124,6 +124,16 @@ fn both<W: Wide>(of: &Everything<'_>, results: &mut Results) {
     let halves = index.as_chunks::<LANES>().0;
     let scattered = (0..4).flat_map(|column| halves.iter().map(move |half| (half, column)));
     results.extend(scattered.map(|(half, column)| ("wide scatter", half.map(|i| quads[i as usize][column]))));
+    let mut stored = sixteen;
+    W::store_quads([q, p, s, r], &mut stored);
+    for column in 0..4 {
+        results.extend(
+            stored.as_chunks().0.iter().map(|half: &[Quad; LANES]| ("wide store_quads", half.map(|quad| quad[column]))),
+        );
+    }
+    let last = std::array::from_fn(|l| if l + 1 == WIDE { f32::MIN_POSITIVE } else { -1.0 });
+    let told = [W::splat(0.0), W::splat(f32::NAN), W::splat(-1.0), W::load(&last), W::splat(1.0)].map(W::any_positive);
+    results.push(("any_positive", std::array::from_fn(|l| if told.get(l) == Some(&true) { 1.0 } else { 0.0 })));
 }
 
 /// The same on plain numbers.
@@ -170,13 +180,18 @@ fn expected(Everything { a, b, quads, index }: Everything<'_>) -> Results {
     results.extend(two("wide min", math::min));
     results.extend(two("wide if_positive", |a, b| if a > 0.0 { b } else { a }));
     results.extend([("wide splat", [a[2]; LANES]); 2]);
-    for (name, order) in
-        [("wide load_quads", [0, 1, 2, 3]), ("wide gather", [0, 1, 2, 3]), ("wide scatter", [1, 0, 3, 2])]
-    {
+    let swapped = [1, 0, 3, 2];
+    for (name, order) in [
+        ("wide load_quads", [0, 1, 2, 3]),
+        ("wide gather", [0, 1, 2, 3]),
+        ("wide scatter", swapped),
+        ("wide store_quads", swapped),
+    ] {
         for c in order {
             results.extend([(name, column(&|l| quads[index[l] as usize], c)); 2]);
         }
     }
+    results.push(("any_positive", [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
     results
 }
 

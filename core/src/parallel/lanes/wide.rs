@@ -1,5 +1,5 @@
-//! Sixteen numbers at once, for contacts: two eights side by side. In a pass over contacts each operation waits for the one before;
-//! of two eights one does not wait for the other.
+//! Sixteen numbers at once, for contacts and pairs: two eights side by side. Where each operation waits for the one before, of two
+//! eights one does not wait for the other.
 
 use super::{Arithmetic, LANES, Lanes, Quad};
 use std::cell::Cell;
@@ -20,6 +20,10 @@ pub(crate) trait Wide: Arithmetic {
     fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; WIDE]);
     /// The four columns of sixteen quads in a row.
     fn load_quads(from: &[Quad; WIDE]) -> [Self; 4];
+    /// The inverse of [`Wide::load_quads`].
+    fn store_quads(columns: [Self; 4], to: &mut [Quad; WIDE]);
+    /// Whether a number is positive in some lane.
+    fn any_positive(self) -> bool;
 }
 
 /// Two eights.
@@ -105,5 +109,17 @@ impl<V: Lanes> Wide for Twice<V> {
     fn load_quads(from: &[Quad; WIDE]) -> [Self; 4] {
         let [low, high] = halves(from);
         together(V::load_quads(low), V::load_quads(high))
+    }
+    #[inline(always)]
+    fn store_quads([a, b, c, d]: [Self; 4], to: &mut [Quad; WIDE]) {
+        let (low, high) = to.split_first_chunk_mut().expect("twice as many");
+        V::store_quads([a.0, b.0, c.0, d.0], low);
+        V::store_quads([a.1, b.1, c.1, d.1], high.try_into().expect("as many are left"));
+    }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        let mut row = [0.0; WIDE];
+        self.store(&mut row);
+        row.iter().fold(false, |any, &lane| any | (lane > 0.0))
     }
 }

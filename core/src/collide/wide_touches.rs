@@ -1,13 +1,13 @@
-//! Where and when the bodies of eight pairs touch within the step, at least one of each pair being round: what `touch.rs` does
+//! Where and when the bodies of sixteen pairs touch within the step, at least one of each pair being round: what `touch.rs` does
 //! for one pair of any bodies, in the same words and with the same bits.
 //!
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
 use super::cull::passes;
-use super::eight_pairs::{Eight, TOUCHING};
 use super::touch::{DEEP, NEAR, ROUNDS};
-use crate::parallel::lanes::Lanes;
-use crate::parallel::vectors::{Vectors, any, less};
+use super::wide_pairs::{Pairs, TOUCHING};
+use crate::parallel::lanes::Wide;
+use crate::parallel::vectors::{Vectors, less};
 use crate::tiling::blueprint::Setup;
 
 /// Manifolds of one point, and the moments in which they are those.
@@ -26,7 +26,7 @@ pub(super) struct Moments<V> {
     distance: V,
 }
 
-/// What comes of eight pairs.
+/// What comes of sixteen pairs.
 #[derive(Clone, Copy)]
 pub(super) struct Touches<V> {
     /// Positive if they make a contact.
@@ -44,11 +44,11 @@ pub(super) struct Touches<V> {
 
 /// `yes` where a number is positive, else `no`, for the bodies A and B.
 #[inline(always)]
-pub(super) fn both<V: Lanes>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
+pub(super) fn both<V: Wide>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
     [Vectors::pick(positive, yes[0], no[0]), Vectors::pick(positive, yes[1], no[1])]
 }
 
-impl<V: Lanes> Moments<V> {
+impl<V: Wide> Moments<V> {
     /// `yes` where a number is positive, else `no`.
     #[inline(always)]
     fn pick(positive: V, yes: &Self, no: &Self) -> Self {
@@ -66,7 +66,7 @@ impl<V: Lanes> Moments<V> {
     }
 }
 
-impl<V: Lanes> Touches<V> {
+impl<V: Wide> Touches<V> {
     /// No contacts.
     #[inline(always)]
     pub(super) fn none() -> Self {
@@ -99,7 +99,7 @@ impl<V: Lanes> Touches<V> {
     }
 }
 
-impl<V: Lanes> Eight<V> {
+impl<V: Wide> Pairs<V> {
     /// One for a body that is not round.
     #[inline(always)]
     fn not_round(&self, side: usize) -> V {
@@ -209,7 +209,7 @@ impl<V: Lanes> Eight<V> {
         let later = is_now.max(passes).if_positive(zero, one);
         let mut at = now;
         let mut meets = is_now.max(less(nearest, speculative));
-        if any(later) {
+        if later.any_positive() {
             let (then, found) = self.first_touch(&now, later);
             at = Moments::pick(found, &then, &now);
             meets = meets.max(found);
@@ -255,7 +255,7 @@ impl<V: Lanes> Eight<V> {
         // Who has a moment of touch already, to be found once more or as it is; and who is still looked for.
         let (mut last, mut at) = (time.max(zero), *now);
         let mut exact = found;
-        if any(mixed) {
+        if mixed.any_positive() {
             let sweep = self.sweep(0).add(self.sweep(1));
             let (mut going, mut ending) = (mixed, zero);
             for _ in 0..ROUNDS {
@@ -263,7 +263,7 @@ impl<V: Lanes> Eight<V> {
                 let bound = zero.sub(self.between.dot(at.normal)).add(sweep);
                 let left = dt.sub(at.time);
                 going = less(bound.mul(left), at.separation).if_positive(zero, going);
-                if !any(going) {
+                if !going.any_positive() {
                     break;
                 }
                 // Half as if the fastest corner led, half as if the nearest point did.
@@ -285,7 +285,7 @@ impl<V: Lanes> Eight<V> {
             last = in_time.if_positive(time.max(zero), last);
             exact = exact.max(in_time);
         }
-        if any(exact) {
+        if exact.any_positive() {
             let then = self.at(last);
             at = Moments::pick(exact, &then, &at);
         }

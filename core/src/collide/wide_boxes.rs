@@ -1,17 +1,17 @@
-//! Where and when the boxes of eight pairs touch within the step: what `touch.rs` and `manifold/box_box.rs` do for one pair, in
+//! Where and when the boxes of sixteen pairs touch within the step: what `touch.rs` and `manifold/box_box.rs` do for one pair, in
 //! the same words and with the same bits.
 //!
 //! Where speeds overflow, it says so, and leaves the pair to those.
 
 use super::cull::passes;
-use super::eight_pairs::{Eight, EightPairs, Outlook, TOUCHING};
-use super::eight_touches::both;
 use super::manifold::box_box::PREFERENCE;
 use super::touch::{DEEP, NEAR, ROUNDS};
+use super::wide_pairs::{Outlook, Pairs, TOUCHING, WidePairs};
+use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
-use crate::parallel::lanes::{LANES, Lanes, Quad, Row};
-use crate::parallel::vectors::{Vectors, absolute, any, less};
+use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
+use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
@@ -32,40 +32,40 @@ struct Moments<V> {
     feature: [V; 2],
 }
 
-/// What comes of eight pairs of boxes.
+/// What comes of sixteen pairs of boxes.
 #[derive(Default, Debug)]
 pub(super) struct BoxOutlook {
     /// Positive if that cannot be told here.
-    unsure: Row,
+    unsure: WideRow,
     /// Positive if a contact has this point.
-    holds: [Row; 2],
-    feature: [Row; 2],
+    holds: [WideRow; 2],
+    feature: [WideRow; 2],
     /// Normal and offset, both rotations, of a [`Contact`]; anchor, separation there and now of its points.
-    frames: [Quad; LANES],
-    rotations: [Quad; LANES],
-    points: [[Quad; LANES]; 2],
+    frames: [Quad; WIDE],
+    rotations: [Quad; WIDE],
+    points: [[Quad; WIDE]; 2],
 }
 
 /// With the sign that it has not.
 #[inline(always)]
-fn negated<V: Lanes>(x: V) -> V {
+fn negated<V: Wide>(x: V) -> V {
     V::splat(-0.0).sub(x)
 }
 
 #[inline(always)]
-fn opposite<V: Lanes>(v: Vectors<V>) -> Vectors<V> {
+fn opposite<V: Wide>(v: Vectors<V>) -> Vectors<V> {
     Vectors::new(negated(v.x), negated(v.y))
 }
 
 /// Minus one for what is less than zero, else one.
 #[inline(always)]
-fn sign<V: Lanes>(x: V) -> V {
+fn sign<V: Wide>(x: V) -> V {
     negated(x).if_positive(V::splat(-1.0), V::splat(1.0))
 }
 
 /// Separations of two boxes along the axes of the first; `offset` in its frame, `turn` from its frame to the other's.
 #[inline(always)]
-fn separations<V: Lanes>(half: Vectors<V>, other: Vectors<V>, turn: Vectors<V>, offset: Vectors<V>) -> Vectors<V> {
+fn separations<V: Wide>(half: Vectors<V>, other: Vectors<V>, turn: Vectors<V>, offset: Vectors<V>) -> Vectors<V> {
     let (c, s) = (absolute(turn.x), absolute(turn.y));
     let reach = Vectors::new(c.mul(other.x).add(s.mul(other.y)), s.mul(other.x).add(c.mul(other.y)));
     Vectors::new(absolute(offset.x), absolute(offset.y)).minus(half).minus(reach)
@@ -73,13 +73,13 @@ fn separations<V: Lanes>(half: Vectors<V>, other: Vectors<V>, turn: Vectors<V>, 
 
 /// From a corner to the nearest point of an edge, and where on the edge that lies: 0 to 1.
 #[inline(always)]
-fn nearest<V: Lanes>(corner: Vectors<V>, ends: [Vectors<V>; 2]) -> (Vectors<V>, V) {
+fn nearest<V: Wide>(corner: Vectors<V>, ends: [Vectors<V>; 2]) -> (Vectors<V>, V) {
     let edge = ends[1].minus(ends[0]);
     let part = corner.minus(ends[0]).dot(edge).div(edge.dot(edge)).max(V::splat(0.0)).min(V::splat(1.0));
     (ends[0].plus(edge.scaled(part)).minus(corner), part)
 }
 
-impl<V: Lanes> Moments<V> {
+impl<V: Wide> Moments<V> {
     /// `yes` where a number is positive, else `no`.
     #[inline(always)]
     fn pick(positive: V, yes: &Self, no: &Self) -> Self {
@@ -113,37 +113,37 @@ impl<V: Lanes> Moments<V> {
 
 impl Outlook for BoxOutlook {
     #[inline(always)]
-    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup) {
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup) {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
-        let (eight, fixed) = (pairs.eight::<V>(setup), V::load(&pairs.fixed));
-        let (dt, speculative) = (eight.dt, V::splat(setup.params.speculative_distance));
-        let far = eight.far();
+        let (both, fixed) = (pairs.load::<V>(setup), V::load(&pairs.fixed));
+        let (dt, speculative) = (both.dt, V::splat(setup.params.speculative_distance));
+        let far = both.far();
         let reach = speculative.add(far);
         let identity = Vectors::new(one, zero);
-        let now = eight.boxes(zero, eight.offset, [identity; 2], reach);
+        let now = both.boxes(zero, both.offset, [identity; 2], reach);
         let (_, separation) = now.nearest();
         let is_slow = less(far, speculative);
         let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
-        let passes = passes(eight.offset, eight.between, eight.bound[0].add(eight.bound[1]), setup);
+        let passes = passes(both.offset, both.between, both.bound[0].add(both.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
         let later = is_now.if_positive(zero, asked);
         let mut at = now;
         let mut meets = is_now.max(less(separation, speculative));
-        if any(later) {
-            let (then, found) = eight.boxes_touch(&now, later, reach);
+        if later.any_positive() {
+            let (then, found) = both.boxes_touch(&now, later, reach);
             at = Moments::pick(found, &then, &now);
             meets = meets.max(found);
         }
         meets = meets.mul(asked).mul(at.some);
-        let moved = eight.between.dot(at.normal).mul(at.time);
+        let moved = both.between.dot(at.normal).mul(at.time);
         for point in 0..2 {
             let (anchor, separation) = (at.anchor[point], at.separation[point]);
-            let closing = eight.closing(anchor, at.offset, at.normal).max(zero);
+            let closing = both.closing(anchor, at.offset, at.normal).max(zero);
             let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
-            let on_a = eight.swing(0, at.turning[0], anchor, at.normal);
-            let on_b = eight.swing(1, at.turning[1], anchor.minus(at.offset), at.normal);
+            let on_a = both.swing(0, at.turning[0], anchor, at.normal);
+            let on_b = both.swing(1, at.turning[1], anchor.minus(at.offset), at.normal);
             let before = separation.sub(moved.add(on_b.sub(on_a)));
             let now = at.time.if_positive(before, separation);
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
@@ -151,7 +151,7 @@ impl Outlook for BoxOutlook {
         }
         // Speeds that overflow tell of no other moment.
         less(far, V::splat(0.125 * f32::MAX)).if_positive(zero, one).store(&mut self.unsure);
-        let [a, b] = [at.turning[0].rotate(eight.rotation[0]), at.turning[1].rotate(eight.rotation[1])];
+        let [a, b] = [at.turning[0].rotate(both.rotation[0]), at.turning[1].rotate(both.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
         V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
     }
@@ -189,7 +189,7 @@ impl Outlook for BoxOutlook {
     }
 }
 
-impl<V: Lanes> Eight<V> {
+impl<V: Wide> Pairs<V> {
     /// What will be of boxes after some seconds if nothing else happens.
     #[inline(always)]
     fn boxes_at(&self, time: V, reach: V) -> Moments<V> {
@@ -302,7 +302,7 @@ impl<V: Lanes> Eight<V> {
             let bound = negated(self.between.dot(at.normal)).add(sweep);
             let left = dt.sub(at.time);
             going = less(bound.mul(left), separation).if_positive(zero, going);
-            if !any(going) {
+            if !going.any_positive() {
                 break;
             }
             // Half as if the fastest corner led, half as if the nearest point did.
@@ -325,7 +325,7 @@ impl<V: Lanes> Eight<V> {
         let time = at.time.add(separation.div(closing));
         let exact = less(dt, time).if_positive(zero, closes);
         found = found.max(closes.if_positive(zero, ending));
-        if any(exact) {
+        if exact.any_positive() {
             let then = self.boxes_at(time.max(zero), reach);
             at = Moments::pick(exact, &then, &at);
             found = found.max(exact.mul(then.some));

@@ -1,12 +1,12 @@
-//! Eight pairs at once, at least one body of each being round: the contacts of what rolls, as most does in a pile, and of what
-//! touches within the step (`eight_touches.rs`).
+//! Sixteen pairs at once, at least one body of each being round: the contacts of what rolls, as most does in a pile, and of what
+//! touches within the step (`wide_touches.rs`).
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::eight_touches::Touches;
+use crate::collide::wide_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
-use crate::parallel::lanes::{LANES, Lanes, Quad, Row};
-use crate::parallel::vectors::{Vectors, absolute, any};
+use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
+use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -17,27 +17,27 @@ pub(super) const TOUCHING: f32 = 0.002;
 /// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
 const ROLLING: f32 = 0.0005;
 
-/// Eight pairs of bodies A and B, one of which is round.
+/// Sixteen pairs of bodies A and B, one of which is round.
 #[derive(Default, Debug)]
-pub(super) struct EightPairs {
+pub(super) struct WidePairs {
     /// One where they had a contact in the last step, else zero.
-    known: Row,
+    known: WideRow,
     /// One where one of them is a static, else zero.
-    pub(super) fixed: Row,
+    pub(super) fixed: WideRow,
     /// Velocity and rotation.
-    a: [Quad; LANES],
-    b: [Quad; LANES],
+    a: [Quad; WIDE],
+    b: [Quad; WIDE],
     /// From the center of A to that of B, in m; angular velocities of both, in rad/s.
-    between: [Quad; LANES],
+    between: [Quad; WIDE],
     /// Half extents, radius, bounding radius (see `KindRow`).
-    kind_a: [Quad; LANES],
-    kind_b: [Quad; LANES],
+    kind_a: [Quad; WIDE],
+    kind_b: [Quad; WIDE],
 }
 
-/// What can be said of eight pairs of some kind.
+/// What can be said of sixteen pairs of some kind.
 pub(super) trait Outlook: Default {
     /// Tells of all lanes, also of those that were not set.
-    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup);
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup);
 
     /// Whether it cannot be told here if a pair makes a contact.
     fn is_unsure(&self, lane: usize) -> bool;
@@ -53,16 +53,16 @@ pub(super) trait Outlook: Default {
 #[derive(Default, Debug)]
 pub(super) struct RoundOutlook {
     /// Positive if they make a contact, of which the others tell.
-    meets: Row,
+    meets: WideRow,
     /// Positive if that cannot be told here.
-    unsure: Row,
+    unsure: WideRow,
     /// Normal and offset, both rotations, of a [`Contact`]; anchor, separation there and now.
-    frames: [Quad; LANES],
-    rotations: [Quad; LANES],
-    points: [Quad; LANES],
+    frames: [Quad; WIDE],
+    rotations: [Quad; WIDE],
+    points: [Quad; WIDE],
 }
 
-impl EightPairs {
+impl WidePairs {
     #[inline(always)]
     pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, is_known: bool, setup: &Setup) {
         let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
@@ -79,13 +79,13 @@ impl EightPairs {
 
     /// As vectors.
     #[inline(always)]
-    pub(super) fn eight<V: Lanes>(&self, setup: &Setup) -> Eight<V> {
+    pub(super) fn load<V: Wide>(&self, setup: &Setup) -> Pairs<V> {
         let [half_x_a, half_y_a, radius_a, bound_a] = V::load_quads(&self.kind_a);
         let [half_x_b, half_y_b, radius_b, bound_b] = V::load_quads(&self.kind_b);
         let [vx_a, vy_a, c_a, s_a] = V::load_quads(&self.a);
         let [vx_b, vy_b, c_b, s_b] = V::load_quads(&self.b);
         let [offset_x, offset_y, w_a, w_b] = V::load_quads(&self.between);
-        Eight {
+        Pairs {
             offset: Vectors::new(offset_x, offset_y),
             between: Vectors::new(vx_b.sub(vx_a), vy_b.sub(vy_a)),
             half: [Vectors::new(half_x_a, half_y_a), Vectors::new(half_x_b, half_y_b)],
@@ -98,8 +98,8 @@ impl EightPairs {
     }
 }
 
-/// The bodies A and B of eight pairs, and how they are to each other.
-pub(super) struct Eight<V> {
+/// The bodies A and B of sixteen pairs, and how they are to each other.
+pub(super) struct Pairs<V> {
     pub(super) offset: Vectors<V>,
     pub(super) between: Vectors<V>,
     pub(super) half: [Vectors<V>; 2],
@@ -110,7 +110,7 @@ pub(super) struct Eight<V> {
     pub(super) dt: V,
 }
 
-impl<V: Lanes> Eight<V> {
+impl<V: Wide> Pairs<V> {
     /// The greatest speed that turning gives a point that it brings nearer to the other: of a round body, none.
     #[inline(always)]
     pub(super) fn sweep(&self, side: usize) -> V {
@@ -185,19 +185,19 @@ impl<V: Lanes> Eight<V> {
 
 impl Outlook for RoundOutlook {
     #[inline(always)]
-    fn look<V: Lanes>(&mut self, pairs: &EightPairs, setup: &Setup) {
-        let (eight, zero) = (pairs.eight::<V>(setup), V::splat(0.0));
-        let is_slow = V::splat(setup.params.speculative_distance).sub(eight.far());
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup) {
+        let (both, zero) = (pairs.load::<V>(setup), V::splat(0.0));
+        let is_slow = V::splat(setup.params.speculative_distance).sub(both.far());
         let known = is_slow.if_positive(V::load(&pairs.known), zero);
         // No closures here: they might be compiled without the lanes' instructions.
         let (one, mut others) = (V::splat(1.0), V::splat(1.0));
         let mut touches = Touches::none();
-        if any(known) {
-            touches = eight.roll();
+        if known.any_positive() {
+            touches = both.roll();
             others = known.if_positive(touches.meets, zero).if_positive(zero, one);
         }
-        if any(others) {
-            touches = Touches::pick(others, &eight.touch(V::load(&pairs.fixed), setup), &touches);
+        if others.any_positive() {
+            touches = Touches::pick(others, &both.touch(V::load(&pairs.fixed), setup), &touches);
         }
         touches.meets.store(&mut self.meets);
         touches.unsure.store(&mut self.unsure);
@@ -241,12 +241,12 @@ impl Outlook for RoundOutlook {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collide::eight_boxes::BoxOutlook;
     use crate::collide::touch::touch;
+    use crate::collide::wide_boxes::BoxOutlook;
     use crate::model::body::Body;
     use crate::model::id::{GlobalId, KindId, TileId};
     use crate::model::params::{Instructions, Params};
-    use crate::parallel::lanes::{Kernel, LaneSet};
+    use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
     use crate::testing::{any_kind, any_rotation, cases};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::TileGrid;
@@ -256,21 +256,25 @@ mod tests {
     /// The lane that is looked at.
     const LANE: usize = 5;
 
-    /// Of a pair in each of eight lanes its contact; none where that cannot be told.
-    struct Look<'a>(&'a EightPairs, &'a Setup);
+    /// Of a pair in each of sixteen lanes its contact; none where that cannot be told.
+    struct Look<'a>(&'a WidePairs, &'a Setup);
 
     impl Kernel for Look<'_> {
         type Output = Option<Option<(Contact, [f32; 2])>>;
         fn run<V: Lanes>(self) -> Self::Output {
-            let Self(eight, setup) = self;
-            let are_boxes = [eight.kind_a, eight.kind_b].iter().all(|kind| kind[LANE][0] > 0.0);
-            if are_boxes { told::<V, BoxOutlook>(eight, setup) } else { told::<V, RoundOutlook>(eight, setup) }
+            let Self(pairs, setup) = self;
+            let are_boxes = [pairs.kind_a, pairs.kind_b].iter().all(|kind| kind[LANE][0] > 0.0);
+            if are_boxes {
+                told::<V::Wide, BoxOutlook>(pairs, setup)
+            } else {
+                told::<V::Wide, RoundOutlook>(pairs, setup)
+            }
         }
     }
 
-    fn told<V: Lanes, O: Outlook>(eight: &EightPairs, setup: &Setup) -> Option<Option<(Contact, [f32; 2])>> {
+    fn told<V: Wide, O: Outlook>(pairs: &WidePairs, setup: &Setup) -> Option<Option<(Contact, [f32; 2])>> {
         let mut outlook = O::default();
-        outlook.look::<V>(eight, setup);
+        outlook.look::<V>(pairs, setup);
         (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, None)))
     }
 
@@ -279,7 +283,7 @@ mod tests {
 
         /// One moment, and every bit of one contact, whoever looks for it.
         #[test]
-        fn eight_touch_as_one_does(
+        fn sixteen_touch_as_one_does(
             kinds in [any_kind(0.05, 2.0), any_kind(0.05, 2.0)], (x, y) in (-3.0_f64..3.0, -3.0_f64..3.0),
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
             spins in [-40.0_f32..40.0, -40.0_f32..40.0], rotations in [any_rotation(), any_rotation()], fixed: bool,
@@ -300,9 +304,9 @@ mod tests {
             }
             let expected = touch(&tile, [0, 1], None, &setup);
             for instructions in [Instructions::Auto, Instructions::Portable] {
-                let mut eight = EightPairs::default();
-                (0..LANES).for_each(|lane| eight.set(lane, &tile, [0, 1], false, &setup));
-                let Some(found) = LaneSet::of(instructions).unwrap().run(Look(&eight, &setup)) else { continue };
+                let mut pairs = WidePairs::default();
+                (0..WIDE).for_each(|lane| pairs.set(lane, &tile, [0, 1], false, &setup));
+                let Some(found) = LaneSet::of(instructions).unwrap().run(Look(&pairs, &setup)) else { continue };
                 prop_assert_eq!(found.is_some(), expected.is_some());
                 if let (Some((contact, separation)), Some((expected, now))) = (found, expected) {
                     prop_assert_eq!(bytemuck::bytes_of(&contact), bytemuck::bytes_of(&expected));
