@@ -26,13 +26,21 @@ pub(crate) struct Contacts {
     pub(crate) separation: Vec<[f32; 2]>,
     /// For each contact the indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
+    /// The same of those that were found before.
+    before: Vec<Pair>,
 }
 
 impl Contacts {
     fn clear(&mut self) {
         self.cache.clear();
         self.separation.clear();
+        std::mem::swap(&mut self.bodies, &mut self.before);
         self.bodies.clear();
+    }
+
+    /// Whether they are between the same bodies as those that were found before, as what rests has them.
+    pub(crate) fn are_between_the_same(&self) -> bool {
+        self.bodies == self.before
     }
 
     fn append(&mut self, other: &mut Self) {

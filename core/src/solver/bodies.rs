@@ -4,7 +4,7 @@ use super::batches::{Batches, Graph};
 use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
 use crate::exchange::record::{GhostRefresh, Unseen};
-use crate::model::params::Ghosts;
+use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::Quad;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
@@ -100,9 +100,13 @@ impl SolverBodies {
         &self.index
     }
 
-    /// Puts the islands of the graph into batches, and takes their bodies in.
-    pub(crate) fn load(&mut self, tile: &Tile, batches: &mut Batches, graph: Graph<'_>, setup: &Setup, team: Team) {
-        self.index = batches.divide(graph, std::mem::take(&mut self.node), setup.params.parallel, team);
+    /// Puts the islands of the graph into batches.
+    pub(crate) fn arrange(&mut self, batches: &mut Batches, graph: Graph<'_>, parallel: Parallel, team: Team) {
+        self.index = batches.divide(graph, std::mem::take(&mut self.node), parallel, team);
+    }
+
+    /// Takes in the bodies of the batches.
+    pub(crate) fn load(&mut self, tile: &Tile, batches: &Batches, setup: &Setup) {
         let total = batches.all.last().map_or(0, |batch| batch.bodies.end);
         for column in [&mut self.velocity, &mut self.pose, &mut self.start, &mut self.weight] {
             column.clear();

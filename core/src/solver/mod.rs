@@ -31,6 +31,7 @@ pub(crate) use write_back::write_back;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
+use crate::islands::{IslandSizes, Islands};
 use crate::model::params::{Exchange, Parallel};
 use crate::parallel::crew::{Crew, Member, Needed};
 use crate::parallel::shared::Shared;
@@ -43,7 +44,6 @@ use coloring::Coloring;
 use constraint::columns::lengths;
 use constraint::groups::Groups;
 use constraint::rows::Source;
-use index::GraphNode;
 use job::Job;
 use run::Run;
 use std::ops::Range;
@@ -52,45 +52,91 @@ use std::ops::Range;
 #[derive(Default, Debug)]
 pub(crate) struct Solver {
     pub(crate) bodies: SolverBodies,
+    islands: Islands,
     batches: Batches,
     coloring: Coloring,
     pub(crate) groups: Groups,
+    /// What the batches are of, but the contacts.
+    arranged: Option<Arranged>,
+    /// How many colors the contacts have.
+    colors: u64,
+}
+
+/// What batches follow from, but contacts; and their islands.
+#[derive(PartialEq, Debug)]
+struct Arranged {
+    /// How many bodies are owned, how many ghosts, and how many there are.
+    counts: [usize; 3],
+    /// Bodies that others hear of within the step.
+    sent: Vec<u32>,
+    team: Team,
+    islands: IslandSizes,
 }
 
 impl Solver {
-    /// The graph of contacts: how many bodies have some (nodes, in the order of the tile), and who touches whom (links).
-    pub(crate) fn graph(&mut self, tile: &Tile, contacts: &[Pair]) -> (usize, &[Pair]) {
-        self.bodies.number(tile, contacts);
-        self.bodies.graph()
-    }
-
-    /// For each body of the tile what it is in the graph of contacts, until bodies are gathered.
-    pub(crate) fn nodes(&self) -> &[GraphNode] {
-        self.bodies.nodes()
-    }
-
-    /// Puts the islands into batches, but those that sleep, and takes their bodies in. `roots` gives for each node the
-    /// lowest of its island, `largest` how many nodes the largest island has, `sent` the bodies that others hear of within the step.
-    pub(crate) fn gather(
+    /// Finds the islands of a tile's contacts, and puts those that do not sleep into batches, as long as these are not those of the
+    /// contacts before. `sent` are the bodies that others hear of within the step.
+    pub(crate) fn arrange(
         &mut self,
-        tile: &Tile,
-        contacts: &[Pair],
-        (roots, largest): (&[u32], u64),
+        tile: &mut Tile,
+        contacts: &Contacts,
         sent: &[u32],
         setup: &Setup,
         team: Team,
-    ) {
-        let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
-        let heard_of = setup.params.exchange == Exchange::Substep;
-        let first_ghost = if heard_of { self.bodies.first_ghost } else { roots.len() };
-        let graph = Graph { contacts, roots, largest, first_ghost, sent, sleeps };
-        self.bodies.load(tile, &mut self.batches, graph, setup, team);
+    ) -> IslandSizes {
+        let counts = [tile.owned, tile.ghosts(), tile.bodies.len()];
+        let is_same = |arranged: &Arranged| arranged.counts == counts && arranged.sent == sent && arranged.team == team;
+        // Who sleeps may change though contacts do not.
+        match self.arranged.as_ref().filter(|_| !setup.params.sleep && contacts.are_between_the_same()) {
+            Some(arranged) if is_same(arranged) => arranged.islands,
+            _ => {
+                let islands = self.arrange_anew(tile, &contacts.bodies, sent, setup, team);
+                self.colors = 0;
+                self.arranged = Some(Arranged { counts, sent: sent.to_vec(), team, islands });
+                islands
+            }
+        }
     }
 
-    /// Colors the contacts and gives each its place. Returns how many colors there are.
+    fn arrange_anew(
+        &mut self,
+        tile: &mut Tile,
+        contacts: &[Pair],
+        sent: &[u32],
+        setup: &Setup,
+        team: Team,
+    ) -> IslandSizes {
+        let Self { bodies, islands, batches, .. } = self;
+        bodies.number(tile, contacts);
+        let (nodes, links) = bodies.graph();
+        let sizes = islands.find(setup.params.island_search, nodes, links, team);
+        let roots = islands.roots();
+        // Not those of ghosts alone.
+        let own = (0..bodies.first_ghost as u32).zip(roots).filter(|(node, root)| node == *root).count() as u64;
+        debug_assert!(own == sizes.islands || setup.overlap.is_some());
+        tile.fall_asleep(bodies.nodes(), roots, setup);
+        let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
+        let heard_of = setup.params.exchange == Exchange::Substep;
+        let first_ghost = if heard_of { bodies.first_ghost } else { roots.len() };
+        let graph = Graph { contacts, roots, largest: sizes.largest, first_ghost, sent, sleeps };
+        bodies.arrange(batches, graph, setup.params.parallel, team);
+        IslandSizes { islands: own, ..sizes }
+    }
+
+    /// Takes in the bodies of the batches.
+    pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup) {
+        self.bodies.load(tile, &self.batches, setup);
+    }
+
+    /// Colors the contacts and gives each its place, as long as they do not have both. Returns how many colors there are.
     pub(crate) fn color(&mut self, contacts: &Contacts, team: Team) -> u64 {
-        self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
-        self.groups.lay_out(&contacts.cache.contacts, &mut self.batches, &self.coloring) as u64
+        if self.colors == 0 {
+            self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
+        }
+        if self.colors == 0 || !self.groups.fit(&contacts.cache.contacts) {
+            self.colors = self.groups.lay_out(&contacts.cache.contacts, &mut self.batches, &self.coloring) as u64;
+        }
+        self.colors
     }
 
     /// Writes the rows of all contacts.

@@ -191,20 +191,13 @@ fn collide(bench: &mut Bench<'_>) {
 /// Islands, and who sleeps; constraints.
 fn prepare(bench: &mut Bench<'_>) {
     bench.stage(Phase::Islands, |b| {
-        let (solver, contacts, params) = (&mut b.work.solver, &b.work.contacts, &b.setup.params);
-        let (nodes, links) = solver.graph(b.tile, &contacts.bodies);
-        let sizes = b.work.islands.find(params.island_search, nodes, links, b.team);
-        let roots = b.work.islands.roots();
+        let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
+        let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
+        let islands = solver.arrange(b.tile, contacts, sent, b.setup, b.team);
+        solver.load(b.tile, b.setup);
         let counts = &mut b.tile.counts;
-        // Not those of ghosts alone.
-        let first_ghost = solver.bodies.first_ghost as u32;
-        let islands = (0..first_ghost).zip(roots).filter(|(node, root)| node == *root).count() as u64;
-        debug_assert!(islands == sizes.islands || b.setup.overlap.is_some());
-        (counts.islands, counts.largest_island) = (islands, sizes.largest);
+        (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
         (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
-        b.tile.fall_asleep(solver.nodes(), roots, b.setup);
-        let sent = if params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
-        solver.gather(b.tile, &contacts.bodies, (roots, sizes.largest), sent, b.setup, b.team);
     });
     bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
     bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));

@@ -8,7 +8,6 @@ use crate::collide::proxies::Proxies;
 use crate::exchange::border::Border;
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::migrate::MigrateWork;
-use crate::islands::Islands;
 use crate::parallel::team::Team;
 use crate::solver::Solver;
 use crate::state::figures::Figures;
@@ -25,7 +24,6 @@ pub(crate) struct Work {
     pub(crate) pairs: Vec<Pair>,
     pub(crate) narrow_phase: NarrowPhase,
     pub(crate) contacts: Contacts,
-    pub(crate) islands: Islands,
     pub(crate) solver: Solver,
     pub(crate) border: Border,
 }

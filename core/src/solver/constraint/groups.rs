@@ -58,6 +58,11 @@ impl Lane {
         Self { column: column as u8, lane: lane as u8, group: group as u32, base: base as u32 }
     }
 
+    /// Whether it lies in that column.
+    pub(super) fn is_of(self, column: usize) -> bool {
+        usize::from(self.column) == column
+    }
+
     /// Those of some bodies that its batch has.
     fn bodies(self, all: &[Quad]) -> &[Quad] {
         &all[self.base as usize..]

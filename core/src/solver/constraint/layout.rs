@@ -13,6 +13,11 @@ fn any(counts: &Each<usize>) -> bool {
 }
 
 impl Groups {
+    /// Whether contacts of the same bodies as those that were laid out have as many points each.
+    pub(crate) fn fit(&self, contacts: &[Contact]) -> bool {
+        self.lanes.iter().zip(contacts).fold(true, |fit, (lane, contact)| fit & lane.is_of(column_of(contact)))
+    }
+
     /// Decides in which group and lane each contact goes. Returns the most colors of a batch.
     pub(crate) fn lay_out(&mut self, contacts: &[Contact], batches: &mut Batches, coloring: &Coloring) -> usize {
         self.colors.clear();
