@@ -216,7 +216,7 @@ struct Block<'a> {
 }
 
 /// What comes of a pair.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Outcome {
     Nothing,
     /// The contact that is known, as it is.
@@ -246,22 +246,38 @@ impl Kernel for FindAmong<'_> {
             }
             block.keep_known(&mut lists, tile, setup);
             block.find::<V, BoxOutlook>(lists.get(NEW_BOXES), tile, setup);
-            for i in 0..pairs.len() {
-                let Named { key, bodies, known } = block.named[i];
-                let contact = match (block.outcome[i], known) {
-                    (Outcome::Nothing, _) => continue,
-                    (Outcome::Known, Some(known)) => known,
-                    _ => &block.found[i],
-                };
-                contacts.cache.push(key, *contact);
-                contacts.bodies.push(bodies);
-                contacts.separation.push(block.separation[i]);
-            }
+            block.keep(pairs.len(), contacts);
         }
     }
 }
 
 impl Block<'_> {
+    /// Appends the contacts of so many pairs. Every one is written down, and counted if there is one: a branch would be a coin toss.
+    #[inline(always)]
+    fn keep(&self, pairs: usize, contacts: &mut Contacts) {
+        let Contacts { cache: ContactCache { keys, contacts }, separation, bodies, .. } = contacts;
+        let mut kept = keys.len();
+        let most = kept + pairs;
+        keys.resize(most, PairKey::default());
+        contacts.resize(most, Contact::zeroed());
+        separation.resize(most, [0.0; 2]);
+        bodies.resize(most, [0, 0]);
+        // One length for all: each place is checked once, not once per column.
+        let (to_keys, to_contacts) = (&mut keys[..most], &mut contacts[..most]);
+        let (to_separation, to_bodies) = (&mut separation[..most], &mut bodies[..most]);
+        for i in 0..pairs {
+            let (named, found) = (&self.named[i], &self.found[i]);
+            let contact = if self.outcome[i] == Outcome::Known { named.known.unwrap_or(found) } else { found };
+            (to_keys[kept], to_bodies[kept]) = (named.key, named.bodies);
+            (to_contacts[kept], to_separation[kept]) = (*contact, self.separation[i]);
+            kept += usize::from(self.outcome[i] != Outcome::Nothing);
+        }
+        keys.truncate(kept);
+        contacts.truncate(kept);
+        separation.truncate(kept);
+        bodies.truncate(kept);
+    }
+
     /// Finds the contacts of pairs of one kind.
     #[inline(always)]
     fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {

@@ -218,7 +218,7 @@ impl ContactCache {
         self.contacts.extend_from_slice(&other.contacts);
     }
 
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {
         self.keys.push(key);
         self.contacts.push(contact);
