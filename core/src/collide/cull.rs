@@ -1,9 +1,9 @@
-//! Which of the candidates that the broad phase names are pairs that may touch: eight at a time, as most do not.
+//! Which of the candidates that the broad phase names are pairs that may touch: sixteen at a time, as most do not.
 
 use super::broad_phase::Pair;
 use super::proxies::Proxies;
 use crate::model::body::Bodies;
-use crate::parallel::lanes::{Arithmetic, Kernel, LANES, Lanes, Quad, Row};
+use crate::parallel::lanes::{Arithmetic, Kernel, Lanes, Quad, WIDE, Wide, WideRow};
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 
@@ -19,28 +19,40 @@ pub(super) struct Cull<'a> {
 impl Kernel for Cull<'_> {
     type Output = ();
 
-    /// Every one is written down, and counted or not: a branch would be a coin toss.
     #[inline(always)]
-    fn run<V: Lanes>(self) {
-        let Self { bodies, proxies, setup, candidates, near } = self;
-        let mut kept = near.len();
-        near.resize(kept + candidates.len(), [0, 0]);
-        let (eights, rest) = candidates.as_chunks::<LANES>();
-        let mut keep = |pairs: &[Pair], apart: Row| {
-            for (&pair, apart) in pairs.iter().zip(apart) {
-                near[kept] = pair;
-                kept += usize::from(proxies.is_wanted(pair)) & usize::from(apart == 0.0);
-            }
-        };
-        for pairs in eights {
-            keep(pairs, are_apart::<V>(bodies, proxies, setup, pairs));
+    fn run<V: Lanes>(mut self) {
+        let kept = self.near.len();
+        self.near.resize(kept + self.candidates.len(), [0, 0]);
+        let (blocks, rest) = self.candidates.as_chunks::<WIDE>();
+        let mut kept = kept;
+        for pairs in blocks {
+            kept = self.keep::<V>(kept, pairs, WIDE);
         }
         if let Some(&last) = rest.last() {
-            let mut pairs = [last; LANES];
+            let mut pairs = [last; WIDE];
             pairs[..rest.len()].copy_from_slice(rest);
-            keep(rest, are_apart::<V>(bodies, proxies, setup, &pairs));
+            kept = self.keep::<V>(kept, &pairs, rest.len());
         }
-        near.truncate(kept);
+        self.near.truncate(kept);
+    }
+}
+
+impl Cull<'_> {
+    /// Keeps those of some pairs that are to be kept, behind those that were: every one is written down, and counted or not, as a
+    /// branch would be a coin toss. How many there are then.
+    #[inline(always)]
+    fn keep<V: Lanes>(&mut self, mut kept: usize, pairs: &[Pair; WIDE], count: usize) -> usize {
+        let Self { bodies, proxies, setup, near, .. } = self;
+        let apart = are_apart::<V::Wide>(bodies, proxies, setup, pairs);
+        // Those of owned bodies are wanted always.
+        let owned = proxies.owned as u32;
+        let all_owned = pairs.iter().fold(true, |all, pair| all & (pair[0] < owned));
+        let near = &mut near[..];
+        for lane in 0..count {
+            near[kept] = pairs[lane];
+            kept += usize::from(apart[lane] == 0.0) & usize::from(all_owned || proxies.is_wanted(pairs[lane]));
+        }
+        kept
     }
 }
 
@@ -53,8 +65,8 @@ impl Kernel for Cull<'_> {
 ///
 /// This reads the bodies' own bits, so two tiles that both see a pair agree on it.
 #[inline(always)]
-fn are_apart<V: Lanes>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs: &[Pair; LANES]) -> Row {
-    let mut ways: [Quad; LANES] = [[0.0; 4]; LANES];
+fn are_apart<V: Wide>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs: &[Pair; WIDE]) -> WideRow {
+    let mut ways: [Quad; WIDE] = [[0.0; 4]; WIDE];
     let (mut a, mut b) = (ways, ways);
     for (lane, pair) in pairs.iter().enumerate() {
         let [first, second] = pair.map(|body| body as usize);
@@ -82,7 +94,7 @@ fn are_apart<V: Lanes>(bodies: &Bodies, proxies: &Proxies, setup: &Setup, pairs:
     let is_slow = V::splat(setup.params.speculative_distance).sub(dt.mul(speed));
     let bounds = absolute(bound_a).add(absolute(bound_b));
     let passing = is_slow.if_positive(zero, passes(offset, between, bounds, setup));
-    let mut apart = [0.0; LANES];
+    let mut apart = [0.0; WIDE];
     beside.if_positive(one, above.if_positive(one, beyond.if_positive(one, passing))).store(&mut apart);
     apart
 }
@@ -114,7 +126,7 @@ mod tests {
 
         /// As told one by one, in words of plain numbers.
         #[test]
-        fn eight_at_once_are_culled_as_one_by_one(tile in any_tile(40, 3)) {
+        fn sixteen_at_once_are_culled_as_one_by_one(tile in any_tile(40, 3)) {
             let Stuffed { setup, tile: held, proxies } = &tile;
             let bodies = &held.bodies;
             let count = bodies.len() as u32;
