@@ -2,7 +2,7 @@
 
 use atoll_tests::program::{self, Profile};
 
-/// Few contacts of NORMAL are between tiles: below 3 % on the grid of 12 x 12 tiles that it has by default. After 20
+/// Few contacts of NORMAL are between tiles: below 3 % on the grid of 12 x 12 tiles that the report has. After 20
 /// steps bodies have long left the lattice they start on.
 #[test]
 fn few_contacts_of_the_reported_experiment_cross_borders() {

@@ -8,7 +8,7 @@ use glam::DVec2;
 
 /// Bodies in a tile of the default grid, on the average. So many stay in a core's L2 cache for a whole step; half as many
 /// cost a tenth more for their ghosts, and more leave fewer tiles to share among ranks.
-const BODIES_PER_TILE: f64 = 5000.0;
+const BODIES_PER_TILE: f64 = 8000.0;
 
 /// A tile of the default grid is at least this many halo widths wide; below, most of a tile's work would be ghosts.
 const HALOS_PER_TILE: f64 = 4.0;
@@ -47,9 +47,9 @@ mod tests {
 
     #[test]
     fn the_reported_sizes() {
-        assert_eq!(default_counts(700_000, DVec2::splat(1210.0), 0.7), [12, 12]);
+        assert_eq!(default_counts(700_000, DVec2::splat(1210.0), 0.7), [9, 9]);
         assert_eq!(default_counts(20_000, DVec2::splat(204.5), 0.7), [2, 2]);
-        assert_eq!(default_counts(100_000, DVec2::new(225.0, 112.5), 0.7), [6, 3]);
+        assert_eq!(default_counts(100_000, DVec2::new(225.0, 112.5), 0.7), [5, 3]);
     }
 
     #[test]
