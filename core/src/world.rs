@@ -221,6 +221,12 @@ impl World {
         &self.tiles
     }
 
+    /// Forgets all that was derived of tiles and is kept from step to step: it must never show.
+    #[cfg(test)]
+    pub(crate) fn forget_works(&mut self) {
+        self.works.iter_mut().for_each(|work| *work = None);
+    }
+
     #[cfg(test)]
     pub(crate) fn tile_states_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
