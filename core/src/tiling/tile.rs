@@ -27,7 +27,7 @@ pub(crate) struct Tile {
     /// Owned bodies, then ghosts, then statics.
     pub(crate) bodies: Bodies,
     pub(crate) owned: usize,
-    /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays. Ascending.
+    /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays.
     pub(crate) newcomers: Vec<u32>,
     /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
     pub(crate) gaps: Vec<u32>,

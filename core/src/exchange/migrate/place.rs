@@ -33,7 +33,7 @@ pub(super) fn sort(tile: &mut Tile, setup: &Setup) {
     }
 }
 
-/// Gives the contacts that serve on their new names, and forgets the others.
+/// Renames the bodies of the contacts that serve on, and forgets the others.
 fn rename_contacts(tile: &mut Tile, new_place: &[u32]) {
     let mut is_newcomer = vec![false; new_place.len()];
     tile.newcomers.iter().for_each(|&index| is_newcomer[index as usize] = true);
