@@ -128,6 +128,11 @@ impl Tile {
         self.owned == 0
     }
 
+    /// About how long a step takes here, in what a body without contacts takes.
+    pub(crate) fn work(&self) -> u64 {
+        (self.owned + 2 * self.ghosts() + 2 * self.contacts.len()) as u64
+    }
+
     /// Whether it owns nothing and remembers nothing.
     pub(crate) fn is_bare(&self) -> bool {
         self.is_idle() && !self.bodies.has_room()
