@@ -5,6 +5,7 @@
 #[allow(unsafe_code)]
 pub(crate) mod ahead;
 pub(crate) mod crew;
+pub(crate) mod deal;
 #[allow(unsafe_code)]
 pub(crate) mod lanes;
 #[allow(unsafe_code)]
