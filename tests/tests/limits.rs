@@ -54,8 +54,8 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
     let folder = tempdir().unwrap();
     let [quick, pile, normal] = ["quickstart", "pile", "normal"].map(|name| format!("configs/{name}.toml --steps 3"));
     for (limit, what, fits) in [
-        (24_000, &*quick, false),
-        (30_000, &pile, false),
+        (32_000, &*quick, false),
+        (36_000, &pile, false),
         (60_000, &quick, true),
         (60_000, &normal, false),
         (400_000, &pile, true),
