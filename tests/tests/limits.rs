@@ -56,7 +56,7 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
     for (limit, what, fits) in [
         (32_000, &*quick, false),
         (36_000, &pile, false),
-        (60_000, &quick, true),
+        (72_000, &quick, true),
         (60_000, &normal, false),
         (400_000, &pile, true),
         // Threads of one process take addresses from each other.
