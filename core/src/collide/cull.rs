@@ -21,10 +21,9 @@ impl Kernel for Cull<'_> {
 
     #[inline(always)]
     fn run<V: Lanes>(mut self) {
-        let kept = self.near.len();
+        let mut kept = self.near.len();
         self.near.resize(kept + self.candidates.len(), [0, 0]);
         let (blocks, rest) = self.candidates.as_chunks::<WIDE>();
-        let mut kept = kept;
         for pairs in blocks {
             kept = self.keep::<V>(kept, pairs, WIDE);
         }

@@ -107,9 +107,8 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
     parcels.extend((Parcel::CONTACT..).zip(&*contacts).map(|(what, &(to, _))| Parcel::new(to, what)));
     let rim = &tile.rim.bodies;
     for Border { rim: place, owner, .. } in border.drain(..) {
-        let index = rim[place as usize].index;
         if owner != tile.id {
-            tile.gaps.push(index);
+            tile.gaps.push(rim[place as usize].index);
             tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, owner));
             parcels.push(Parcel::new(owner, place));
         }
