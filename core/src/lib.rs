@@ -94,4 +94,4 @@ pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::{Blueprint, halo_width};
 pub use tiling::partition::{Region, TileGrid};
-pub use world::World;
+pub use world::{Clock, World};

@@ -211,12 +211,24 @@ pub struct Inbox {
 const ELSEWHERE: u32 = u32::MAX;
 
 impl Inbox {
-    pub(crate) fn new(tiles: &[TileId], grid_tiles: usize, kinds: usize) -> Self {
-        let mut places = vec![ELSEWHERE; grid_tiles];
-        for (place, tile) in (0..).zip(tiles) {
-            places[tile.0 as usize] = place;
+    pub(crate) fn new(tiles: impl Iterator<Item = TileId>, grid_tiles: usize, kinds: usize) -> Self {
+        let mut inbox = Self { places: vec![ELSEWHERE; grid_tiles], kinds: kinds as u32, ..Self::default() };
+        inbox.hold(tiles);
+        inbox
+    }
+
+    /// From here on it is for these tiles, in the order of the world's.
+    pub(crate) fn hold(&mut self, tiles: impl Iterator<Item = TileId>) {
+        self.places.fill(ELSEWHERE);
+        let mut count = 0;
+        for tile in tiles {
+            self.places[tile.0 as usize] = count;
+            count += 1;
         }
-        Self { places, ends: vec![0; tiles.len()], kinds: kinds as u32, ..Self::default() }
+        self.ends.clear();
+        self.ends.resize(count as usize, 0);
+        self.routes.clear();
+        self.sorted.clear();
     }
 
     /// The messages of other ranks decoded so far, in the order they came in.

@@ -13,6 +13,7 @@ use crate::solver::Solver;
 use crate::state::figures::Figures;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
+use std::time::Duration;
 
 /// Everything that is derived of a tile's state in a step. With one sync point a step, a tile is stepped in one go and a
 /// thread's tiles share one of these, so that little more than the bodies streams through memory; with several, every
@@ -33,6 +34,8 @@ pub(crate) struct Work {
 pub(crate) struct Hand {
     pub(crate) migrate: MigrateWork,
     pub(crate) timings: Timings,
+    /// Time booked in this step.
+    pub(crate) booked: Duration,
     /// What its tiles have to tell at the next sync point.
     pub(crate) outgoing: Mailbag,
     /// Of its tiles, in a step that takes them.
@@ -73,7 +76,7 @@ pub(crate) struct Shop<'a> {
 
 impl<'a> Bench<'a> {
     pub(crate) fn new(shop: Shop<'a>, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
-        let Hand { migrate, timings, outgoing, figures, work } = hand;
+        let Hand { migrate, timings, outgoing, figures, work, .. } = hand;
         let Shop { setup, step, team, measures, takes_figures } = shop;
         let figures = takes_figures.then_some(figures);
         let watch = Stopwatch::start();

@@ -14,6 +14,7 @@ use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
 use glam::DVec2;
+use std::time::Duration;
 
 /// The unit of physics: one step of a tile is a function of its state and of the messages it received.
 #[derive(Debug)]
@@ -51,6 +52,8 @@ pub(crate) struct Tile {
     pub(crate) quadtree: Option<Box<Quadtree>>,
     /// What happened in the step under way.
     pub(crate) counts: TileCounts,
+    /// Time worked on it since that was last asked for, where it is booked.
+    pub(crate) booked: Duration,
 }
 
 /// What a tile counts in a step.
@@ -112,6 +115,7 @@ impl Tile {
             violation: Violation::default(),
             quadtree: (setup.params.broad_phase == BroadPhase::Quadtree).then(quadtree),
             counts: TileCounts::default(),
+            booked: Duration::ZERO,
         }
     }
 

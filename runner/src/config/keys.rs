@@ -76,6 +76,7 @@ pub(super) static KEYS: &[Key] = &[
     key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),
     key("run.instructions", How, &Word(|c| &mut c.params.instructions, words::INSTRUCTIONS)),
     key("run.mpi_exchange", How, &Word(|c| &mut c.run.mpi_exchange, words::MPI_EXCHANGE)),
+    key("run.balance", How, &Word(|c| &mut c.run.balance, words::BALANCE)),
     // Of numbers without bounds here, the physics checks them.
     key("physics.hertz", What, &Hertz),
     key("physics.substeps", What, &Whole(|c| Some(&mut c.params.substeps), |_| 0..=u64::from(u32::MAX))),
@@ -175,6 +176,7 @@ mod tests {
             ("run.peer_timeout", "2.5"),
             ("run.instructions", "portable"),
             ("run.mpi_exchange", "sparse"),
+            ("run.balance", "off"),
             ("physics.gravity", "[1, -9]"),
             ("physics.broad_phase", "quadtree"),
             ("physics.solver", "pgs"),

@@ -43,6 +43,8 @@ pub struct RunConfig {
     pub peer_timeout: Duration,
     /// How ranks exchange messages with transport mpi.
     pub mpi_exchange: MpiExchange,
+    /// By what tiles move from rank to rank.
+    pub balance: Balance,
 }
 
 /// `[output]`: of runs that were given a folder for it, or a file for their log.
@@ -64,6 +66,20 @@ pub enum MpiExchange {
     Alltoallv,
     /// Messages only between ranks that have some: right for thousands.
     Sparse,
+}
+
+/// By what tiles move from rank to rank while it runs. It changes no bit of a result.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum Balance {
+    /// By the time that each tile took.
+    #[default]
+    Measured,
+    /// By the bodies in each tile.
+    Bodies,
+    /// Not at all: who holds a tile at the start holds it to the end.
+    Off,
+    /// About half of all tiles go to another rank after every step, to test that nothing depends on it.
+    Shuffled,
 }
 
 /// What carries bytes between ranks.
@@ -112,6 +128,7 @@ impl Default for RunConfig {
             tiles: None,
             peer_timeout: Duration::from_secs(30),
             mpi_exchange: MpiExchange::default(),
+            balance: Balance::default(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The words that a configuration may say, one table each, for reading and for writing.
 
-use super::sections::{MpiExchange, TransportKind};
+use super::sections::{Balance, MpiExchange, TransportKind};
 use atoll_core::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Solver};
 
 /// Words and what they mean.
@@ -17,6 +17,14 @@ pub(super) const TRANSPORT: Words<TransportKind> = &[
 /// `run.mpi_exchange`
 pub(super) const MPI_EXCHANGE: Words<MpiExchange> =
     &[("alltoallv", MpiExchange::Alltoallv), ("sparse", MpiExchange::Sparse)];
+
+/// `run.balance`
+pub(super) const BALANCE: Words<Balance> = &[
+    ("measured", Balance::Measured),
+    ("bodies", Balance::Bodies),
+    ("off", Balance::Off),
+    ("shuffled", Balance::Shuffled),
+];
 
 /// `run.instructions`
 pub(super) const INSTRUCTIONS: Words<Instructions> = &[

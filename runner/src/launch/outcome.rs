@@ -55,7 +55,7 @@ enum Nearness {
 impl Nearness {
     fn of_error(error: &RankError) -> Self {
         match error {
-            RankError::Step(StepError::Halo(ExchangeError::Frame { .. })) => Self::Witness,
+            RankError::Step(StepError::Halo(ExchangeError::Frame { .. } | ExchangeError::Tile { .. })) => Self::Witness,
             error => match error.transport() {
                 Some(TransportError::PeerLost { .. } | TransportError::Timeout { .. }) => Self::Misses,
                 // It could not take part itself.
@@ -90,9 +90,9 @@ pub(super) fn told(error: RankError, complete: u64, steps: u64) -> RunError {
         RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
         RankError::Step(StepError::FloatMode { step }) => RunError::FloatMode { step },
         RankError::Step(StepError::Halo(ExchangeError::Transport(error))) => transport(error),
-        RankError::Step(StepError::Halo(error @ ExchangeError::Frame { from, .. })) => {
-            RunError::PeerLost { rank: from, complete, steps, reason: error.to_string() }
-        }
+        RankError::Step(StepError::Halo(
+            error @ (ExchangeError::Frame { from, .. } | ExchangeError::Tile { from, .. }),
+        )) => RunError::PeerLost { rank: from, complete, steps, reason: error.to_string() },
     }
 }
 

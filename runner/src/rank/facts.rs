@@ -48,6 +48,12 @@ pub struct RankFacts {
     pub wait_nanos: u64,
     /// Time in which the state was copied to be written, the disk was waited for, or a row of the log was made.
     pub output_nanos: u64,
+    /// Time in which ranks told each other how busy they are, and tiles went from one to another.
+    pub balance_nanos: u64,
+    /// Tiles that went from one rank to another, of all ranks.
+    pub tiles_moved: u64,
+    /// The busiest rank's time on a core over the mean of all ranks, the mean over all steps, in millionths.
+    pub imbalance: u64,
     /// Time of each phase, in the order of [`Phase::ALL`].
     pub phase_nanos: [u64; PHASES],
 }
@@ -81,11 +87,12 @@ impl RankFacts {
     }
 
     /// The time of each phase in the order of the step, in nanoseconds, `wait`, the part of the exchange in which it waited for
-    /// other ranks, and `other`, which no phase accounts for, such as threads out of work. They add up to all of it, but for
+    /// other ranks, `balance`, in which tiles went from rank to rank, `output`, and `other`, which no phase accounts for, such as threads out of work. They add up to all of it, but for
     /// rounding.
     pub fn phases(&self) -> Vec<(&'static str, u64)> {
-        let rest = self.wall_nanos.saturating_sub(self.phase_nanos.iter().sum::<u64>() + self.output_nanos);
-        let mut phases = Vec::with_capacity(PHASES + 3);
+        let told = self.phase_nanos.iter().sum::<u64>() + self.balance_nanos + self.output_nanos;
+        let rest = self.wall_nanos.saturating_sub(told);
+        let mut phases = Vec::with_capacity(PHASES + 4);
         for (phase, nanos) in Phase::ALL.into_iter().zip(self.phase_nanos) {
             if phase == Phase::Exchange {
                 // The part in which nothing was done but wait is told apart.
@@ -95,7 +102,7 @@ impl RankFacts {
                 phases.push((phase.name(), nanos));
             }
         }
-        phases.extend([("output", self.output_nanos), ("other", rest)]);
+        phases.extend([("balance", self.balance_nanos), ("output", self.output_nanos), ("other", rest)]);
         phases
     }
 
@@ -126,6 +133,10 @@ impl RankFacts {
             wall_nanos: most(|rank| rank.wall_nanos),
             wait_nanos: most(|rank| rank.wait_nanos),
             output_nanos: most(|rank| rank.output_nanos),
+            balance_nanos: most(|rank| rank.balance_nanos),
+            // These all ranks know alike.
+            tiles_moved: most(|rank| rank.tiles_moved),
+            imbalance: most(|rank| rank.imbalance),
             phase_nanos: std::array::from_fn(|phase| self.phase_nanos[phase].max(other.phase_nanos[phase])),
         }
     }

@@ -1,7 +1,8 @@
 //! The halo of the physics over a transport: one frame per pair of ranks and sync point.
 
+use super::balance::thread_time;
 use crate::plan::Assignment;
-use atoll_core::{CodecError, Frames, Halo, Inbox, Outbox, TileId, Verdict};
+use atoll_core::{CodecError, Frames, Halo, Inbox, Outbox, RestoreError, TileId, Verdict};
 use atoll_transport::{Incoming, Rank, Transport, TransportError};
 use std::time::Duration;
 use thiserror::Error;
@@ -21,24 +22,49 @@ pub(crate) enum ExchangeError {
         /// What is wrong with it.
         error: CodecError,
     },
+    /// A tile came that cannot be taken over.
+    #[error("rank {from} handed over what cannot be read: {error}")]
+    Tile {
+        /// Who gave it up.
+        from: Rank,
+        /// What is wrong with it.
+        error: RestoreError,
+    },
 }
 
 /// One rank's halo.
 #[derive(Debug)]
-pub(crate) struct RankHalo<'a, T> {
+pub(crate) struct RankHalo<T> {
     transport: T,
-    assignment: &'a Assignment,
+    assignment: Assignment,
     /// What goes to each rank; kept for its memory.
     frames: Frames,
     /// What came last; kept for its memory.
     incoming: Incoming,
     waited: Duration,
+    worked: Duration,
 }
 
-impl<'a, T: Transport> RankHalo<'a, T> {
+impl<T: Transport> RankHalo<T> {
     /// A halo that finds tiles by `assignment`, which every rank must hold alike.
-    pub(crate) fn new(transport: T, assignment: &'a Assignment) -> Self {
-        Self { transport, assignment, frames: Frames::default(), incoming: Incoming::default(), waited: Duration::ZERO }
+    pub(crate) fn new(transport: T, assignment: Assignment) -> Self {
+        let (frames, incoming) = Default::default();
+        Self { transport, assignment, frames, incoming, waited: Duration::ZERO, worked: Duration::ZERO }
+    }
+
+    /// Who holds which tile.
+    pub(crate) fn assignment(&self) -> &Assignment {
+        &self.assignment
+    }
+
+    /// From here on tiles are held by others, on every rank alike.
+    pub(crate) fn assign(&mut self, assignment: Assignment) {
+        self.assignment = assignment;
+    }
+
+    /// How long this rank has worked in all sync points, and not waited.
+    pub(crate) fn worked(&self) -> Duration {
+        self.worked
     }
 
     /// How long this rank has waited for others in all sync points.
@@ -52,10 +78,11 @@ impl<'a, T: Transport> RankHalo<'a, T> {
     }
 }
 
-impl<T: Transport> Halo for RankHalo<'_, T> {
+impl<T: Transport> Halo for RankHalo<T> {
     type Error = ExchangeError;
 
     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), ExchangeError> {
+        let begun = thread_time();
         let (own, size) = (self.transport.rank().index(), self.transport.size());
         self.frames.deal(outbox, size, own, &|tile: TileId| self.assignment.rank_of(tile));
         let outgoing = self.transport.prepare(self.frames.lengths())?;
@@ -63,17 +90,20 @@ impl<T: Transport> Halo for RankHalo<'_, T> {
         for (to, bytes) in outgoing.iter_mut().filter(|(_, bytes)| !bytes.is_empty()) {
             self.frames.encode(outbox, to.index(), bytes);
         }
+        self.worked += thread_time().saturating_sub(begun);
         {
             let _span = trace_span!("wait").entered();
             self.transport.exchange(&mut self.incoming)?;
         }
         self.waited += self.incoming.waited();
+        let begun = thread_time();
         // What stays on this rank never becomes bytes.
         outbox.deliver(inbox);
         inbox.hear(Verdict::from_word(self.incoming.flag_word()));
         for (from, bytes) in self.incoming.iter().filter(|(_, bytes)| !bytes.is_empty()) {
             inbox.decode(bytes).map_err(|error| ExchangeError::Frame { from, error })?;
         }
+        self.worked += thread_time().saturating_sub(begun);
         Ok(())
     }
 }

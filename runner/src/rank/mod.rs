@@ -1,5 +1,6 @@
 //! One rank of a run, from an empty world to the last figure.
 
+mod balance;
 mod begin;
 mod end;
 mod facts;
@@ -26,6 +27,7 @@ use crate::error::Exit;
 use crate::plan::Plan;
 use atoll_core::{Phase, SetupError, StepError, StepReport, TileFacts};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
+use balance::Balancer;
 use begin::Beginning;
 use bytemuck::Pod;
 use log::Log;
@@ -135,7 +137,7 @@ fn run<T: Transport>(
     let rank = transport.rank();
     // Before the halo: where this rank fails, the others hear of it before the last of what it writes is written.
     let mut recorder;
-    let mut halo = RankHalo::new(Counting::new(transport), &plan.assignment);
+    let mut halo = RankHalo::new(Counting::new(transport), plan.assignment.clone());
     let Beginning { mut world, resumed } = begin::build(plan, rank, observer, halo.transport())?;
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
@@ -157,6 +159,7 @@ fn run<T: Transport>(
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
         recorder.write_due(&world, false);
     }
+    let mut balancer = Balancer::start(plan, &mut world);
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan.config.run.peer_timeout);
     meetings.linger(&Held { rank, world: &world, last: &last, waited: Duration::ZERO }, halo.transport())?;
@@ -199,6 +202,10 @@ fn run<T: Transport>(
             let waited = halo.waited();
             meetings.hold(&Held { rank, world: &world, last: &last, waited }, halo.transport())?;
         }
+        if let Some(balancer) = &mut balancer {
+            let is_last = last.stopped || *complete == steps;
+            balancer.after_step(&last, is_last, &mut world, &mut halo)?;
+        }
         debug!(step = last.step, contacts = last.contacts, ghosts = last.ghosts, "stepped");
     }
     tracer.before(None);
@@ -221,6 +228,10 @@ fn run<T: Transport>(
         // Waiting for others is part of an exchange, whatever is exchanged.
         facts.phase_nanos[Phase::Exchange as usize] += log.waited().as_nanos() as u64;
         sent = sent.since(&log.sent());
+    }
+    if let Some(balancer) = &balancer {
+        sent = sent.since(&balancer.sent);
+        balancer.tell_of(&mut facts);
     }
     facts.interrupted = interrupted.into();
     facts.migrations = migrations;
@@ -269,10 +280,7 @@ fn records<T: Pod>(parts: &[Vec<u8>]) -> Result<Vec<T>, TransportError> {
 }
 
 fn unreadable(rank: Rank) -> TransportError {
-    TransportError::PeerLost {
-        rank,
-        reason: "its closing figures cannot be read; run one version on all ranks".to_owned(),
-    }
+    TransportError::PeerLost { rank, reason: "what it sent cannot be read; run one version on all ranks".to_owned() }
 }
 
 /// The most memory this process ever held, in bytes; zero where the system does not tell.

@@ -88,6 +88,11 @@ pub struct Summary {
     pub bytes_sent: u64,
     /// Messages sent from rank to rank by steps.
     pub messages_sent: u64,
+    /// The busiest rank's time on a core in a step over the mean of all ranks', the mean over all steps: 1 where all have as much
+    /// to do.
+    pub imbalance: f64,
+    /// Tiles that went from one rank to another to make it less.
+    pub tiles_moved: u64,
     /// In kg.
     pub mass: f64,
     /// In J, rotation included.
@@ -163,6 +168,8 @@ impl Summary {
             colors: all.colors,
             bytes_sent: all.bytes_sent,
             messages_sent: all.messages_sent,
+            imbalance: if all.imbalance > 0 { all.imbalance as f64 * 1e-6 } else { 1.0 },
+            tiles_moved: all.tiles_moved,
             mass: facts.mass,
             kinetic_energy: facts.kinetic_energy,
             mean_half_v2: facts.mean_half_v2,

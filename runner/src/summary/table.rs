@@ -60,6 +60,12 @@ impl Summary {
         )?;
         let sent = self.bytes_sent as f64 * mega;
         row(f, "sent", format_args!("{sent:.1} MB between ranks in {} messages", self.messages_sent))?;
+        if self.ranks > 1 {
+            let (busiest, moved) = (100.0 * (self.imbalance - 1.0), self.tiles_moved);
+            let held =
+                format_args!("the busiest rank has {busiest:.1} % more than the mean to do; {moved} tiles moved");
+            row(f, "balance", held)?;
+        }
         row(f, "memory", format_args!("{:.0} MB at most", self.peak_rss_bytes as f64 * mega))?;
         row(f, "config hash", format_args!("{}", self.config_hash))?;
         row(f, "state hash", format_args!("{}", self.state_hash))?;

@@ -13,6 +13,12 @@ pub enum RestoreError {
         /// The tile asked for.
         tile: TileId,
     },
+    /// The world has the tile already, or it is none of its grid.
+    #[error("saved tile {tile}: this rank cannot take it over")]
+    NotToBeTaken {
+        /// The tile.
+        tile: TileId,
+    },
     /// Saved by another version of the program.
     #[error("saved tile {tile}: of format {found} where {expected} is read: resume with the version that saved it")]
     Version {

@@ -178,7 +178,7 @@ impl World {
     pub fn restore(&mut self, tile: TileId, block: &[u8]) -> Result<(), RestoreError> {
         let place = self.tile_states().binary_search_by_key(&tile, |tile| tile.id);
         let place = place.map_err(|_| RestoreError::NotHere { tile })?;
-        let restored = restore(&self.tile_states()[place], block, &self.setup)?;
+        let restored = restore(tile, self.tile_states()[place].statics.clone(), block, &self.setup)?;
         self.replace_tile(place, restored);
         Ok(())
     }
@@ -243,9 +243,15 @@ impl Reader<'_> {
     }
 }
 
-/// The tile that was saved in `block`, to take the place of `old`.
-fn restore(old: &Tile, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
-    let tile = old.id;
+/// The block of one tile.
+pub(crate) fn block(tile: &Tile) -> Vec<u8> {
+    let mut block = vec![0; length(tile)];
+    save(tile, &mut block);
+    block
+}
+
+/// The tile that was saved in `block`, which these rows of the statics reach.
+pub(crate) fn restore(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
     let header = Header::read(tile, block)?;
     let mut reader = Reader(&block[HEADER..]);
     let (owned, dynamic) = (header.bodies as usize, header.bodies as usize + header.ghosts as usize);
@@ -261,9 +267,9 @@ fn restore(old: &Tile, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError
     let ghost_owners = reader.column(header.ghosts as usize);
     let contacts = header.contacts as usize;
     let contacts = ContactCache { keys: reader.column(contacts), contacts: reader.column(contacts) };
-    old.statics.iter().for_each(|&row| bodies.push(setup.statics[row as usize]));
+    statics.iter().for_each(|&row| bodies.push(setup.statics[row as usize]));
     let unseen = vec![Unseen::default(); dynamic - owned];
-    let empty = Tile::with_statics(tile, old.statics.clone(), setup);
+    let empty = Tile::with_statics(tile, statics, setup);
     let restored = Tile { bodies, owned, unseen, ghost_owners, contacts, sleep, ..empty };
     check(&restored, setup)?;
     let hashes = restored.hashes();

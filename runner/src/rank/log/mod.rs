@@ -85,7 +85,7 @@ impl Log {
         plan: &Plan,
         found: Found,
         resumed: Option<u64>,
-        (world, halo): (&World, &mut RankHalo<'_, Counting<T>>),
+        (world, halo): (&World, &mut RankHalo<Counting<T>>),
         (recorder, observer): (Option<&Recorder<'_>>, &Observer),
     ) -> Result<Self, RankError> {
         let every = &plan.config.output;
@@ -170,7 +170,7 @@ impl Log {
         world: &World,
         step: &StepReport,
         (migrations, written): (u64, Duration),
-        halo: &mut RankHalo<'_, Counting<T>>,
+        halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
         let Some(&figures) = world.figures().filter(|_| step.stopped || self.is_due(world.step_count())) else {
             return Ok(());
@@ -204,7 +204,7 @@ impl Log {
         step: &StepReport,
         figures: Figures,
         now: RankFacts,
-        halo: &mut RankHalo<'_, Counting<T>>,
+        halo: &mut RankHalo<Counting<T>>,
     ) -> Result<Option<String>, RankError> {
         let before = std::mem::replace(&mut self.last, now);
         let since = |figure: fn(&RankFacts) -> u64| figure(&now) - figure(&before);

@@ -1,24 +1,25 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
-use crate::exchange::halo::{Carry, NotCarried};
-use crate::exchange::mail::{Inbox, Mailbag, Outbox};
+mod handover;
+mod stages;
+
+use crate::exchange::mail::{Inbox, Outbox};
 use crate::exchange::verdict::Verdict;
 use crate::model::body::Body;
-use crate::model::error::{SetupError, StepError};
-use crate::model::id::{GlobalId, TileId};
-use crate::model::math::float_mode_is_default;
+use crate::model::error::SetupError;
+use crate::model::id::TileId;
 use crate::model::names::Names;
-use crate::parallel::deal::dealt;
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
 use crate::state::view::TileView;
-use crate::step::phase::{Phase, Stopwatch, Timings};
-use crate::step::stage::{Bench, Hand, Shop, Work};
+use crate::step::phase::Timings;
+use crate::step::stage::{Hand, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
-use crate::tiling::tile::{Fault, Tile, TileCounts};
+use crate::tiling::tile::Tile;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// The tiles one rank holds. The bodies of other ranks' tiles are elsewhere.
 #[derive(Debug)]
@@ -44,6 +45,10 @@ pub struct World {
     /// What this rank has to say at the next exchange.
     verdict: Verdict,
     timings: Timings,
+    /// By which the time spent on each tile is booked, if it is.
+    clock: Option<Clock>,
+    /// So far.
+    booked: Duration,
     /// Whether the next step measures how well its contacts are solved.
     pub(crate) measures: bool,
     /// Whether the next step takes figures, and what the last one took.
@@ -53,12 +58,8 @@ pub struct World {
     warned_of_leaps: bool,
 }
 
-/// Whether every thread works on tiles of its own. Where there are fewer tiles than threads, all work on one tile after
-/// the other; not both, as who waits for others within a tile might be handed another tile, and its work is taken.
-fn apart(tiles: usize) -> bool {
-    let threads = rayon::current_num_threads();
-    threads > 1 && tiles >= threads
-}
+/// A clock to book the time of tiles by: how long the thread that asks has worked so far, or how late it is.
+pub type Clock = fn() -> Duration;
 
 impl World {
     /// An empty world of the given tiles. None at all is allowed: a rank without work still takes part in exchanges.
@@ -90,8 +91,7 @@ impl World {
 
     /// A world of some tiles, which are in ascending order.
     fn of(setup: Arc<Setup>, tiles: Vec<Tile>) -> Self {
-        let names: Vec<_> = tiles.iter().map(|tile| tile.id).collect();
-        let inbox = Inbox::new(&names, setup.grid.tiles(), setup.dynamic_kinds);
+        let inbox = Inbox::new(tiles.iter().map(|tile| tile.id), setup.grid.tiles(), setup.dynamic_kinds);
         Self {
             setup,
             works: tiles.iter().map(|_| None).collect(),
@@ -107,6 +107,8 @@ impl World {
             sync: 0,
             verdict: Verdict::default(),
             timings: Timings::default(),
+            clock: None,
+            booked: Duration::ZERO,
             measures: false,
             takes_figures: false,
             figures: None,
@@ -213,6 +215,22 @@ impl World {
         *self.tiles.par_iter().filter(|tile| !tile.is_idle()).map(of_tile).reduce(Box::default, both)
     }
 
+    /// Has the time that is worked on each tile booked from here on. Times never enter a result.
+    pub fn book_time(&mut self, clock: Clock) {
+        self.clock = Some(clock);
+    }
+
+    /// All time that was booked so far, of all threads together.
+    pub fn booked_time(&self) -> Duration {
+        self.booked
+    }
+
+    /// The time booked for each tile since this was last asked for, in the order of [`tiles`](Self::tiles), of all threads that
+    /// worked on it together.
+    pub fn take_booked_times(&mut self) -> impl Iterator<Item = (TileId, Duration)> {
+        self.tiles.iter_mut().map(|tile| (tile.id, std::mem::take(&mut tile.booked)))
+    }
+
     /// Time spent in each phase so far, as shares of the wall clock.
     pub fn timings(&self) -> &Timings {
         &self.timings
@@ -242,150 +260,5 @@ impl World {
     pub(crate) fn replace_tile(&mut self, place: usize, tile: Tile) {
         self.tiles[place] = tile;
         self.changed = true;
-    }
-
-    /// Starts a step: no sync point passed, nothing counted.
-    pub(crate) fn begin_step(&mut self) {
-        self.sync = 0;
-        let threads = rayon::current_num_threads();
-        if self.hands.len() < threads {
-            self.hands.resize_with(threads, Mutex::default);
-        }
-        if std::mem::take(&mut self.changed) {
-            let tiles = (0..).zip(&self.tiles);
-            self.busy.clear();
-            self.busy.extend(tiles.filter(|(_, tile)| !tile.is_bare()).map(|(place, _)| place));
-        }
-        for &place in &self.busy {
-            self.tiles[place as usize].counts = TileCounts::default();
-        }
-    }
-
-    /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
-    pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
-        let threads = if apart(self.busy.len()) { rayon::current_num_threads() as u32 } else { 1 };
-        self.figures = std::mem::take(&mut self.takes_figures).then(Box::default);
-        for hand in &mut self.hands {
-            let hand = hand.get_mut().expect("no stage panicked");
-            if let Some(figures) = &mut self.figures {
-                figures.merge(&std::mem::take(&mut hand.figures));
-            }
-            self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
-        }
-        if leaps > 0 && !self.warned_of_leaps {
-            self.warned_of_leaps = true;
-            tracing::warn!(
-                "step {}: {leaps} bodies moved past a neighbouring tile; larger tiles or a speed limit are faster",
-                self.step
-            );
-        }
-        if let Some(id) = not_finite {
-            self.verdict = self.verdict.merge(Verdict { failure: Some((self.step, id)), ..Verdict::default() });
-        }
-        (self.verdict.meet, self.verdict.far) = (false, false);
-        self.measures = false;
-        self.step += 1;
-    }
-
-    /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.
-    pub(crate) fn has_failed(&self) -> bool {
-        self.verdict.failure.is_some()
-    }
-
-    /// Lets all ranks hear with the next sync point whether a body of a tile that had something to do goes far.
-    pub(crate) fn tell_of_far_bodies(&mut self) {
-        self.verdict.far = self.busy.iter().any(|&place| self.tiles[place as usize].counts.far);
-    }
-
-    /// One sync point. What all ranks together have to say comes back.
-    pub(crate) fn exchange(&mut self, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
-        let _span = tracing::trace_span!("exchange", sync = self.sync).entered();
-        let mut watch = Stopwatch::start();
-        self.outbox.verdict = self.verdict;
-        (self.outbox.step, self.outbox.sync) = (self.step, self.sync);
-        self.outbox.bags.resize_with(self.hands.len(), Mailbag::default);
-        for (hand, bag) in self.hands.iter_mut().zip(&mut self.outbox.bags) {
-            std::mem::swap(&mut hand.get_mut().expect("no stage panicked").outgoing, bag);
-        }
-        self.inbox.begin(self.step, self.sync);
-        self.sync += 1;
-        halo(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
-        self.inbox.end(&mut self.outbox);
-        watch.lap(Phase::Exchange, &mut self.timings);
-        Ok(self.inbox.verdict)
-    }
-
-    /// Counts those tiles among the busy ones that bodies come to.
-    pub(crate) fn welcome_heirs(&mut self) {
-        let Self { busy, tiles, inbox, .. } = self;
-        let owners = busy.len();
-        for heir in inbox.heirs() {
-            let tile = &mut tiles[heir as usize];
-            if tile.is_bare() {
-                tile.counts = TileCounts::default();
-                busy.push(heir);
-            }
-        }
-        if busy.len() > owners {
-            busy.sort_unstable();
-            busy.dedup();
-        }
-    }
-
-    /// Counts those tiles no longer among the busy ones that bodies have left. Now it is known who works on what: where
-    /// threads help within tiles, each of them is asked how it computes, once a step; else in every stage.
-    pub(crate) fn dismiss_idle(&mut self) {
-        let Self { busy, dismissed, tiles, works, .. } = self;
-        dismissed.clear();
-        dismissed.extend(busy.extract_if(.., |&mut place| tiles[place as usize].is_idle()));
-        for &place in &*dismissed {
-            works[place as usize] = None;
-        }
-        let helped = rayon::current_num_threads() > 1 && !apart(busy.len());
-        if helped && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok) {
-            busy.iter().for_each(|&place| tiles[place as usize].counts.fault = Some(Fault::FloatMode));
-        }
-    }
-
-    /// A stage over the busy tiles, in parallel; their results in order.
-    pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
-        self.each(|bench, _| stage(bench))
-    }
-
-    /// As [`each_tile`](Self::each_tile), with work that each tile keeps from stage to stage.
-    pub(crate) fn each_tile_apart(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
-        self.each(|bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
-    }
-
-    fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
-        let apart = apart(self.busy.len());
-        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, .. } = self;
-        let team = if apart { Team::ALONE } else { Team::of_pool() };
-        let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
-        let (hands, inbox) = (&*hands, &*inbox);
-        let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
-            let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
-            if !float_mode_is_default() {
-                tile.counts.fault = Some(Fault::FloatMode);
-            }
-            stage(&mut Bench::new(shop, tile, inbox.mail(place), &mut hand), own)
-        };
-        let mut rest = (0, &mut tiles[..], &mut works[..]);
-        let tiles = busy.iter().map(|&place| {
-            let place = place as usize;
-            let (first, tiles, works) = std::mem::take(&mut rest);
-            let (tile, tiles) = tiles[place - first..].split_first_mut().expect("busy tiles are tiles");
-            let (work, works) = works[place - first..].split_first_mut().expect("busy tiles are tiles");
-            rest = (place + 1, tiles, works);
-            (place, tile, work)
-        });
-        if !apart {
-            return tiles.map(run).collect();
-        }
-        let dealt = dealt(tiles.collect(), |(_, tile, _)| tile.work(), rayon::current_num_threads());
-        let in_place = |job: (usize, &mut Tile, &mut Option<Box<Work>>)| (job.0, run(job));
-        let mut results: Vec<_> = dealt.into_par_iter().with_max_len(1).map(in_place).collect();
-        results.sort_unstable_by_key(|&(place, _)| place);
-        results.into_iter().map(|(_, result)| result).collect()
     }
 }

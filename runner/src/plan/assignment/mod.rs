@@ -1,10 +1,14 @@
-//! Which rank holds which tiles: contiguous runs along a Hilbert curve, of about equal weight.
+//! Which rank holds which tiles: at first contiguous runs along a Hilbert curve, of about equal weight.
 //!
 //! A run of the curve is compact, so a rank's tiles mostly border each other and few bytes leave the rank. Only integers
 //! are compared, so every rank computes the same assignment from the same weights. The assignment decides how a world
 //! is computed and never what comes out.
 
+mod curve;
+mod refine;
+
 use atoll_core::{TileGrid, TileId};
+use curve::hilbert_order;
 
 /// A rank for every tile.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -47,6 +51,14 @@ impl Assignment {
         Self { rank_of, ranks }
     }
 
+    /// One by which about half of all tiles are held by the next rank, others after every step: to test that nothing depends on
+    /// who holds a tile.
+    pub fn shuffled(&self, step: u64) -> Self {
+        let goes = |tile: u64| ((tile << 32 | step & 0xffff_ffff).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) & 1;
+        let next = |(tile, &rank): (u64, &u32)| (rank + goes(tile) as u32) % self.ranks as u32;
+        Self { rank_of: (0..).zip(&self.rank_of).map(next).collect(), ranks: self.ranks }
+    }
+
     /// The rank that holds a tile.
     pub fn rank_of(&self, tile: TileId) -> usize {
         self.rank_of[tile.0 as usize] as usize
@@ -69,42 +81,6 @@ impl Assignment {
     }
 }
 
-/// All tiles (row * columns + column) in the order in which the Hilbert curve over the smallest power-of-two square
-/// around the grid visits them.
-fn hilbert_order(columns: usize, rows: usize) -> Vec<usize> {
-    let side = columns.max(rows).next_power_of_two();
-    let mut tiles: Vec<usize> = (0..columns * rows).collect();
-    tiles.sort_by_cached_key(|tile| hilbert_index(side, tile % columns, tile / columns));
-    tiles
-}
-
-/// Distance along the Hilbert curve through a square of `side` (a power of two) cells a side, at cell (x, y).
-fn hilbert_index(side: usize, mut x: usize, mut y: usize) -> u64 {
-    let mut index = 0;
-    let mut half = side / 2;
-    while half > 0 {
-        let (right, upper) = (x & half != 0, y & half != 0);
-        let quadrant: u64 = match (right, upper) {
-            (false, false) => 0,
-            (false, true) => 1,
-            (true, true) => 2,
-            (true, false) => 3,
-        };
-        index += quadrant * (half as u64) * (half as u64);
-        x &= half - 1;
-        y &= half - 1;
-        // The curve enters the lower quadrants turned by a quarter and mirrored.
-        if !upper {
-            if right {
-                (x, y) = (half - 1 - x, half - 1 - y);
-            }
-            (x, y) = (y, x);
-        }
-        half /= 2;
-    }
-    index
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,21 +93,6 @@ mod tests {
     fn loads(assignment: &Assignment, weights: &[u64]) -> Vec<u64> {
         let load = |rank| assignment.tiles_of(rank).iter().map(|tile| weights[tile.0 as usize]).sum();
         (0..assignment.ranks()).map(load).collect()
-    }
-
-    #[test]
-    fn the_curve_visits_every_cell_of_a_square_in_unit_steps() {
-        for side in [1_usize, 2, 4, 8, 32] {
-            let order = hilbert_order(side, side);
-            let mut sorted = order.clone();
-            sorted.sort_unstable();
-            assert!(sorted.into_iter().eq(0..side * side));
-            assert_eq!(order[0], 0);
-            for pair in order.windows(2) {
-                let (dx, dy) = ((pair[0] % side).abs_diff(pair[1] % side), (pair[0] / side).abs_diff(pair[1] / side));
-                assert_eq!(dx + dy, 1, "side {side}: {pair:?}");
-            }
-        }
     }
 
     #[test]

@@ -1,0 +1,179 @@
+//! How a world goes through a step: stage by stage over the tiles that have something to do.
+
+use super::World;
+use crate::exchange::halo::{Carry, NotCarried};
+use crate::exchange::mail::Mailbag;
+use crate::exchange::verdict::Verdict;
+use crate::model::error::StepError;
+use crate::model::id::GlobalId;
+use crate::model::math::float_mode_is_default;
+use crate::parallel::deal::dealt;
+use crate::parallel::team::Team;
+use crate::step::phase::{Phase, Stopwatch};
+use crate::step::stage::{Bench, Shop, Work};
+use crate::tiling::tile::{Fault, Tile, TileCounts};
+use rayon::prelude::*;
+use std::sync::Mutex;
+
+/// Whether every thread works on tiles of its own. Where there are fewer tiles than threads, all work on one tile after
+/// the other; not both, as who waits for others within a tile might be handed another tile, and its work is taken.
+fn apart(tiles: usize) -> bool {
+    let threads = rayon::current_num_threads();
+    threads > 1 && tiles >= threads
+}
+
+impl World {
+    /// Starts a step: no sync point passed, nothing counted.
+    pub(crate) fn begin_step(&mut self) {
+        self.sync = 0;
+        let threads = rayon::current_num_threads();
+        if self.hands.len() < threads {
+            self.hands.resize_with(threads, Mutex::default);
+        }
+        if std::mem::take(&mut self.changed) {
+            let tiles = (0..).zip(&self.tiles);
+            self.busy.clear();
+            self.busy.extend(tiles.filter(|(_, tile)| !tile.is_bare()).map(|(place, _)| place));
+        }
+        for &place in &self.busy {
+            self.tiles[place as usize].counts = TileCounts::default();
+        }
+    }
+
+    /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
+    pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
+        let threads = if apart(self.busy.len()) { rayon::current_num_threads() as u32 } else { 1 };
+        self.figures = std::mem::take(&mut self.takes_figures).then(Box::default);
+        for hand in &mut self.hands {
+            let hand = hand.get_mut().expect("no stage panicked");
+            if let Some(figures) = &mut self.figures {
+                figures.merge(&std::mem::take(&mut hand.figures));
+            }
+            self.booked += std::mem::take(&mut hand.booked);
+            self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
+        }
+        if leaps > 0 && !self.warned_of_leaps {
+            self.warned_of_leaps = true;
+            tracing::warn!(
+                "step {}: {leaps} bodies moved past a neighbouring tile; larger tiles or a speed limit are faster",
+                self.step
+            );
+        }
+        if let Some(id) = not_finite {
+            self.verdict = self.verdict.merge(Verdict { failure: Some((self.step, id)), ..Verdict::default() });
+        }
+        (self.verdict.meet, self.verdict.far) = (false, false);
+        self.measures = false;
+        self.step += 1;
+    }
+
+    /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.
+    pub fn has_failed(&self) -> bool {
+        self.verdict.failure.is_some()
+    }
+
+    /// Lets all ranks hear with the next sync point whether a body of a tile that had something to do goes far.
+    pub(crate) fn tell_of_far_bodies(&mut self) {
+        self.verdict.far = self.busy.iter().any(|&place| self.tiles[place as usize].counts.far);
+    }
+
+    /// One sync point. What all ranks together have to say comes back.
+    pub(crate) fn exchange(&mut self, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
+        let _span = tracing::trace_span!("exchange", sync = self.sync).entered();
+        let mut watch = Stopwatch::start();
+        self.outbox.verdict = self.verdict;
+        (self.outbox.step, self.outbox.sync) = (self.step, self.sync);
+        self.outbox.bags.resize_with(self.hands.len(), Mailbag::default);
+        for (hand, bag) in self.hands.iter_mut().zip(&mut self.outbox.bags) {
+            std::mem::swap(&mut hand.get_mut().expect("no stage panicked").outgoing, bag);
+        }
+        self.inbox.begin(self.step, self.sync);
+        self.sync += 1;
+        halo(&mut self.outbox, &mut self.inbox).map_err(StepError::Halo)?;
+        self.inbox.end(&mut self.outbox);
+        watch.lap(Phase::Exchange, &mut self.timings);
+        Ok(self.inbox.verdict)
+    }
+
+    /// Counts those tiles among the busy ones that bodies come to.
+    pub(crate) fn welcome_heirs(&mut self) {
+        let Self { busy, tiles, inbox, .. } = self;
+        let owners = busy.len();
+        for heir in inbox.heirs() {
+            let tile = &mut tiles[heir as usize];
+            if tile.is_bare() {
+                tile.counts = TileCounts::default();
+                busy.push(heir);
+            }
+        }
+        if busy.len() > owners {
+            busy.sort_unstable();
+            busy.dedup();
+        }
+    }
+
+    /// Counts those tiles no longer among the busy ones that bodies have left. Now it is known who works on what: where
+    /// threads help within tiles, each of them is asked how it computes, once a step; else in every stage.
+    pub(crate) fn dismiss_idle(&mut self) {
+        let Self { busy, dismissed, tiles, works, .. } = self;
+        dismissed.clear();
+        dismissed.extend(busy.extract_if(.., |&mut place| tiles[place as usize].is_idle()));
+        for &place in &*dismissed {
+            works[place as usize] = None;
+        }
+        let helped = rayon::current_num_threads() > 1 && !apart(busy.len());
+        if helped && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok) {
+            busy.iter().for_each(|&place| tiles[place as usize].counts.fault = Some(Fault::FloatMode));
+        }
+    }
+
+    /// A stage over the busy tiles, in parallel; their results in order.
+    pub(crate) fn each_tile<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>) -> R + Sync) -> Vec<R> {
+        self.each(|bench, _| stage(bench))
+    }
+
+    /// As [`each_tile`](Self::each_tile), with work that each tile keeps from stage to stage.
+    pub(crate) fn each_tile_apart(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each(|bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
+    }
+
+    fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
+        let apart = apart(self.busy.len());
+        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, clock, .. } = self;
+        let team = if apart { Team::ALONE } else { Team::of_pool() };
+        let workers = if apart { 1 } else { rayon::current_num_threads() as u32 };
+        let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
+        let (hands, inbox) = (&*hands, &*inbox);
+        let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
+            let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
+            if !float_mode_is_default() {
+                tile.counts.fault = Some(Fault::FloatMode);
+            }
+            let begun = clock.map(|clock| clock());
+            let result = stage(&mut Bench::new(shop, tile, inbox.mail(place), &mut hand), own);
+            if let Some((clock, begun)) = clock.zip(begun) {
+                let worked = clock().saturating_sub(begun) * workers;
+                tile.booked += worked;
+                hand.booked += worked;
+            }
+            result
+        };
+        let mut rest = (0, &mut tiles[..], &mut works[..]);
+        let tiles = busy.iter().map(|&place| {
+            let place = place as usize;
+            let (first, tiles, works) = std::mem::take(&mut rest);
+            let (tile, tiles) = tiles[place - first..].split_first_mut().expect("busy tiles are tiles");
+            let (work, works) = works[place - first..].split_first_mut().expect("busy tiles are tiles");
+            rest = (place + 1, tiles, works);
+            (place, tile, work)
+        });
+        if !apart {
+            return tiles.map(run).collect();
+        }
+        let dealt = dealt(tiles.collect(), |(_, tile, _)| tile.work(), rayon::current_num_threads());
+        let in_place = |job: (usize, &mut Tile, &mut Option<Box<Work>>)| (job.0, run(job));
+        let mut results: Vec<_> = dealt.into_par_iter().with_max_len(1).map(in_place).collect();
+        results.sort_unstable_by_key(|&(place, _)| place);
+        results.into_iter().map(|(_, result)| result).collect()
+    }
+}
