@@ -80,6 +80,8 @@ fn killed_runs_go_on_elsewhere() {
             let killed = folder.path().join(format!("killed-{w}-{time}"));
             let mut command = way.command(1 + number(0, 4), CONFIG);
             options(&mut command);
+            // Half of the tiles are on their way between any two steps.
+            command.args(["--set", "balance=shuffled"]);
             // Nobody removes what MPI has for a job that is killed with its launcher, so that lies here as well.
             for variable in ["TMPDIR", "OMPI_MCA_btl_vader_backing_directory"] {
                 command.env(variable, folder.path());

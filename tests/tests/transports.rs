@@ -25,6 +25,15 @@ fn options(options: &'static [&'static str]) -> &'static [&'static str] {
     if std::env::var_os("ATOLL_FULL_LENGTH").is_some() { &options[..options.len() - 2] } else { options }
 }
 
+/// Rules by which tiles move from rank to rank, one for each of [`RANKS`]; at full length all of them.
+const BALANCES: [&str; 5] = ["measured", "bodies", "shuffled", "measured", "off"];
+
+fn balances(ranks: usize) -> impl Iterator<Item = &'static str> {
+    let all = std::env::var_os("ATOLL_FULL_LENGTH").is_some() && ranks > 1;
+    let own = RANKS.iter().position(|&other| other == ranks).expect("one of these");
+    BALANCES.into_iter().enumerate().filter(move |&(i, _)| if all { i > 0 } else { i == own }).map(|(_, rule)| rule)
+}
+
 #[test]
 fn every_transport_and_number_of_ranks_gives_the_same_hashes() {
     for (config, given) in SCENES {
@@ -35,13 +44,21 @@ fn every_transport_and_number_of_ranks_gives_the_same_hashes() {
             for ranks in RANKS.into_iter().filter(|&ranks| way.supports(ranks)) {
                 // Threads within ranks that pass messages, for some.
                 let threads = if ranks == 3 { "2" } else { "1" };
-                let found = summary(way.command(ranks, config).args(given).args(["--threads", threads]));
-                for key in ["state_hash", "contact_hash", "config_hash", "steps", "bodies_lost"] {
-                    assert_eq!(found[key], expected[key], "{key} of {config} over {way} on {ranks} ranks");
+                for balance in balances(ranks) {
+                    let moves = format!("balance={balance}");
+                    let how = ["--threads", threads, "--set", &moves];
+                    let found = summary(way.command(ranks, config).args(given).args(how));
+                    for key in ["state_hash", "contact_hash", "config_hash", "steps", "bodies_lost"] {
+                        assert_eq!(found[key], expected[key], "{key} of {config} over {way} on {ranks} ranks, {moves}");
+                    }
+                    let moved = found["tiles_moved"].as_u64().unwrap();
+                    assert!(balance != "shuffled" || moved > 100, "{moved} tiles moved over {way}");
+                    assert!(balance != "off" && ranks > 1 || moved == 0, "{moved} tiles moved over {way}");
+                    assert!(found["imbalance"].as_f64().unwrap() >= 1.0, "{way} on {ranks} ranks");
+                    assert_eq!(found["transport"], way.transport());
+                    assert_eq!(found["ranks"], ranks, "{way}");
+                    passed_between_ranks += u64::from(found["bytes_sent"].as_u64().unwrap() > 0);
                 }
-                assert_eq!(found["transport"], way.transport());
-                assert_eq!(found["ranks"], ranks, "{way}");
-                passed_between_ranks += u64::from(found["bytes_sent"].as_u64().unwrap() > 0);
             }
         }
         assert!(

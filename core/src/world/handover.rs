@@ -63,3 +63,92 @@ impl World {
         self.changed = true;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Loopback;
+    use crate::model::body::{Body, StaticBody};
+    use crate::model::id::{GlobalId, KindId};
+    use crate::model::params::Params;
+    use crate::step::step;
+    use crate::testing::{circle, rectangle};
+    use crate::tiling::blueprint::Blueprint;
+    use crate::tiling::partition::TileGrid;
+    use glam::{DVec2, Vec2};
+
+    /// A heap of discs and boxes over the borders of four tiles.
+    fn world() -> World {
+        let params = Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() };
+        let grid = TileGrid::new(DVec2::new(-4.0, 0.0), DVec2::new(4.0, 4.0), 4, 1).unwrap();
+        let statics = vec![StaticBody::new(GlobalId(0), rectangle(20.0, 2.0), DVec2::new(0.0, -1.0))];
+        let blueprint = Blueprint { params, grid, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics };
+        let mut world = World::whole(&blueprint).unwrap();
+        for k in 0..60_u32 {
+            let place = DVec2::new(0.51 * f64::from(k % 12) - 3.0, 0.25 + 0.51 * f64::from(k / 12));
+            world.add(Body::at_rest(GlobalId(u64::from(k) + 1), KindId(u32::from(k % 3 > 0)), place)).unwrap();
+        }
+        world
+    }
+
+    #[test]
+    fn tiles_that_went_and_came_back_show_nowhere() {
+        let (mut stays, mut goes) = (world(), world());
+        for number in 0..40 {
+            step(&mut stays, &mut Loopback).unwrap();
+            step(&mut goes, &mut Loopback).unwrap();
+            let all = [0, 1, 2, 3].map(TileId);
+            let leaving: Vec<TileId> = all.into_iter().filter(|tile| (number + tile.0 * tile.0) % 3 != 0).collect();
+            let blocks = goes.give_up(&leaving);
+            assert!(goes.tiles().eq(all.into_iter().filter(|tile| !leaving.contains(tile))));
+            // In another order, and each by itself.
+            for (tile, block) in leaving.iter().zip(&blocks).rev() {
+                goes.take_over(&[(*tile, block)]).unwrap();
+            }
+            assert!(goes.tiles().eq(all));
+            assert_eq!(goes.hashes(), stays.hashes(), "after step {number}");
+        }
+        assert!(stays.tile_states().iter().all(|tile| tile.contacts.keys.iter().any(|key| key.is_border())));
+    }
+
+    #[test]
+    fn what_cannot_be_taken_over_changes_nothing() {
+        let mut world = world();
+        step(&mut world, &mut Loopback).unwrap();
+        let before = world.hashes();
+        let block = snapshot::block(&world.tiles[1]);
+        let refused = |world: &mut World, blocks: &[(TileId, &[u8])]| world.take_over(blocks).unwrap_err();
+        assert_eq!(refused(&mut world, &[(TileId(1), &block)]), RestoreError::NotToBeTaken { tile: TileId(1) });
+        assert_eq!(refused(&mut world, &[(TileId(7), &block)]), RestoreError::NotToBeTaken { tile: TileId(7) });
+        assert_eq!(world.hashes(), before);
+        let blocks = world.give_up(&[TileId(1), TileId(3)]);
+        let left = world.hashes();
+        let twice = [(TileId(1), &blocks[0][..]), (TileId(1), &blocks[0])];
+        assert_eq!(refused(&mut world, &twice), RestoreError::NotToBeTaken { tile: TileId(1) });
+        let wrong = [(TileId(1), &blocks[0][..]), (TileId(3), &blocks[0])];
+        assert_eq!(refused(&mut world, &wrong), RestoreError::OtherTile { tile: TileId(3), found: TileId(1) });
+        let mut damaged = blocks[1].clone();
+        damaged[100] ^= 1;
+        let damaged = [(TileId(1), &blocks[0][..]), (TileId(3), &damaged)];
+        assert_eq!(refused(&mut world, &damaged), RestoreError::Damaged { tile: TileId(3) });
+        assert_eq!(world.hashes(), left);
+        world.take_over(&[(TileId(1), &blocks[0]), (TileId(3), &blocks[1])]).unwrap();
+        assert_eq!(world.hashes(), before);
+    }
+
+    #[test]
+    fn the_time_of_each_tile_is_booked() {
+        use std::sync::atomic::{AtomicU64, Ordering};
+        use std::time::Duration;
+        static CLOCK: AtomicU64 = AtomicU64::new(0);
+        let mut world = world();
+        step(&mut world, &mut Loopback).unwrap();
+        assert!(world.booked_time().is_zero());
+        world.book_time(|| Duration::from_nanos(CLOCK.fetch_add(1, Ordering::Relaxed)));
+        step(&mut world, &mut Loopback).unwrap();
+        let booked: Vec<(TileId, Duration)> = world.take_booked_times().collect();
+        assert!(booked.iter().all(|(_, time)| !time.is_zero()), "{booked:?}");
+        assert_eq!(booked.iter().map(|(_, time)| *time).sum::<Duration>(), world.booked_time());
+        assert!(world.take_booked_times().all(|(_, time)| time.is_zero()));
+    }
+}

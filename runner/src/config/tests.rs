@@ -101,6 +101,7 @@ fn every_key_can_be_given() {
         peer_timeout = 2.5
         instructions = "portable"
         mpi_exchange = "sparse"
+        balance = "bodies"
         [physics]
         hertz = 120
         substeps = 2
@@ -141,6 +142,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
     assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
+    assert_eq!(config.run.balance, Balance::Bodies);
     assert_eq!(config.params.instructions, Instructions::Portable);
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
     assert_eq!((config.params.max_linear_speed, config.params.margin_cap), (f32::INFINITY, 0.4));

@@ -57,6 +57,11 @@ impl<T: Transport> RankHalo<T> {
         &self.assignment
     }
 
+    /// Both who holds which tile, and the transport.
+    pub(crate) fn parts(&mut self) -> (&Assignment, &mut T) {
+        (&self.assignment, &mut self.transport)
+    }
+
     /// From here on tiles are held by others, on every rank alike.
     pub(crate) fn assign(&mut self, assignment: Assignment) {
         self.assignment = assignment;

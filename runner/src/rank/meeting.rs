@@ -3,7 +3,9 @@
 //! Rank 0 lets the ranks know by the word that every step carries anyway ([`World::request_meeting`]), so that nothing is sent
 //! while nobody has a question.
 
+use super::halo::RankHalo;
 use super::{Observer, RankError};
+use crate::plan::Assignment;
 use atoll_core::{StepReport, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport, TransportError};
 use std::fmt::Debug;
@@ -27,6 +29,8 @@ pub struct Held<'a> {
     pub rank: Rank,
     /// Its world.
     pub world: &'a World,
+    /// Who holds which tile.
+    pub assignment: &'a Assignment,
     /// What the last step was like; that of no step before the first.
     pub last: &'a StepReport,
     /// How long it has waited for other ranks in all steps.
@@ -93,20 +97,29 @@ impl<'a> Meetings<'a> {
     /// If a rank is lost.
     pub(super) fn linger<T: Transport>(
         &mut self,
-        held: &Held<'_>,
-        transport: &mut Counting<T>,
+        world: &World,
+        last: &StepReport,
+        halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
-        if self.host().is_some_and(Host::lingers) { self.hold(held, transport) } else { Ok(()) }
+        if self.host().is_some_and(Host::lingers) { self.hold(world, last, halo) } else { Ok(()) }
     }
 
     /// Meets, until rank 0 lets time go on, or somebody asks the run to stop.
     ///
     /// # Errors
     /// If a rank is lost.
-    pub(super) fn hold<T: Transport>(&mut self, held: &Held<'_>, transport: &mut Counting<T>) -> Result<(), RankError> {
+    pub(super) fn hold<T: Transport>(
+        &mut self,
+        world: &World,
+        last: &StepReport,
+        halo: &mut RankHalo<Counting<T>>,
+    ) -> Result<(), RankError> {
         let Some(host) = self.host() else { return Ok(()) };
+        let (waited, rank) = (halo.waited(), halo.transport().rank());
+        let (assignment, transport) = halo.parts();
+        let held = Held { rank, world, assignment, last, waited };
         let before = transport.stats();
-        while self.go_round(host, held, transport).map_err(RankError::Transport)? {}
+        while self.go_round(host, &held, transport).map_err(RankError::Transport)? {}
         self.sent += transport.stats().since(&before);
         Ok(())
     }

@@ -162,7 +162,7 @@ fn run<T: Transport>(
     let mut balancer = Balancer::start(plan, &mut world);
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan.config.run.peer_timeout);
-    meetings.linger(&Held { rank, world: &world, last: &last, waited: Duration::ZERO }, halo.transport())?;
+    meetings.linger(&world, &last, &mut halo)?;
     while world.step_count() < steps && !last.stopped {
         let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
         if observer.stop.is_requested() || unwritten {
@@ -185,7 +185,8 @@ fn run<T: Transport>(
         observer.complete.store(*complete, Ordering::Relaxed);
         if let Some(log) = &mut log {
             let written = recorder.as_ref().map_or(Duration::ZERO, Recorder::time);
-            log.write_due(&world, &last, (migrations, written), &mut halo)?;
+            let balanced = balancer.as_ref().map_or(Duration::ZERO, Balancer::time);
+            log.write_due(&world, &last, (migrations, written, balanced), &mut halo)?;
             match (log.take_failure(), &recorder) {
                 // Before a snapshot that would be gone on from without the rows until then.
                 (Some(failure), Some(recorder)) => recorder.fail(failure),
@@ -199,8 +200,7 @@ fn run<T: Transport>(
         observer.show(rank, &world);
         told.made(*complete);
         if last.meeting {
-            let waited = halo.waited();
-            meetings.hold(&Held { rank, world: &world, last: &last, waited }, halo.transport())?;
+            meetings.hold(&world, &last, &mut halo)?;
         }
         if let Some(balancer) = &mut balancer {
             let is_last = last.stopped || *complete == steps;
@@ -242,7 +242,7 @@ fn run<T: Transport>(
     facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
     if !last.stopped {
-        meetings.linger(&Held { rank, world: &world, last: &last, waited: halo.waited() }, halo.transport())?;
+        meetings.linger(&world, &last, &mut halo)?;
     }
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {

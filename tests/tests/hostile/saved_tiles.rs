@@ -9,14 +9,14 @@ use atoll::scene::SplitMix64;
 use atoll_core::{RestoreError, TileId};
 use atoll_tests::fuzz::{self, BLOCK};
 
-/// Every kind of refusal that a block can meet. Not among them is [`RestoreError::NotHere`]: which tile is asked for is not
-/// said by the block.
+/// Every kind of refusal that a block can meet. Not among them are those about which tile is asked for, which is not said
+/// by the block.
 const KINDS: [&str; 9] =
     ["version", "other tile", "length", "damaged", "bad body", "bad rest", "bad ghost", "bad contact", "hashes"];
 
 fn kind(error: &RestoreError) -> &'static str {
     match error {
-        RestoreError::NotHere { .. } => "not here",
+        RestoreError::NotHere { .. } | RestoreError::NotToBeTaken { .. } => "not here",
         RestoreError::Version { .. } => KINDS[0],
         RestoreError::OtherTile { .. } => KINDS[1],
         RestoreError::Length { .. } => KINDS[2],

@@ -1,6 +1,6 @@
 //! A run that is looked at is the run that is not.
 
-use atoll_tests::page::{Page, Served};
+use atoll_tests::page::{Heard, Page, Served};
 use atoll_tests::program::{self, run_to_summary};
 use atoll_tests::ways::Way;
 use serde_json::{Value, json};
@@ -29,12 +29,16 @@ pub(crate) fn domain(hello: &Value) -> [f64; 4] {
 fn a_run_under_the_eyes_of_a_restless_page_comes_to_the_same_hashes() {
     let folder = tempdir().unwrap();
     let config = "configs/quickstart.toml";
-    let alone = run_to_summary(Way::Channel.command(2, config).args(small(STEPS)), &folder.path().join("alone.json"));
+    let moves = ["--set", "balance=shuffled"];
+    let alone = run_to_summary(
+        Way::Channel.command(2, config).args(small(STEPS)).args(moves),
+        &folder.path().join("alone.json"),
+    );
     for way in Way::all() {
         let ranks = if way == Way::Local { 1 } else { 2 };
         let json = folder.path().join("watched.json");
         let mut command = way.command(ranks, config);
-        let served = Served::start(command.args(small(STEPS)).args(["--view", "--json"]).arg(&json));
+        let served = Served::start(command.args(small(STEPS)).args(moves).args(["--view", "--json"]).arg(&json));
         let mut page = Page::open(&served);
         let hello = page.hello();
         assert_eq!((&hello["recorded"], &hello["last_step"]), (&json!(false), &json!(STEPS)), "{way}");
@@ -80,7 +84,8 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let out = folder.path().join("out");
     let mut command = program::command();
     command
-        .args(["run", "configs/quickstart.toml", "--ranks", "2", "--view", "--checkpoint-every", "1000", "--out"])
+        .args(["run", "configs/quickstart.toml", "--ranks", "2", "--set", "balance=shuffled", "--view"])
+        .args(["--checkpoint-every", "1000", "--out"])
         .arg(&out);
     let served = Served::start(command.args(small(4_000_000_000)));
     let mut page = Page::open(&served);
@@ -89,6 +94,16 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     page.look(domain(&hello), [320, 240], "kind");
     let (step, _) = page.frame().unwrap();
     page.wish(&json!({ "do": "step", "by": 3 }));
+    // Tiles go to other ranks between any two steps, and the page hears who holds them.
+    let holders = loop {
+        match page.hear().expect("the run waits") {
+            Heard::Said(said) if said["type"] == "holders" => break said["rank_of_tile"].clone(),
+            Heard::Said(_) => {}
+            Heard::Frame(number, ..) => page.wish(&json!({ "do": "ack", "frame": number })),
+        }
+    };
+    assert_eq!(holders.as_array().map(Vec::len), Some(16), "{holders}");
+    assert_ne!(holders, hello["sources"][0]["rank_of_tile"]);
     while page.frame().unwrap().0 < step + 3 {}
     served.interrupt();
     let ended = served.end();

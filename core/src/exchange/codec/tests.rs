@@ -80,7 +80,7 @@ fn outbox(rank: usize, ranks: usize, tiles: u32, letters: &Letters) -> Outbox {
 }
 
 fn inbox(rank: usize, ranks: usize, tiles: u32) -> Inbox {
-    let mut inbox = Inbox::new(&tiles_of(rank, ranks, tiles), tiles as usize, KINDS);
+    let mut inbox = Inbox::new(tiles_of(rank, ranks, tiles).into_iter(), tiles as usize, KINDS);
     inbox.begin(12, 3);
     inbox
 }

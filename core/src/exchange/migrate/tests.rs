@@ -403,7 +403,7 @@ fn exchange_by_hand(moves: [f64; 2], marks: [f32; 2]) -> [Option<f32>; 2] {
         tile.contacts.push(PairKey::new(Slot::from_index(0, 1, 1), Slot::from_index(1, 1, 1)), contact);
     }
     let mut outbox = Outbox { bags: vec![Mailbag::default(); 2], ..Outbox::default() };
-    let mut inbox = Inbox::new(&[TileId(0), TileId(1)], 2, 1);
+    let mut inbox = Inbox::new([TileId(0), TileId(1)].into_iter(), 2, 1);
     let mut work = MigrateWork::default();
     for (tile, bag) in tiles.iter_mut().zip(&mut outbox.bags) {
         send(tile, bag, &mut work, &setup);

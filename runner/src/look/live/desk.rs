@@ -3,6 +3,7 @@
 
 use super::protocol::{Gaze, Say, Wish};
 use std::collections::BTreeMap;
+use std::mem::discriminant;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -209,13 +210,15 @@ impl Desk {
 
     // What who shows the world does.
 
-    /// Tells each page that comes from now on, first of all, and those that are there.
+    /// Tells each page that comes from now on, first of all, and those that are there. What was told of the same before no longer
+    /// counts.
     pub(crate) fn greet(&self, greeting: Say) {
         self.tell(&greeting);
         let mut inner = self.lock();
         if matches!(greeting, Say::Hello(_)) {
             inner.greeting.clear();
         }
+        inner.greeting.retain(|earlier| discriminant(earlier) != discriminant(&greeting));
         inner.greeting.push(greeting);
     }
 

@@ -12,7 +12,6 @@ use crate::look::frame::Setting;
 use crate::look::picture::{ColorBy, Range};
 use crate::plan::Plan;
 use crate::rank::{Held, Host, Next};
-use atoll_core::TileId;
 use bytemuck::Pod;
 use glam::DVec2;
 use std::collections::VecDeque;
@@ -65,6 +64,8 @@ struct State {
     measured: Option<(ColorBy, u64)>,
     /// The body that was looked for last, if it was found.
     found: Option<Known>,
+    /// By tile, as pages know it.
+    ranks_of_tiles: Vec<u32>,
     course: Course,
     /// Nobody is asked how it goes before; and what it was like when somebody was.
     next_course: Instant,
@@ -88,12 +89,11 @@ impl Viewer {
         let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
         let hertz = facts.hertz().expect("every configuration has a frequency");
         let (grid, kinds, statics) = (blueprint.grid, blueprint.kinds, blueprint.statics);
-        let rank_of = |tile| plan.assignment.rank_of(TileId(tile)) as u32;
-        let ranks_of_tiles = (0..grid.tiles() as u32).map(rank_of).collect();
+        let ranks_of_tiles = plan.assignment.ranks_of_tiles().to_vec();
         let setting = Setting { grid, kinds, statics, hertz };
         let last_step = plan.config.run.steps;
         if let Some(desk) = &desk {
-            let source = scenery::source(name.to_owned(), &setting, ranks_of_tiles);
+            let source = scenery::source(name.to_owned(), &setting, ranks_of_tiles.clone());
             desk.greet(Say::Hello(scenery::hello(vec![source], false, Vec::new(), last_step)));
         }
         let now = Instant::now();
@@ -106,6 +106,7 @@ impl Viewer {
             ranges: [Range::default(); 2],
             measured: None,
             found: None,
+            ranks_of_tiles,
             course: Course::default(),
             next_course: now,
             told: None,
@@ -139,6 +140,15 @@ impl Viewer {
         desk.give(due, vec![picture.encode()]);
         state.begun = true;
         parts.iter().map(|part| part.took).max().unwrap_or_default() + begun.elapsed()
+    }
+
+    /// Tells pages if tiles are held by others than they know.
+    fn tell_of_holders(&self, desk: &Desk, ranks_of_tiles: &[u32]) {
+        let mut state = lock(&self.state);
+        if state.ranks_of_tiles != ranks_of_tiles {
+            state.ranks_of_tiles = ranks_of_tiles.to_vec();
+            desk.greet(Say::Holders { rank_of_tile: ranks_of_tiles.to_vec() });
+        }
     }
 
     /// Tells pages of the body that was looked for.
@@ -260,6 +270,9 @@ impl Host for Viewer {
     }
 
     fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8> {
+        if let Some(desk) = &self.desk {
+            self.tell_of_holders(desk, held.assignment.ranks_of_tiles());
+        }
         match (serde_json::from_slice(question), self.papers.get(held.rank.index())) {
             (Ok(question), Some(paper)) => answer(&question, &self.setting, held, &mut lock(paper)),
             // It is of another version; that is found out before.

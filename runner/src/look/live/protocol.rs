@@ -129,6 +129,11 @@ pub(crate) enum Say {
         /// It.
         body: Option<PickedBody>,
     },
+    /// Tiles of the world are held by other ranks than before.
+    Holders {
+        /// For each tile its rank.
+        rank_of_tile: Vec<u32>,
+    },
     /// The first record in which two worlds differ, or that there is none.
     Difference {
         /// Its step.

@@ -8,7 +8,7 @@ use super::over_time::{points, times};
 use super::source::Source;
 
 /// Phases in the order of a step, with their colors: what is alike has like ones.
-const PHASES: [(&str, &str); 14] = [
+const PHASES: [(&str, &str); 15] = [
     ("migrate", "p0"),
     ("exchange", "p1"),
     ("wait", "p2"),
@@ -21,8 +21,9 @@ const PHASES: [(&str, &str); 14] = [
     ("substeps", "p9"),
     ("border", "p10"),
     ("finalize", "p11"),
-    ("output", "p12"),
-    ("other", "p13"),
+    ("balance", "p12"),
+    ("output", "p13"),
+    ("other", "p14"),
 ];
 
 /// In front of the columns of phases in a log.
@@ -173,7 +174,7 @@ fn memory(sources: &[Source]) -> String {
 }
 
 fn color(phase: &str) -> &'static str {
-    PHASES.iter().find(|one| one.0 == phase).map_or("p13", |one| one.1)
+    PHASES.iter().find(|one| one.0 == phase).map_or("p14", |one| one.1)
 }
 
 fn words(phase: &str) -> String {

@@ -10,7 +10,7 @@ use crate::look::frame::{Frame, Setting};
 use crate::plan::Plan;
 use crate::rank::Observer;
 use crate::summary::Summary;
-use atoll_core::{Blueprint, GlobalId, TileId};
+use atoll_core::{Blueprint, GlobalId};
 use atoll_transport::Rank;
 use std::panic;
 use std::sync::Arc;
@@ -91,7 +91,7 @@ impl Live {
                 run.map_err(|error| RunError::Threads { rank: Rank(0), threads: 1, reason: error.to_string() })?;
             let shown = {
                 let _closes = AtEnd(|| parts.close());
-                self.take_all(&parts, show)
+                Self::take_all(&parts, show)
             };
             if shown.is_err() {
                 stop.request();
@@ -106,13 +106,9 @@ impl Live {
         Ok((end, summary))
     }
 
-    fn take_all(&self, parts: &Parts, show: &mut Show<'_>) -> Result<(), RunError> {
+    fn take_all(parts: &Parts, show: &mut Show<'_>) -> Result<(), RunError> {
         let mut frame = Frame::default();
         while parts.take(&mut frame) {
-            if let Some(live) = frame.live.as_mut().filter(|live| live.rank_of_tile.is_empty()) {
-                let (tiles, assignment) = (self.plan.blueprint.grid.tiles() as u32, &self.plan.assignment);
-                live.rank_of_tile.extend((0..tiles).map(|tile| assignment.rank_of(TileId(tile)) as u32));
-            }
             show(&frame)?;
         }
         Ok(())

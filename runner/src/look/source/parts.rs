@@ -5,7 +5,7 @@ use super::Shown;
 use crate::folder::recording::Row;
 use crate::look::frame::{Frame, Live};
 use crate::rank::Watcher;
-use atoll_core::{Body, TileView, World};
+use atoll_core::{Body, TileId, TileView, World};
 use atoll_transport::Rank;
 use glam::DVec2;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -17,9 +17,17 @@ pub(super) struct Parts {
     /// Whether to tell what is known only while a run is under way.
     live: bool,
     /// By rank. Each is locked by its rank while it is empty, and by who takes it while it is full.
-    parts: Vec<Mutex<Frame>>,
+    parts: Vec<Mutex<Part>>,
     state: Mutex<State>,
     changed: Condvar,
+}
+
+/// What one rank shows.
+#[derive(Default, Debug)]
+struct Part {
+    frame: Frame,
+    /// The tiles it holds.
+    tiles: Vec<TileId>,
 }
 
 /// How far things are.
@@ -53,14 +61,19 @@ impl Parts {
         }
         drop(state);
         clear(frame, self.live);
-        frame.bodies.reserve_exact(self.parts.iter().map(|part| lock(part).bodies.len()).sum());
+        frame.bodies.reserve_exact(self.parts.iter().map(|part| lock(part).frame.bodies.len()).sum());
         for (rank, part) in (0..).zip(&self.parts) {
-            let part = lock(part);
+            let Part { frame: part, tiles } = &*lock(part);
             frame.step = part.step;
             frame.bodies.extend_from_slice(&part.bodies);
             frame.ranks.push((rank, frame.bodies.len()));
             if let Some((to, from)) = frame.live.as_mut().zip(part.live.as_ref()) {
                 append(to, from);
+                for tile in tiles {
+                    let tile = tile.0 as usize;
+                    to.rank_of_tile.resize(to.rank_of_tile.len().max(tile + 1), 0);
+                    to.rank_of_tile[tile] = rank;
+                }
             }
         }
         if let Some(live) = &mut frame.live {
@@ -141,8 +154,10 @@ fn append(to: &mut Live, from: &Live) {
 }
 
 /// What one rank has to show.
-fn fill(part: &mut Frame, world: &World, live: bool) {
+fn fill(Part { frame: part, tiles }: &mut Part, world: &World, live: bool) {
     clear(part, live);
+    tiles.clear();
+    tiles.extend(world.tiles());
     part.step = world.step_count();
     let bodies: usize = world.views().map(|tile| tile.bodies().len()).sum();
     // Bodies come and go a few at a time, and twice the memory would be much.

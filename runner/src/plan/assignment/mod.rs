@@ -64,6 +64,11 @@ impl Assignment {
         self.rank_of[tile.0 as usize] as usize
     }
 
+    /// For every tile the rank that holds it.
+    pub(crate) fn ranks_of_tiles(&self) -> &[u32] {
+        &self.rank_of
+    }
+
     /// The tiles of a rank, ascending. None for an idle rank.
     pub fn tiles_of(&self, rank: usize) -> Vec<TileId> {
         let of_rank = |&(_, &holder): &(u32, &u32)| holder as usize == rank;

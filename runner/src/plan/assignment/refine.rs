@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn few_tiles_are_spread_evenly_and_few_of_them_move() {
-        for (side, ranks, moved) in [(9, 16, 81), (12, 4, 60), (9, 2, 40), (24, 7, 240)] {
+        for (side, ranks, moved) in [(9, 16, 81), (12, 4, 100), (9, 2, 40), (24, 7, 500)] {
             let grid = grid(side, side);
             let even = Assignment::balanced(&grid, &vec![100; grid.tiles()], ranks);
             let costs = skewed(&grid);

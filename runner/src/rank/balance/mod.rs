@@ -20,7 +20,7 @@ use tracing::info;
 
 /// Ranks tell each other how busy they are after so many steps, and one more for every [`RANKS_A_STEP`]: the cost of telling
 /// grows with the square of their number.
-const EVERY: usize = 10;
+const EVERY: usize = 16;
 /// See [`EVERY`].
 const RANKS_A_STEP: usize = 32;
 
@@ -83,6 +83,11 @@ impl<'a> Balancer<'a> {
             time: Duration::ZERO,
             sent: Stats::default(),
         })
+    }
+
+    /// How long it has taken this rank so far.
+    pub(super) fn time(&self) -> Duration {
+        self.time
     }
 
     /// Brings what came of it to the summary.

@@ -164,12 +164,12 @@ impl Log {
     }
 
     /// Writes the row that is due after a step, if one is. `migrations` are those of all steps so far, `written` is how long
-    /// this rank spent on other output.
+    /// this rank spent on other output, `balanced` on balancing.
     pub(super) fn write_due<T: Transport>(
         &mut self,
         world: &World,
         step: &StepReport,
-        (migrations, written): (u64, Duration),
+        (migrations, written, balanced): (u64, Duration, Duration),
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
         let Some(&figures) = world.figures().filter(|_| step.stopped || self.is_due(world.step_count())) else {
@@ -181,6 +181,7 @@ impl Log {
             wall_nanos: self.begun.elapsed().as_nanos() as u64,
             wait_nanos: (halo.waited() + self.waited).as_nanos() as u64,
             output_nanos: (written + self.time).as_nanos() as u64,
+            balance_nanos: balanced.as_nanos() as u64,
             phase_nanos: Phase::ALL.map(|phase| world.timings().total(phase).as_nanos() as u64),
             ..RankFacts::default()
         };
@@ -218,6 +219,7 @@ impl Log {
             wall_nanos: since(|facts| facts.wall_nanos),
             wait_nanos: since(|facts| facts.wait_nanos),
             output_nanos: since(|facts| facts.output_nanos),
+            balance_nanos: since(|facts| facts.balance_nanos),
             phase_nanos: std::array::from_fn(|phase| now.phase_nanos[phase] - before.phase_nanos[phase]),
             ..now
         };

@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn a_field_for_each_column_and_times_of_the_steps_since_the_row_before() {
         let columns = columns();
-        assert!(columns.ends_with(",ms_border,ms_finalize,ms_output,ms_other"), "{columns}");
+        assert!(columns.ends_with(",ms_border,ms_finalize,ms_balance,ms_output,ms_other"), "{columns}");
         let part = |scale: u64| {
             let mut facts = RankFacts { steps: 30, resumed_at: 20, migrations: scale, ..RankFacts::default() };
             (facts.wall_nanos, facts.wait_nanos, facts.output_nanos) = (60_000_000, 10_000_000 * scale, 5_000_000);

@@ -44,7 +44,7 @@ socket.onclose = () => say(state.hello ? "The run is over; this is what was seen
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, figures, body, difference })[type]?.(message);
+    ({ hello, figures, body, difference, holders })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -87,6 +87,15 @@ function start_drawing() {
     state.drawing.grid(made, source.tiles, source.rank_of_tile, state.hello.rank_colors);
     return made;
   });
+}
+
+/// Tiles have gone to other ranks.
+function holders({ rank_of_tile }) {
+  const [source] = state.hello.sources;
+  source.rank_of_tile = rank_of_tile;
+  if (!state.drawing) return;
+  state.drawing.grid(state.sources[0], source.tiles, rank_of_tile, state.hello.rank_colors);
+  redraw();
 }
 
 /// Two worlds differ from a record on, or nowhere.
