@@ -3,10 +3,12 @@
 use crate::model::id::GlobalId;
 use std::collections::HashSet;
 
-/// A set of names: a bit for each up to some multiple of how many there are, which is all of them where bodies are
-/// numbered through, and a hash table for the others.
+/// A set of names: runs of those that came in ascending order, as a scene tells them; of others a bit for each up to some
+/// multiple of how many there are, which is all of them where bodies are numbered through, and a hash table for the rest.
 #[derive(Default, Debug)]
 pub(crate) struct Names {
+    /// First and last of each run, ascending.
+    runs: Vec<[GlobalId; 2]>,
     bits: Vec<u64>,
     sparse: HashSet<GlobalId>,
     count: u64,
@@ -18,6 +20,18 @@ const BITS_EACH: u64 = 64;
 impl Names {
     /// Takes a name; says no if it is taken.
     pub(crate) fn insert(&mut self, name: GlobalId) -> bool {
+        let greatest = self.runs.last_mut().map(|[_, last]| last);
+        if greatest.as_ref().is_none_or(|greatest| name > **greatest) {
+            match greatest {
+                Some(greatest) if name.0 == greatest.0 + 1 => *greatest = name,
+                _ => self.runs.push([name; 2]),
+            }
+            return true;
+        }
+        let run = self.runs.partition_point(|[_, last]| *last < name);
+        if self.runs[run][0] <= name {
+            return false;
+        }
         let (word, bit) = ((name.0 / 64) as usize, 1 << (name.0 % 64));
         if self.bits.get(word).is_some_and(|bits| bits & bit != 0) || self.sparse.contains(&name) {
             return false;
@@ -54,9 +68,13 @@ mod tests {
     }
 
     #[test]
-    fn numbered_names_take_a_bit_each() {
+    fn numbered_names_take_little() {
         let mut taken = Names::default();
         (0..1_000_000).for_each(|name| assert!(taken.insert(GlobalId(name))));
-        assert!(taken.sparse.is_empty() && taken.bits.len() <= 1 << 15);
+        assert!(taken.runs.len() == 1 && taken.bits.is_empty() && taken.sparse.is_empty());
+        // In any order a bit each.
+        let mut taken = Names::default();
+        (0..1_000_000).rev().for_each(|name| assert!(taken.insert(GlobalId(name))));
+        assert!(taken.sparse.len() < 1_000_000 / 64 + 70_000 && taken.bits.len() <= 1 << 15, "{}", taken.sparse.len());
     }
 }

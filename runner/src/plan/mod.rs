@@ -2,11 +2,13 @@
 
 mod advice;
 mod assignment;
+mod holding;
 mod memory;
 mod threads;
 pub(crate) mod tiles;
 
 pub(crate) use assignment::Assignment;
+pub(crate) use holding::Holding;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
@@ -14,7 +16,7 @@ use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
-use atoll_core::{Blueprint, TileGrid};
+use atoll_core::{Blueprint, Body, TileGrid};
 use std::path::PathBuf;
 
 /// A configuration, checked and resolved.
@@ -173,7 +175,8 @@ impl Plan {
         let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
             let mut weights = vec![0; blueprint.grid.tiles()];
             if ranks > 1 {
-                scene.iter().for_each(|body| weights[blueprint.grid.locate(body.position).0 as usize] += 1);
+                let tile = |body: &Body| blueprint.grid.locate(body.position).0 as usize;
+                scene.sample().for_each(|(bodies, body)| weights[tile(&body)] += bodies);
             }
             weights
         });

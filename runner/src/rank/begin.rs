@@ -4,7 +4,7 @@ use super::trouble::{Refusal, all_well};
 use super::{Observer, RankError};
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
-use crate::plan::Plan;
+use crate::plan::{Holding, Plan};
 use atoll_core::World;
 use atoll_transport::{Rank, Transport};
 use tracing::info;
@@ -59,10 +59,9 @@ fn scene(plan: &Plan, rank: Rank) -> Result<World, RankError> {
     let tiles = plan.assignment.tiles_of(rank.index());
     let mut world = World::new(&plan.blueprint, &tiles).map_err(RankError::Setup)?;
     let mut bodies = 0_u64;
-    if !tiles.is_empty() {
-        for body in plan.scene.iter() {
-            bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
-        }
+    let held = Holding::new(&plan.blueprint.grid, &tiles);
+    for body in plan.scene.near(|low, high| held.meets(low, high)) {
+        bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
     }
     info!(tiles = tiles.len(), bodies, "built");
     Ok(world)

@@ -8,6 +8,13 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
+    /// The bodies that stand in the corners of the least block of columns and rows that holds some others. There need not be any
+    /// such bodies.
+    pub(super) fn corners(self, first: u64, last: u64) -> [u64; 2] {
+        let [columns, rows] = block(first, last, self.side);
+        [0, 1].map(|end| columns[end] * self.side + rows[end])
+    }
+
     /// The smallest with a place for every body.
     pub(super) fn of(bodies: u64) -> Self {
         let root = bodies.isqrt();
@@ -18,6 +25,14 @@ impl Lattice {
     pub(super) fn relative(self, body: u64) -> [f64; 2] {
         [body / self.side, body % self.side].map(|i| (i as f64 + 0.5) / self.side as f64)
     }
+}
+
+/// The least rows and the least columns that hold some of the bodies that fill rows of some `length`: of both the first and the
+/// last.
+pub(super) fn block(first: u64, last: u64, length: u64) -> [[u64; 2]; 2] {
+    let rows = [first, last].map(|body| body / length);
+    let columns = if rows[0] == rows[1] { [first, last].map(|body| body % length) } else { [0, length - 1] };
+    [rows, columns]
 }
 
 #[cfg(test)]

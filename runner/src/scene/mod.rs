@@ -23,6 +23,7 @@ pub use random::SplitMix64;
 
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
 use glam::DVec2;
+use std::iter;
 
 /// What makes one scene different from another.
 trait Layout: Send + Sync + std::fmt::Debug {
@@ -36,11 +37,23 @@ trait Layout: Send + Sync + std::fmt::Debug {
     fn statics(&self) -> Vec<StaticBody>;
     /// The body of the given index, from 0, which is to be called `id`.
     fn body(&self, index: u64, id: GlobalId, seed: u64) -> Body;
+    /// Low and high corner of a rectangle that the centers of the bodies from the index `first` to `last` start in, to within
+    /// [`ROUNDING`]. The tighter it is, the sooner a rank finds the bodies near its tiles.
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2);
     /// Low and high corner of the rectangle this body must not leave: the domain, unless the scene says otherwise.
     fn home(&self, _index: u64) -> (DVec2, DVec2) {
         self.domain()
     }
 }
+
+/// How far extents may be off, in meters.
+const ROUNDING: f64 = 1e-3;
+
+/// So few bodies are looked at one by one.
+const FEW: u64 = 16;
+
+/// Of worlds with more bodies than this, samples of about as many are looked at.
+const SAMPLES: u64 = 1 << 19;
 
 /// The start of a run.
 #[derive(Debug)]
@@ -100,6 +113,46 @@ impl Scene {
     /// All bodies as they start, in the order of their ids.
     pub fn iter(&self) -> impl Iterator<Item = Body> + '_ {
         (0..self.bodies()).map(|index| self.body(index))
+    }
+
+    /// The bodies that start in any rectangle for which `meets` says yes, and perhaps some more, in ascending order; `meets` is asked
+    /// of rectangles that hold many. Takes time for the bodies found, and for the boundaries of where they are.
+    pub fn near(&self, meets: impl Fn(DVec2, DVec2) -> bool) -> impl Iterator<Item = Body> {
+        let mut parts = vec![(0, self.bodies())];
+        let mut few = 0..0;
+        iter::from_fn(move || {
+            loop {
+                if let Some(index) = few.next() {
+                    return Some(self.body(index));
+                }
+                let (first, end) = parts.pop()?;
+                if first == end {
+                    continue;
+                }
+                let (low, high) = self.layout.extent(first, end - 1);
+                if !meets(low - ROUNDING, high + ROUNDING) {
+                    continue;
+                }
+                if end - first <= FEW {
+                    few = first..end;
+                } else {
+                    let middle = first + (end - first) / 2;
+                    parts.extend([(middle, end), (first, middle)]);
+                }
+            }
+        })
+    }
+
+    /// All bodies, each with a one; of many bodies a sample, each with the number of those that it stands for.
+    pub fn sample(&self) -> impl Iterator<Item = (u64, Body)> {
+        let (bodies, samples) = (self.bodies(), self.bodies().min(SAMPLES));
+        let begin = move |sample: u64| (u128::from(bodies) * u128::from(sample) / u128::from(samples)) as u64;
+        (0..samples).map(move |sample| {
+            let (first, end) = (begin(sample), begin(sample + 1));
+            // Anywhere among them, so that none of them keeps time with the rows of a lattice.
+            let index = first + SplitMix64::after(0, sample).bits() % (end - first);
+            (end - first, self.body(index))
+        })
     }
 
     /// Low and high corner of the rectangle that the center of the body with this index must not leave: its room, or

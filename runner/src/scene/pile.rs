@@ -2,6 +2,7 @@
 //!
 //! Bodies take two draws each, in this order: kind, shift along x.
 
+use super::lattice::block;
 use super::random::SplitMix64;
 use super::{Layout, mixture, random_kind, statics};
 use atoll_core::{Body, GlobalId, Kind, Rot, StaticBody};
@@ -55,6 +56,12 @@ impl Layout for Pile {
         let (column, row) = (index % self.columns, index / self.columns);
         let position = FIRST + DVec2::new(SPACING * column as f64 + shift, SPACING * row as f64);
         Body { id, position, rotation: Rot::IDENTITY, velocity: Vec2::ZERO, angular_velocity: 0.0, kind }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let [rows, columns] = block(first, last, self.columns);
+        let place = |end: usize| FIRST + DVec2::new(columns[end] as f64, rows[end] as f64) * SPACING;
+        (place(0) - DVec2::X * self.jitter, place(1) + DVec2::X * self.jitter)
     }
 }
 

@@ -3,6 +3,7 @@
 //! Pyramids are filled one after another, the lowest row of boxes first. Bodies take no draws: every seed gives the same
 //! world.
 
+use super::lattice::block;
 use super::{Layout, statics, table};
 use atoll_core::{Body, GlobalId, Kind, KindId, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
@@ -89,6 +90,14 @@ impl Layout for Pyramids {
         let position = corner + DVec2::new(x, SIDE * (row as f64 + 0.5));
         let (rotation, velocity) = (Rot::IDENTITY, Vec2::ZERO);
         Body { id, position, rotation, velocity, angular_velocity: 0.0, kind: KindId(0) }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let pyramid = |body: u64| body / Self::boxes(self.base);
+        let [rows, columns] = block(pyramid(first), pyramid(last), self.side);
+        let corner =
+            |end: usize, more: u64| self.pitch() * DVec2::new((columns[end] + more) as f64, (rows[end] + more) as f64);
+        (corner(0, 0), corner(1, 1) + DVec2::X * SPACE)
     }
 }
 

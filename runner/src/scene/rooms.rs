@@ -73,6 +73,16 @@ impl Rooms {
         let relative = self.lattice.relative(body);
         if self.power == 1.0 { relative } else { relative.map(|r| libm::pow(r, self.power)) }
     }
+
+    /// Where a body starts, in meters.
+    fn position(&self, body: u64) -> DVec2 {
+        let r = self.coordinates(body);
+        let place = |axis: usize| {
+            let (k, along) = Self::split(r[axis]);
+            self.span(axis, k).0 + INSET + along * (self.room_side() - 2.0 * INSET)
+        };
+        DVec2::new(place(0), place(1))
+    }
 }
 
 impl Layout for Rooms {
@@ -99,16 +109,15 @@ impl Layout for Rooms {
 
     fn body(&self, index: u64, id: GlobalId, seed: u64) -> Body {
         let mut random = SplitMix64::after(seed, DRAWS * index);
-        let r = self.coordinates(index);
-        let place = |axis: usize| {
-            let (k, along) = Self::split(r[axis]);
-            self.span(axis, k).0 + INSET + along * (self.room_side() - 2.0 * INSET)
-        };
         let kind = random_kind(&mut random);
         let velocity = Vec2::new(random.below(SPEED), random.below(SPEED));
         let angular_velocity = random.below(SPIN);
-        let position = DVec2::new(place(0), place(1));
+        let position = self.position(index);
         Body { id, position, rotation: Rot::IDENTITY, velocity, angular_velocity, kind }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        self.lattice.corners(first, last).map(|body| self.position(body)).into()
     }
 
     fn home(&self, index: u64) -> (DVec2, DVec2) {

@@ -3,6 +3,7 @@
 //!
 //! Bodies take one draw each: the kind.
 
+use super::lattice::block;
 use super::random::SplitMix64;
 use super::{Layout, random_kind, statics, table};
 use atoll_core::{Body, GlobalId, Kind, Rot, Shape, StaticBody};
@@ -59,6 +60,13 @@ impl Layout for SingleIsland {
         let shift = if row % 2 == 1 { 0.5 } else { 0.0 };
         let position = DVec2::new(column as f64 + 0.5 + shift, row as f64 + 0.5) * WIDTH;
         Body { id, position, rotation: Rot::IDENTITY, velocity: Vec2::ZERO, angular_velocity: 0.0, kind }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let [rows, columns] = block(first, last, self.columns);
+        // Every other row is shifted by half a body.
+        let place = |end: usize, x: f64| DVec2::new(columns[end] as f64 + x, rows[end] as f64 + 0.5) * WIDTH;
+        (place(0, 0.5), place(1, 1.0))
     }
 }
 

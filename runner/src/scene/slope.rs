@@ -50,6 +50,11 @@ impl Slope {
         DVec2::new(c * along - s * above, s * along + c * above)
     }
 
+    /// Where a box lies, in meters.
+    fn place(&self, index: u64) -> DVec2 {
+        self.point(SPACING * (index as f64 - 0.5 * (self.bodies - 1) as f64), 0.0)
+    }
+
     fn kind(&self, half: Vec2) -> Kind {
         Kind { shape: Shape::Box { half }, material: self.material }
     }
@@ -80,9 +85,13 @@ impl Layout for Slope {
     }
 
     fn body(&self, index: u64, id: GlobalId, _seed: u64) -> Body {
-        let along = SPACING * (index as f64 - 0.5 * (self.bodies - 1) as f64);
         let (rotation, velocity) = (self.rotation, Vec2::ZERO);
-        Body { id, position: self.point(along, 0.0), rotation, velocity, angular_velocity: 0.0, kind: KindId(0) }
+        Body { id, position: self.place(index), rotation, velocity, angular_velocity: 0.0, kind: KindId(0) }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let [a, b] = [first, last].map(|index| self.place(index));
+        (a.min(b), a.max(b))
     }
 }
 

@@ -3,6 +3,7 @@
 //!
 //! The large box has index 0; those of the wall follow column by column. Bodies take no draws: every seed gives the same world.
 
+use super::lattice::block;
 use super::{Layout, table};
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
@@ -36,6 +37,11 @@ impl Smash {
     fn size(&self) -> DVec2 {
         let columns = self.bodies.saturating_sub(1).div_ceil(self.rows);
         DVec2::new(columns as f64, self.rows as f64) * SIDE
+    }
+
+    /// Where a box of the wall starts, in meters.
+    fn place(&self, column: u64, row: u64) -> DVec2 {
+        DVec2::new(AWAY + SIDE * column as f64, SIDE * (row as f64 - (self.rows / 2) as f64))
     }
 }
 
@@ -71,11 +77,21 @@ impl Layout for Smash {
                 rotation: Rot::IDENTITY,
                 ..still
             },
-            Some(small) => {
-                let (column, row) = ((small / self.rows) as f64, (small % self.rows) as f64 - (self.rows / 2) as f64);
-                Body { position: DVec2::new(AWAY + SIDE * column, SIDE * row), ..still }
-            }
+            Some(small) => Body { position: self.place(small / self.rows, small % self.rows), ..still },
         }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let wall = (last > 0).then(|| {
+            let [columns, rows] = block(first.max(1) - 1, last - 1, self.rows);
+            [0, 1].map(|end| self.place(columns[end], rows[end]))
+        });
+        let large = (first == 0).then_some([START; 2]);
+        let [low, high] = match (wall, large) {
+            (Some(wall), Some(large)) => [wall[0].min(large[0]), wall[1].max(large[1])],
+            (wall, large) => wall.or(large).expect("there is a first body"),
+        };
+        (low, high)
     }
 }
 

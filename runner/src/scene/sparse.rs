@@ -38,6 +38,11 @@ impl Sparse {
     pub(super) fn new(bodies: u64) -> Self {
         Self { bodies, lattice: Lattice::of(bodies), side: (AREA * bodies as f64).sqrt() }
     }
+
+    /// Where a body starts, in meters.
+    fn position(&self, body: u64) -> DVec2 {
+        DVec2::from(self.lattice.relative(body).map(|r| INSET + r * (self.side - 2.0 * INSET)))
+    }
 }
 
 impl Layout for Sparse {
@@ -63,8 +68,11 @@ impl Layout for Sparse {
         let kind = random_kind(&mut random);
         let velocity = Vec2::new(random.within(SPEED) as f32, random.within(SPEED) as f32);
         let angular_velocity = random.within(SPIN) as f32;
-        let position = DVec2::from(self.lattice.relative(index).map(|r| INSET + r * (self.side - 2.0 * INSET)));
-        Body { id, position, rotation: Rot::IDENTITY, velocity, angular_velocity, kind }
+        Body { id, position: self.position(index), rotation: Rot::IDENTITY, velocity, angular_velocity, kind }
+    }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        self.lattice.corners(first, last).map(|body| self.position(body)).into()
     }
 }
 

@@ -58,6 +58,11 @@ impl Layout for Stack {
         let (rotation, velocity) = (Rot::IDENTITY, Vec2::ZERO);
         Body { id, position, rotation, velocity, angular_velocity: 0.0, kind: KindId(0) }
     }
+
+    fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
+        let place = |shift: f64, index: u64| DVec2::new(shift, SIDE * (index as f64 + 0.5));
+        (place(-SHIFT, first), place(SHIFT, last))
+    }
 }
 
 #[cfg(test)]

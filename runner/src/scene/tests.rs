@@ -4,7 +4,7 @@ use super::*;
 use atoll_core::Rot;
 
 /// Every kind of scene, and how many statics it has with 500 bodies.
-const KINDS: [(SceneKind, u64); 8] = [
+const KINDS: [(SceneKind, u64); 9] = [
     (SceneKind::Rooms { power: 1.2 }, 16),
     (SceneKind::Pile { jitter: 0.01 }, 3),
     (SceneKind::Pyramids { base: 10 }, 4),
@@ -12,6 +12,7 @@ const KINDS: [(SceneKind, u64); 8] = [
     (SceneKind::Sparse, 4),
     (SceneKind::SingleIsland, 3),
     (SceneKind::Stack, 1),
+    (SceneKind::Smash, 0),
     (SceneKind::Slope { angle: 35.0, friction: 0.5 }, 2),
 ];
 
@@ -94,4 +95,48 @@ fn a_body_in_another_room_has_escaped() {
     assert!(scene.has_escaped(&body));
     body.position = DVec2::NAN;
     assert!(scene.has_escaped(&body));
+}
+
+#[test]
+fn bodies_start_within_the_extent_of_any_that_they_are_among() {
+    for (kind, _) in KINDS {
+        let scene = scene(kind);
+        for (first, last) in [(0, 0), (0, 499), (1, 1), (499, 499), (17, 18), (22, 23), (100, 140), (3, 480), (0, 7)] {
+            let (low, high) = scene.layout.extent(first, last);
+            for index in first..=last {
+                let place = scene.body(index).position;
+                let within = place.cmpge(low - ROUNDING).all() && place.cmple(high + ROUNDING).all();
+                assert!(within, "{kind:?}: {index} of {first} to {last} at {place}, not within {low} to {high}");
+            }
+        }
+    }
+}
+
+#[test]
+fn who_is_near_is_found_without_looking_at_all() {
+    for (kind, _) in KINDS {
+        let scene = Scene::new(&SceneSpec { kind, bodies: 50_000, seed: 3 });
+        let center = scene.body(31_000).position;
+        let (low, high) = (center - 3.0, center + 3.0);
+        let is_near = |body: &Body| body.position.cmpge(low).all() && body.position.cmple(high).all();
+        let mut looked = 0;
+        let near = scene.near(|a, b| a.cmple(high).all() && b.cmpge(low).all()).inspect(|_| looked += 1);
+        let found: Vec<Body> = near.filter(is_near).collect();
+        assert!(scene.iter().filter(is_near).eq(found.iter().copied()), "{kind:?}");
+        assert!(!found.is_empty() && looked < 50_000 / 8, "{kind:?}: {looked} looked at");
+    }
+}
+
+#[test]
+fn a_sample_stands_for_all() {
+    let spec = |bodies| SceneSpec { kind: SceneKind::Rooms { power: 1.2 }, bodies, seed: 3 };
+    let few = Scene::new(&spec(1000));
+    assert!(few.sample().eq(few.iter().map(|body| (1, body))));
+    let many = Scene::new(&spec(SAMPLES * 3 + 7));
+    let (low, high) = many.domain();
+    let lower = |(_, body): &(u64, Body)| body.position.cmplt(0.5 * (low + high)).all();
+    let told = many.sample().filter(lower).map(|(weight, _)| weight).sum::<u64>() as f64;
+    let true_count = many.iter().filter(|body| lower(&(1, *body))).count() as f64;
+    assert!((told / true_count - 1.0).abs() < 0.01, "{told} for {true_count}");
+    assert_eq!(many.sample().map(|(weight, _)| weight).sum::<u64>(), many.bodies());
 }
