@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `step` | How long does a step of the reported experiment take, and how much memory? |
 //! | `growth` | Does a body cost more in a larger world, and in a larger tile? |
+//! | `building` | What does one rank of many take until the first step? |
 //! | `strategies` | What do threads bring within one tile, by islands, by coloring, and by both? |
 //! | `choices` | What does each choice of the report cost, in time and in quality? |
 //! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
@@ -50,6 +51,13 @@ pub const PILE: File = file!("pile.toml");
 
 /// A heap that is one island from the start.
 pub const SINGLE_ISLAND: File = file!("single_island.toml");
+
+/// The most memory this process ever held, in bytes; zero where the system does not tell.
+pub fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
+    peak.unwrap_or(0_u64) * 1024
+}
 
 /// Runs a configuration, some of whose keys have other values than in the file, as after `--set`.
 ///

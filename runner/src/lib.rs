@@ -97,5 +97,5 @@ pub mod internals {
     pub use crate::launch::run as run_plan;
     pub use crate::look::live::overhear;
     pub use crate::plan::Plan;
-    pub use crate::rank::{Held, Host, Next, PanicAt, Watcher};
+    pub use crate::rank::{Held, Host, Next, PanicAt, Watcher, part_of_scene};
 }

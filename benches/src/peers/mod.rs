@@ -144,17 +144,10 @@ fn measure(engine_version: String, mut simulation: impl Simulation, case: &Case)
         simulation.step().map_err(Failure::broken)?;
     }
     let wall = start.elapsed();
-    let peak_rss_bytes = peak_rss_bytes();
+    let peak_rss_bytes = crate::peak_rss_bytes();
     let bodies = simulation.bodies();
     drop(simulation);
     let quality = pool(case)?.install(|| quality::measure(case, &bodies))?;
     let ms_per_step = wall.as_secs_f64() * 1e3 / case.steps.max(1) as f64;
     Ok(Run { engine_version, ms_per_step, peak_rss_bytes, quality })
-}
-
-/// The most memory this process ever held, in bytes; zero where the system does not tell.
-fn peak_rss_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
-    peak.unwrap_or(0_u64) * 1024
 }

@@ -5,7 +5,7 @@ use super::{Observer, RankError};
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
 use crate::plan::{Holding, Plan};
-use atoll_core::World;
+use atoll_core::{SetupError, World};
 use atoll_transport::{Rank, Transport};
 use tracing::info;
 
@@ -41,7 +41,7 @@ pub(super) fn build(
             observer.note(&format!("{error}; going on after step {next} instead"));
         }
     }
-    Ok(Beginning { world: scene(plan, rank)?, resumed: None })
+    Ok(Beginning { world: scene(plan, rank).map_err(RankError::Setup)?, resumed: None })
 }
 
 /// This rank's tiles of a snapshot. That they cannot be read is for all ranks to hear.
@@ -55,13 +55,16 @@ fn restore(plan: &Plan, rank: Rank, snapshot: &Snapshot) -> Result<Result<World,
 }
 
 /// This rank's part of the scene.
-fn scene(plan: &Plan, rank: Rank) -> Result<World, RankError> {
+///
+/// # Errors
+/// If it makes no world.
+pub fn scene(plan: &Plan, rank: Rank) -> Result<World, SetupError> {
     let tiles = plan.assignment.tiles_of(rank.index());
-    let mut world = World::new(&plan.blueprint, &tiles).map_err(RankError::Setup)?;
+    let mut world = World::new(&plan.blueprint, &tiles)?;
     let mut bodies = 0_u64;
     let held = Holding::new(&plan.blueprint.grid, &tiles);
     for body in plan.scene.near(|low, high| held.meets(low, high)) {
-        bodies += u64::from(world.add(body).map_err(RankError::Setup)?);
+        bodies += u64::from(world.add(body)?);
     }
     info!(tiles = tiles.len(), bodies, "built");
     Ok(world)

@@ -18,6 +18,7 @@ pub(crate) mod trouble;
 pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
+pub use begin::scene as part_of_scene;
 pub use meeting::{Held, Host, Next};
 pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 pub(crate) use trace::TraceSteps;
