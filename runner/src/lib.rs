@@ -29,6 +29,7 @@ mod folder;
 mod launch;
 mod look;
 mod plan;
+mod project;
 mod rank;
 pub mod scene;
 mod summary;

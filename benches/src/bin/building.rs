@@ -54,7 +54,9 @@ fn part(arguments: &[String]) -> Result<(), String> {
 
 fn compare(arguments: &[String]) -> Result<(), String> {
     let number = |at: usize, usual: u64| match arguments.get(at) {
-        Some(text) => text.parse::<u64>().map_err(|_| format!("not a number: {text}; usage: building [BODIES [RANKS]]")),
+        Some(text) => {
+            text.parse::<u64>().map_err(|_| format!("not a number: {text}; usage: building [BODIES [RANKS]]"))
+        }
         None => Ok(usual),
     };
     let (bodies, ranks) = (number(0, 50_000_000)?, number(1, 64)?.max(1));
@@ -65,7 +67,11 @@ fn compare(arguments: &[String]) -> Result<(), String> {
         let (time, memory) = (whole.seconds / part.seconds, whole.bytes as f64 / part.bytes as f64);
         let megabytes = part.bytes as f64 * 1e-6;
         let Cost { seconds, bodies: own, bytes } = part;
-        eprintln!("{ranks:>8}{rank:>8}{own:>12}{seconds:>10.3}{megabytes:>10.1}{:>10}{:>10}", ratio(time), ratio(memory));
+        eprintln!(
+            "{ranks:>8}{rank:>8}{own:>12}{seconds:>10.3}{megabytes:>10.1}{:>10}{:>10}",
+            ratio(time),
+            ratio(memory)
+        );
         println!(
             r#"{{"bench":"building","bodies":{bodies},"ranks":{ranks},"rank":{rank},"own_bodies":{own},"seconds":{seconds:.4},"peak_bytes":{bytes}}}"#
         );

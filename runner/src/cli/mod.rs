@@ -8,6 +8,7 @@ mod info;
 mod interrupt;
 mod output;
 mod progress;
+mod project;
 mod render;
 mod report;
 mod run;
@@ -35,6 +36,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
         Command::Report(args) => report::run(args),
+        Command::Project(args) => project::run(args),
         Command::Export(args) => export::run(args),
     });
     let exit = result.unwrap_or_else(|error| {

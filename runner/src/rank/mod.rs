@@ -1,6 +1,6 @@
 //! One rank of a run, from an empty world to the last figure.
 
-mod balance;
+pub(crate) mod balance;
 mod begin;
 mod end;
 mod facts;
@@ -15,10 +15,10 @@ mod recorder;
 pub(crate) mod trace;
 pub(crate) mod trouble;
 
+pub use begin::scene as part_of_scene;
 pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
-pub use begin::scene as part_of_scene;
 pub use meeting::{Held, Host, Next};
 pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 pub(crate) use trace::TraceSteps;

@@ -64,7 +64,7 @@ impl Observer {
     }
 
     /// Tells of steps until it is dropped, if it `speaks`.
-    pub(super) fn steps(&self, speaks: bool, from: u64, steps: u64) -> Steps<'_> {
+    pub(crate) fn steps(&self, speaks: bool, from: u64, steps: u64) -> Steps<'_> {
         let listener = self.listener.as_deref().filter(|_| speaks);
         listener.inspect(|listener| listener.begins(from, steps));
         Steps(listener)
@@ -73,10 +73,10 @@ impl Observer {
 
 /// Tells of the steps of a run, and that it ends, also where it fails.
 #[derive(Debug)]
-pub(super) struct Steps<'a>(Option<&'a dyn Listener>);
+pub(crate) struct Steps<'a>(Option<&'a dyn Listener>);
 
 impl Steps<'_> {
-    pub(super) fn made(&self, steps: u64) {
+    pub(crate) fn made(&self, steps: u64) {
         self.0.inspect(|listener| listener.made(steps));
     }
 }

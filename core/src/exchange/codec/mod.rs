@@ -54,8 +54,11 @@ fn arrays<'a>(message: &Message<'a>) -> [(usize, &'a [u8]); 5] {
     ]
 }
 
-fn message_length(message: &Message<'_>) -> usize {
-    COUNTS + arrays(message).iter().map(|(_, bytes)| bytes.len()).sum::<usize>()
+impl Message<'_> {
+    /// How many bytes it takes in a frame.
+    pub fn encoded_length(&self) -> usize {
+        COUNTS + arrays(self).iter().map(|(_, bytes)| bytes.len()).sum::<usize>()
+    }
 }
 
 /// The messages of an outbox dealt out to ranks, a frame for each. Keep one value: it keeps its memory.
@@ -85,7 +88,7 @@ impl Frames {
         }
         let others = || outbox.numbered_messages().map(|(place, m)| (place, m, rank_of(m.to))).filter(|m| m.2 != own);
         for (_, message, rank) in others() {
-            lengths[rank] += message_length(&message) + if lengths[rank] == 0 { HEADER } else { 0 };
+            lengths[rank] += message.encoded_length() + if lengths[rank] == 0 { HEADER } else { 0 };
             ends[rank + 1] += 1;
         }
         for rank in 0..size {

@@ -1,12 +1,14 @@
 //! The command line. Values of the configuration stay text here: the configuration checks them, whether they come from
 //! a file or from here.
 
+mod project;
 mod recordings;
 mod render;
 mod run;
 mod values;
 mod view;
 
+pub(crate) use project::ProjectArgs;
 pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
 pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
@@ -41,6 +43,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Write a page about a run, or two side by side: what was run, pictures, figures over time, where the time went.
     Report(ReportArgs),
+    /// Tell what more ranks would bring, without having them.
+    Project(Box<ProjectArgs>),
     /// Write what a run has recorded as files for other programs.
     Export(ExportArgs),
 }

@@ -102,8 +102,12 @@ impl<'a> Loads<'a> {
             return false;
         };
         let mut receivers: Vec<usize> = (0..self.sums.len()).filter(|&rank| rank != from).collect();
-        receivers.sort_by_key(|&rank| (self.sums[rank], rank));
-        receivers.truncate(RECEIVERS);
+        let least = |&rank: &usize| (self.sums[rank], rank);
+        if receivers.len() > RECEIVERS {
+            receivers.select_nth_unstable_by_key(RECEIVERS, least);
+            receivers.truncate(RECEIVERS);
+        }
+        receivers.sort_unstable_by_key(least);
         receivers.extend(self.neighbours_of_rank(from));
         let mut best = (most, None);
         for to in receivers {

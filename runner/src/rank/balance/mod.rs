@@ -14,7 +14,7 @@ use crate::plan::{Assignment, Plan};
 use atoll_core::{StepError, StepReport, TileGrid, TileId, World};
 use atoll_transport::{Collective, Counting, Incoming, Rank, Stats, Transport, TransportError};
 use bytemuck::{Pod, Zeroable};
-pub(super) use clock::thread_time;
+pub(crate) use clock::thread_time;
 use std::time::{Duration, Instant};
 use tracing::info;
 
@@ -23,6 +23,16 @@ use tracing::info;
 const EVERY: usize = 16;
 /// See [`EVERY`].
 const RANKS_A_STEP: usize = 32;
+
+/// After how many steps so many ranks tell each other how busy they are, where tiles may move.
+pub(crate) fn steps_between(ranks: usize) -> usize {
+    EVERY + ranks / RANKS_A_STEP
+}
+
+/// Whether tiles may move by what they took, where the busiest rank took so long and the mean of all so long.
+pub(crate) fn is_uneven(most: u64, mean: u64) -> bool {
+    most > mean + mean / TOO_BUSY
+}
 
 /// Where no tile ever moves, ranks tell each other for the summary alone.
 const RARELY: usize = 100;
@@ -65,7 +75,7 @@ impl<'a> Balancer<'a> {
             return None;
         }
         let by = plan.config.run.balance;
-        let often = EVERY + ranks / RANKS_A_STEP;
+        let often = steps_between(ranks);
         let every = match by {
             Balance::Measured | Balance::Bodies => often,
             Balance::Off => often.max(RARELY),
@@ -156,12 +166,12 @@ impl<'a> Balancer<'a> {
         }
         let worked = || told.iter().map(|told| told[..steps].iter().sum::<u64>());
         let (most, mean) = (worked().max().unwrap_or(0), worked().sum::<u64>() / told.len() as u64);
-        let is_uneven = match self.by {
-            Balance::Measured => most > mean + mean / TOO_BUSY,
+        let may_move = match self.by {
+            Balance::Measured => is_uneven(most, mean),
             Balance::Bodies | Balance::Shuffled => true,
             Balance::Off => false,
         };
-        Ok(is_uneven && told.iter().all(|told| told[steps] == 0))
+        Ok(may_move && told.iter().all(|told| told[steps] == 0))
     }
 
     /// What each tile cost since that was last asked, by tile, on every rank alike.

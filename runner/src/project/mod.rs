@@ -1,0 +1,95 @@
+//! What more ranks would bring, without having them: a run is made here on one thread, what each tile takes and what tiles tell
+//! each other is kept, and then any number of ranks goes through that course in thought.
+//!
+//! What is left out: ranks whose cores are slower for what others on the same processor do, and the noise of an operating system.
+
+mod course;
+mod network;
+mod plot;
+mod predict;
+mod table;
+
+pub(crate) use network::Network;
+pub(crate) use plot::svg;
+pub(crate) use predict::Prediction;
+
+use crate::config::Balance;
+use crate::error::RunError;
+use crate::plan::Plan;
+use crate::rank::Observer;
+use course::Course;
+use predict::{Machine, predict};
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+
+/// The rules of dealing tiles that are compared.
+const RULES: [Balance; 3] = [Balance::Off, Balance::Bodies, Balance::Measured];
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub(crate) struct Wanted {
+    /// Numbers of ranks.
+    pub ranks: Vec<usize>,
+    /// Threads of each.
+    pub threads: usize,
+    /// Between them.
+    pub network: Network,
+}
+
+/// What some numbers of ranks would take. The fields are the keys of the JSON file.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Projection {
+    /// Kind of scene.
+    pub scene: &'static str,
+    /// Fingerprint of what was run.
+    pub config_hash: String,
+    /// Bodies.
+    pub bodies: u64,
+    /// Steps.
+    pub steps: u64,
+    /// Columns and rows of tiles.
+    pub tiles: [u32; 2],
+    /// Of the network, in seconds.
+    pub latency_s: f64,
+    /// Of a rank, each way, in bytes per second.
+    pub bandwidth: f64,
+    /// Mean of a step here, on one thread, in milliseconds.
+    pub ms_per_step_alone: f64,
+    /// By ranks, and for each by rule.
+    pub predictions: Vec<Prediction>,
+}
+
+impl Projection {
+    /// Makes the steps of a plan of one rank here, and goes through them with every number of ranks. None if somebody asked
+    /// to stop before all were made.
+    ///
+    /// # Errors
+    /// If no world can be made of it, or its state is no longer finite.
+    pub(crate) fn make(plan: &Plan, wanted: &Wanted, observer: &Observer) -> Result<Option<Self>, RunError> {
+        let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+        let threads = |error: rayon::ThreadPoolBuildError| RunError::Threads {
+            rank: atoll_transport::Rank(0),
+            threads: 1,
+            reason: error.to_string(),
+        };
+        let _pool = pool.map_err(threads)?;
+        let Some(course) = Course::run(plan, observer)? else { return Ok(None) };
+        let &Wanted { ref ranks, threads, network } = wanted;
+        let grid = &plan.blueprint.grid;
+        let one = |ranks: usize, rule| predict(&course, grid, Machine { ranks, threads, network }, rule);
+        let rules = |ranks: usize| if ranks == 1 { &RULES[..1] } else { &RULES };
+        let predictions = ranks.iter().flat_map(|&ranks| rules(ranks).iter().map(move |&rule| (ranks, rule)));
+        let alone = predict(&course, grid, Machine { ranks: 1, threads: 1, network }, Balance::Off);
+        Ok(Some(Self {
+            scene: plan.config.scene.kind.name(),
+            config_hash: plan.config.hash(plan.tiles),
+            bodies: plan.scene.bodies(),
+            steps: plan.config.run.steps,
+            tiles: plan.tiles,
+            latency_s: network.latency,
+            bandwidth: network.bandwidth,
+            ms_per_step_alone: alone.ms_per_step,
+            predictions: predictions.map(|(ranks, rule)| one(ranks, rule)).collect(),
+        }))
+    }
+}

@@ -1,0 +1,241 @@
+//! What so many ranks would take for a run whose course is known.
+
+use super::course::{Course, Moment};
+use super::network::{Load, Network};
+use crate::config::Balance;
+use crate::plan::Assignment;
+use crate::rank::balance::{is_uneven, steps_between};
+use atoll_core::{TileGrid, TileId};
+use serde::Serialize;
+
+/// What handing over a tile costs who gives it up and who takes it over together, in seconds for each of its bodies: measured with
+/// 16 ranks on NORMAL.
+const MOVE: f64 = 120e-9;
+
+/// Bytes of a tile on its way, for each of its bodies and about as many contacts.
+const MOVED_BYTES: f64 = 150.0;
+
+/// What a number of ranks would take, by one rule of dealing tiles. Times are of a step, in milliseconds.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Prediction {
+    /// How many ranks.
+    pub ranks: usize,
+    /// Threads of each.
+    pub threads: usize,
+    /// The rule, as in `run.balance`.
+    pub balance: &'static str,
+    /// Mean of a step.
+    pub ms_per_step: f64,
+    /// Mean over the last quarter of all steps.
+    pub last_quarter_ms: f64,
+    /// Of the busiest rank in its tiles, the mean over all steps.
+    pub work_ms: f64,
+    /// The busiest rank's work over the mean of all ranks', the mean over all steps.
+    pub imbalance: f64,
+    /// Of the busiest rank with its messages, and of all ranks on their way.
+    pub exchange_ms: f64,
+    /// Of ranks that hand tiles over.
+    pub moving_ms: f64,
+    /// What ranks wait for others, their mean.
+    pub waiting_ms: f64,
+    /// Times as fast as one rank of one thread.
+    pub speedup: f64,
+    /// That divided by all threads of all ranks.
+    pub efficiency: f64,
+    /// Over the last quarter of all steps.
+    pub last_quarter_efficiency: f64,
+    /// Tiles that went to other ranks.
+    pub tiles_moved: u64,
+    /// Ranks without a tile.
+    pub idle_ranks: usize,
+}
+
+/// How many ranks, and what they have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Machine {
+    pub ranks: usize,
+    pub threads: usize,
+    pub network: Network,
+}
+
+/// Sums over steps, in seconds.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    steps: f64,
+    time: f64,
+    alone: f64,
+    work: f64,
+    mean_work: f64,
+    imbalance: f64,
+    exchange: f64,
+    moving: f64,
+}
+
+impl Sums {
+    /// Adds one of these so many times.
+    fn add(&mut self, times: f64, one: Self) {
+        self.steps += times;
+        self.time += times * one.time;
+        self.alone += times * one.alone;
+        self.work += times * one.work;
+        self.mean_work += times * one.mean_work;
+        self.imbalance += times * one.imbalance;
+        self.exchange += times * one.exchange;
+        self.moving += times * one.moving;
+    }
+}
+
+/// Goes through a course as if so many ranks made it.
+pub(super) fn predict(course: &Course, grid: &TileGrid, machine: Machine, balance: Balance) -> Prediction {
+    let Machine { ranks, threads, network } = machine;
+    let mut assignment = Assignment::balanced(grid, course.bodies(0), ranks);
+    let (every, mut since) = (steps_between(ranks) as u64, 0);
+    let mut costs = vec![0.0; grid.tiles()];
+    let (mut loads, mut loads_of) = (Vec::new(), None);
+    let (mut all, mut last, mut tiles_moved) = (Sums::default(), Sums::default(), 0);
+    let steps = course.moments.last().map_or(0, |moment| moment.step + moment.steps);
+    for moment in &course.moments {
+        let window = course.window(moment.step);
+        if loads_of != Some(window) {
+            loads = messages(course, window, &assignment);
+            loads_of = Some(window);
+        }
+        let work = work(moment, &assignment, threads);
+        let busiest = work.iter().copied().fold(0.0, f64::max);
+        let mean = work.iter().sum::<f64>() / ranks as f64;
+        let with_messages = work.iter().zip(&loads).map(|(work, load)| work + network.busy(load)).fold(0.0, f64::max);
+        let time = with_messages + course.syncs * network.sync(ranks);
+        let mut one = Sums {
+            time,
+            alone: moment.tiles.iter().copied().map(f64::from).sum::<f64>() + moment.rest,
+            work: busiest,
+            mean_work: mean,
+            imbalance: busiest / mean.max(f64::MIN_POSITIVE),
+            exchange: time - busiest,
+            ..Sums::default()
+        };
+        costs.iter_mut().zip(&moment.tiles).for_each(|(sum, time)| *sum += f64::from(*time) * moment.steps as f64);
+        since += moment.steps;
+        if balance != Balance::Off && since >= every && ranks > 1 {
+            let nanos: Vec<u64> = match balance {
+                Balance::Bodies => course.bodies(window).to_vec(),
+                _ => costs.iter().map(|cost| (cost * 1e9) as u64).collect(),
+            };
+            if let Some(better) = better(&assignment, grid, &nanos, balance) {
+                let (moved, seconds) = moving(&assignment, &better, course.bodies(window), &network);
+                (tiles_moved, assignment, loads_of) = (tiles_moved + moved, better, None);
+                one.moving = seconds / moment.steps as f64;
+                one.time += one.moving;
+            }
+            costs.fill(0.0);
+            since = 0;
+        }
+        all.add(moment.steps as f64, one);
+        if moment.step >= steps - steps / 4 {
+            last.add(moment.steps as f64, one);
+        }
+    }
+    let ms = |sum: f64| 1e3 * sum / all.steps.max(1.0);
+    let speedup = |sums: &Sums| if sums.time > 0.0 { sums.alone / sums.time } else { 1.0 };
+    let hands = (ranks * threads) as f64;
+    Prediction {
+        ranks,
+        threads,
+        balance: match balance {
+            Balance::Off => "off",
+            Balance::Bodies => "bodies",
+            _ => "measured",
+        },
+        ms_per_step: ms(all.time),
+        last_quarter_ms: 1e3 * last.time / last.steps.max(1.0),
+        work_ms: ms(all.work),
+        imbalance: all.imbalance / all.steps.max(1.0),
+        exchange_ms: ms(all.exchange),
+        moving_ms: ms(all.moving),
+        waiting_ms: ms(all.work - all.mean_work),
+        speedup: speedup(&all),
+        efficiency: speedup(&all) / hands,
+        last_quarter_efficiency: speedup(&last) / hands,
+        tiles_moved,
+        idle_ranks: assignment.idle_ranks(),
+    }
+}
+
+/// What each rank works in a step, in seconds. Its threads take the longest tiles first; what no tile accounts for is shared by
+/// tiles.
+fn work(moment: &Moment, assignment: &Assignment, threads: usize) -> Vec<f64> {
+    let ranks = assignment.ranks_of_tiles();
+    let rest = moment.rest / ranks.len() as f64;
+    if threads == 1 {
+        let mut work = vec![0.0; assignment.ranks()];
+        for (&rank, &time) in ranks.iter().zip(&moment.tiles) {
+            work[rank as usize] += f64::from(time) + rest;
+        }
+        return work;
+    }
+    let mut tiles = vec![Vec::new(); assignment.ranks()];
+    for (&rank, &time) in ranks.iter().zip(&moment.tiles) {
+        tiles[rank as usize].push(f64::from(time) + rest);
+    }
+    tiles.into_iter().map(|tiles| makespan(tiles, threads)).collect()
+}
+
+/// How long so many hands take for some jobs of which they take the longest first.
+fn makespan(mut jobs: Vec<f64>, hands: usize) -> f64 {
+    if jobs.len() < hands {
+        // All work within one after the other.
+        return jobs.iter().sum::<f64>() / hands as f64;
+    }
+    jobs.sort_unstable_by(|a, b| b.total_cmp(a));
+    let mut busy = vec![0.0_f64; hands];
+    for job in jobs {
+        let least = busy.iter_mut().min_by(|a, b| a.total_cmp(b)).expect("there are hands");
+        *least += job;
+    }
+    busy.into_iter().fold(0.0, f64::max)
+}
+
+/// What ranks send each other in a step, by rank.
+fn messages(course: &Course, window: usize, assignment: &Assignment) -> Vec<Load> {
+    let mut loads = vec![Load::default(); assignment.ranks()];
+    let mut pairs = Vec::new();
+    for &(from, to, bytes) in course.traffic(window) {
+        let (from, to) = (assignment.rank_of(TileId(from)), assignment.rank_of(TileId(to)));
+        if from != to {
+            loads[from].bytes[0] += bytes;
+            loads[to].bytes[1] += bytes;
+            pairs.push((from, to));
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    for (from, to) in pairs {
+        loads[from].messages[0] += course.syncs;
+        loads[to].messages[1] += course.syncs;
+    }
+    loads
+}
+
+/// The assignment that ranks would change to.
+fn better(assignment: &Assignment, grid: &TileGrid, costs: &[u64], balance: Balance) -> Option<Assignment> {
+    let mut sums = vec![0; assignment.ranks()];
+    for (&rank, &cost) in assignment.ranks_of_tiles().iter().zip(costs) {
+        sums[rank as usize] += cost;
+    }
+    let (most, mean) = (sums.iter().copied().max().unwrap_or(0), sums.iter().sum::<u64>() / sums.len() as u64);
+    let may_move = balance == Balance::Bodies || is_uneven(most, mean);
+    may_move.then(|| assignment.refined(grid, costs)).flatten()
+}
+
+/// How many tiles move, and how long that takes.
+fn moving(old: &Assignment, new: &Assignment, bodies: &[u64], network: &Network) -> (u64, f64) {
+    let (mut moved, mut busy) = (0, vec![0.0_f64; old.ranks()]);
+    for (tile, from, to) in old.moves(new) {
+        let bodies = bodies[tile.0 as usize] as f64;
+        for rank in [from, to] {
+            busy[rank] += bodies * (0.5 * MOVE + MOVED_BYTES / network.bandwidth);
+        }
+        moved += 1;
+    }
+    (moved, busy.into_iter().fold(0.0, f64::max) + network.sync(old.ranks()))
+}
