@@ -22,9 +22,7 @@ pub(super) type Told = (u32, u32, f64);
 /// A run, as it went on one thread.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// How many steps each of the moments below stands for, but perhaps the last.
-    pub stride: u64,
-    /// In their order.
+    /// In the order of their steps; all of as many, but perhaps the last.
     pub moments: Vec<Moment>,
     /// One for every [`TRAFFIC`] steps.
     traffic: Vec<Vec<Told>>,
@@ -57,8 +55,7 @@ impl Course {
         world.book_time(thread_time);
         let (steps, tiles) = (plan.config.run.steps, plan.blueprint.grid.tiles());
         let stride = (steps * tiles as u64).div_ceil(MOST_TIMES).max(1);
-        let mut course =
-            Self { stride, moments: Vec::new(), traffic: Vec::new(), bodies: vec![bodies(&world)], syncs: 0.0 };
+        let mut course = Self { moments: Vec::new(), traffic: Vec::new(), bodies: vec![bodies(&world)], syncs: 0.0 };
         let mut tap = Tap::default();
         let (told, mut before) = (observer.steps(true, 0, steps), thread_time());
         for step in 0..steps {
@@ -71,7 +68,7 @@ impl Course {
                 StepError::FloatMode { step } => RunError::FloatMode { step },
                 StepError::Halo(NotHere { tile }) => RunError::Protocol { step, tile },
             })?;
-            course.add(step, thread_time().saturating_sub(before), &mut world);
+            course.add((step, stride), thread_time().saturating_sub(before), &mut world);
             if (step + 1).is_multiple_of(TRAFFIC) || step + 1 == steps {
                 course.traffic.push(tap.take());
                 course.bodies.push(bodies(&world));
@@ -86,9 +83,9 @@ impl Course {
         Ok(Some(course))
     }
 
-    /// Adds a step that took so long.
-    fn add(&mut self, step: u64, took: Duration, world: &mut World) {
-        if step.is_multiple_of(self.stride) {
+    /// Adds a step that took so long, to a moment of so many.
+    fn add(&mut self, (step, stride): (u64, u64), took: Duration, world: &mut World) {
+        if step.is_multiple_of(stride) {
             let tiles = vec![0.0; world.tiles().count()];
             self.moments.push(Moment { step, steps: 0, tiles, rest: 0.0 });
         }
@@ -159,5 +156,14 @@ impl Halo for Tap {
             *self.bytes.entry((message.from.0, message.to.0)).or_default() += message.encoded_length() as u64;
         }
         Loopback.exchange(outbox, inbox)
+    }
+}
+
+#[cfg(test)]
+impl Course {
+    /// One that was thought up: its moments, each of a step, what tiles tell each other in every one, and their bodies.
+    pub(super) fn of(moments: Vec<Moment>, told: Vec<Told>, bodies: Vec<u64>) -> Self {
+        let windows = moments.len().div_ceil(TRAFFIC as usize);
+        Self { moments, traffic: vec![told; windows], bodies: vec![bodies; windows + 1], syncs: 1.0 }
     }
 }

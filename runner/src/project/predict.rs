@@ -239,3 +239,49 @@ fn moving(old: &Assignment, new: &Assignment, bodies: &[u64], network: &Network)
     }
     (moved, busy.into_iter().fold(0.0, f64::max) + network.sync(old.ranks()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    /// Eight tiles in a row, of which each tells its neighbours a thousand bytes, over 64 steps.
+    fn course(tiles: [f32; 8]) -> (Course, TileGrid) {
+        let moment = |step| Moment { step, steps: 1, tiles: tiles.to_vec(), rest: 0.0 };
+        let told = (0..7).flat_map(|tile| [(tile, tile + 1, 1e3), (tile + 1, tile, 1e3)]).collect();
+        let course = Course::of((0..64).map(moment).collect(), told, vec![1000; 8]);
+        (course, TileGrid::new(DVec2::ZERO, DVec2::new(8.0, 1.0), 8, 1).unwrap())
+    }
+
+    fn machine(ranks: usize, threads: usize) -> Machine {
+        Machine { ranks, threads, network: Network { latency: 1e-5, bandwidth: 1e9 } }
+    }
+
+    #[test]
+    fn one_rank_takes_what_its_tiles_take_and_even_ones_their_share() {
+        let (course, grid) = course([1e-3; 8]);
+        let alone = predict(&course, &grid, machine(1, 1), Balance::Off);
+        assert!((alone.ms_per_step - 8.0).abs() < 1e-5 && (alone.efficiency - 1.0).abs() < 1e-9, "{alone:?}");
+        assert_eq!((alone.exchange_ms, alone.waiting_ms), (0.0, 0.0));
+        let two = predict(&course, &grid, machine(2, 1), Balance::Measured);
+        assert!((two.work_ms - 4.0).abs() < 1e-5 && (two.imbalance - 1.0).abs() < 1e-6 && two.tiles_moved == 0);
+        // A sync point: two latencies and what a rank does; the rest are its messages.
+        let sync = 1e3 * machine(2, 1).network.sync(2);
+        assert!(two.exchange_ms > sync && two.exchange_ms < sync + 0.01, "{two:?}");
+        let threads = predict(&course, &grid, machine(1, 4), Balance::Off);
+        assert!((threads.work_ms - 2.0).abs() < 1e-5 && (threads.efficiency - 1.0).abs() < 1e-5, "{threads:?}");
+        let many = predict(&course, &grid, machine(100, 1), Balance::Off);
+        assert!(many.idle_ranks == 92 && many.work_ms > 0.99 && many.efficiency < 0.08, "{many:?}");
+    }
+
+    #[test]
+    fn tiles_that_take_longer_are_dealt_anew_where_that_is_measured() {
+        let (course, grid) = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
+        let [off, bodies, measured] =
+            [Balance::Off, Balance::Bodies, Balance::Measured].map(|rule| predict(&course, &grid, machine(2, 1), rule));
+        // By bodies all tiles are alike.
+        assert!((off.work_ms - 10.0).abs() < 1e-4 && (bodies.work_ms - 10.0).abs() < 1e-4, "{off:?} {bodies:?}");
+        assert!(measured.tiles_moved == 3 && (7.0..8.0).contains(&measured.work_ms), "{measured:?}");
+        assert!(measured.moving_ms > 0.0 && measured.last_quarter_efficiency > 0.98, "{measured:?}");
+    }
+}

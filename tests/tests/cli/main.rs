@@ -1,5 +1,6 @@
 //! The program as its user meets it: what it refuses and in which words, exit codes, files.
 
+mod projected;
 mod refused;
 mod told;
 

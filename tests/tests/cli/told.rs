@@ -109,7 +109,7 @@ fn the_summary_has_all_its_keys() {
         };
         value.as_object().is_some_and(|phases| !phases.is_empty() && phases.values().all(times))
     };
-    let keys: [(&str, Holds); 32] = [
+    let keys: [(&str, Holds); 34] = [
         ("bodies", &|value| *value == 400),
         ("steps", &|value| *value == 5),
         ("ranks", &|value| *value == 2),
@@ -128,6 +128,8 @@ fn the_summary_has_all_its_keys() {
         ("ghosts", &count),
         ("migrations", &count),
         ("bytes_sent", &|value| value.as_u64().is_some_and(|bytes| bytes > 0)),
+        ("imbalance", &|value| value.as_f64().is_some_and(|imbalance| (1.0..=2.0).contains(&imbalance))),
+        ("tiles_moved", &count),
         ("mass", &positive),
         ("kinetic_energy", &positive),
         ("mean_half_v2", &positive),

@@ -1,0 +1,56 @@
+//! What more ranks are said to bring.
+
+use crate::{Desk, SMALL, assert_refused};
+use atoll_tests::program::{self, run};
+use serde_json::Value;
+use std::fs;
+
+fn project(desk: &Desk, options: &str) -> program::Ended {
+    let mut command = program::command();
+    run(command.current_dir(desk.path()).args(["project", "world.toml"]).args(options.split_whitespace()))
+}
+
+#[test]
+fn a_projection_tells_of_every_number_of_ranks() {
+    let desk = Desk::new(SMALL);
+    let options = "--bodies 3000 --tiles 6x6 --steps 40 --ranks 1,2,8,50 --json p.json --plot p.svg --quiet";
+    let ended = project(&desk, options);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
+    assert!(ended.stdout.contains("from 50 ranks on some have nothing to do: there are only 36 tiles"), "{ended}");
+    let json: Value = serde_json::from_slice(&fs::read(desk.path().join("p.json")).unwrap()).unwrap();
+    let alone = json["ms_per_step_alone"].as_f64().unwrap();
+    let rows = json["predictions"].as_array().unwrap();
+    let told: Vec<_> =
+        rows.iter().map(|row| (row["ranks"].as_u64().unwrap(), row["balance"].as_str().unwrap())).collect();
+    let rules = |ranks| ["off", "bodies", "measured"].map(|rule| (ranks, rule));
+    assert_eq!(told, [&[(1, "off")][..], &rules(2), &rules(8), &rules(50)].concat());
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap();
+        let ranks = number("ranks");
+        assert!((number("speedup") - alone / number("ms_per_step")).abs() < 1e-6 * ranks, "{row}");
+        assert!(number("efficiency") <= 1.0 + 1e-9 && number("imbalance") >= 1.0 - 1e-9, "{row}");
+        assert!((ranks == 1.0) == (number("exchange_ms") == 0.0), "{row}");
+    }
+    assert_eq!(rows[0]["ms_per_step"], alone);
+    assert!(fs::read_to_string(desk.path().join("p.svg")).unwrap().contains("balance = measured"));
+}
+
+#[test]
+fn what_cannot_be_projected_is_refused() {
+    let desk = Desk::new(SMALL);
+    for (options, expected) in [
+        ("--ranks 0", "invalid value '0' for '--ranks <N,...>': must be a whole number within 1 to 1048576; see"),
+        ("--ranks 1,x", "invalid value 'x' for '--ranks <N,...>': must be a whole number"),
+        ("--threads 0", "invalid value '0' for '--threads <T>': must be a whole number within 1 to 1024"),
+        (
+            "--network lan",
+            "invalid value 'lan' for '--network <NETWORK>': a network is one of node, cluster, ethernet, or",
+        ),
+        ("--bodies -5", "--bodies -5: must be a whole number"),
+        ("--json no/such/x.json", "--json no/such/x.json: "),
+        ("--plot world.toml", "--plot world.toml: "),
+    ] {
+        assert_refused(&project(&desk, options), 2, expected);
+    }
+    assert_eq!(desk.files(), ["world.toml"]);
+}
