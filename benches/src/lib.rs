@@ -5,6 +5,7 @@
 //! | `step` | How long does a step of the reported experiment take, and how much memory? |
 //! | `growth` | Does a body cost more in a larger world, and in a larger tile? |
 //! | `building` | What does one rank of many take until the first step? |
+//! | `scaling` | What do ranks and threads bring, beside the report's figures and a projection? |
 //! | `strategies` | What do threads bring within one tile, by islands, by coloring, and by both? |
 //! | `choices` | What does each choice of the report cost, in time and in quality? |
 //! | `islands` | Which search for islands is fastest, and what does a second thread bring? |
@@ -42,6 +43,9 @@ macro_rules! file {
 
 /// The reported experiment.
 pub const NORMAL: File = file!("normal.toml");
+
+/// The same with more bodies in one corner.
+pub const SKEWED: File = file!("skewed.toml");
 
 /// Many bodies of which few touch.
 pub const SPARSE: File = file!("sparse.toml");

@@ -98,5 +98,6 @@ pub mod internals {
     pub use crate::launch::run as run_plan;
     pub use crate::look::live::overhear;
     pub use crate::plan::Plan;
+    pub use crate::project::{Network, Prediction, Projection, Wanted};
     pub use crate::rank::{Held, Host, Next, PanicAt, Watcher, part_of_scene};
 }

@@ -12,19 +12,18 @@ impl World {
     /// # Panics
     /// If a tile is not of this world.
     pub fn give_up(&mut self, tiles: &[TileId]) -> Vec<Vec<u8>> {
-        let places = tiles.iter().map(|&tile| self.place_of(tile).expect("only who holds a tile can give it up"));
-        let places: Vec<usize> = places.collect();
-        let blocks = places.iter().map(|&place| snapshot::block(&self.tiles[place])).collect();
-        let mut leaving = places.into_iter().peekable();
-        let mut place = 0;
-        let mut stays = || {
-            place += 1;
-            leaving.next_if_eq(&(place - 1)).is_none()
+        let mut leaving = tiles.iter().peekable();
+        let mut blocks = Vec::with_capacity(tiles.len());
+        let all = std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works));
+        let stays = |(tile, _): &(Tile, _)| {
+            let leaves = leaving.next_if(|name| **name == tile.id).is_some();
+            if leaves {
+                blocks.push(snapshot::block(tile));
+            }
+            !leaves
         };
-        let stays: Vec<bool> = self.tiles.iter().map(|_| stays()).collect();
-        let (mut of_tiles, mut of_works) = (stays.iter(), stays.iter());
-        self.tiles.retain(|_| *of_tiles.next().expect("one for each tile"));
-        self.works.retain(|_| *of_works.next().expect("one for each tile"));
+        (self.tiles, self.works) = all.filter(stays).unzip();
+        assert!(leaving.next().is_none(), "only who holds a tile can give it up");
         self.find_places();
         blocks
     }

@@ -9,14 +9,15 @@ mod plot;
 mod predict;
 mod table;
 
-pub(crate) use network::Network;
+pub use network::Network;
 pub(crate) use plot::svg;
-pub(crate) use predict::Prediction;
+pub use predict::Prediction;
 
 use crate::config::Balance;
 use crate::error::RunError;
 use crate::plan::Plan;
 use crate::rank::Observer;
+use atoll_transport::Rank;
 use course::Course;
 use predict::{Machine, predict};
 use rayon::ThreadPoolBuilder;
@@ -27,7 +28,7 @@ const RULES: [Balance; 3] = [Balance::Off, Balance::Bodies, Balance::Measured];
 
 /// What is wanted.
 #[derive(Clone, Debug)]
-pub(crate) struct Wanted {
+pub struct Wanted {
     /// Numbers of ranks.
     pub ranks: Vec<usize>,
     /// Threads of each.
@@ -38,7 +39,7 @@ pub(crate) struct Wanted {
 
 /// What some numbers of ranks would take. The fields are the keys of the JSON file.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub(crate) struct Projection {
+pub struct Projection {
     /// Kind of scene.
     pub scene: &'static str,
     /// Fingerprint of what was run.
@@ -65,15 +66,10 @@ impl Projection {
     ///
     /// # Errors
     /// If no world can be made of it, or its state is no longer finite.
-    pub(crate) fn make(plan: &Plan, wanted: &Wanted, observer: &Observer) -> Result<Option<Self>, RunError> {
-        let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-        let threads = |error: rayon::ThreadPoolBuildError| RunError::Threads {
-            rank: atoll_transport::Rank(0),
-            threads: 1,
-            reason: error.to_string(),
-        };
-        let _pool = pool.map_err(threads)?;
-        let Some(course) = Course::run(plan, observer)? else { return Ok(None) };
+    pub fn make(plan: &Plan, wanted: &Wanted, observer: &Observer) -> Result<Option<Self>, RunError> {
+        let failed = |reason: String| RunError::Threads { rank: Rank(0), threads: 1, reason };
+        let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| failed(error.to_string()))?;
+        let Some(course) = pool.install(|| Course::run(plan, observer))? else { return Ok(None) };
         let &Wanted { ref ranks, threads, network } = wanted;
         let grid = &plan.blueprint.grid;
         let one = |ranks: usize, rule| predict(&course, grid, Machine { ranks, threads, network }, rule);

@@ -12,7 +12,7 @@ const BYTE: f64 = 0.4e-9;
 
 /// A network.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Network {
+pub struct Network {
     /// Until the first byte of a message is there, in seconds.
     pub latency: f64,
     /// Of a rank, each way, in bytes per second.

@@ -17,7 +17,7 @@ const MOVED_BYTES: f64 = 150.0;
 
 /// What a number of ranks would take, by one rule of dealing tiles. Times are of a step, in milliseconds.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub(crate) struct Prediction {
+pub struct Prediction {
     /// How many ranks.
     pub ranks: usize,
     /// Threads of each.

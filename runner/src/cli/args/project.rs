@@ -23,7 +23,7 @@ pub struct ProjectArgs {
     pub threads: usize,
     /// What is between ranks: node, cluster, ethernet, or a latency and a bandwidth such as 2us,10GB/s.
     #[arg(long, value_name = "NETWORK", default_value = "cluster")]
-    pub(crate) network: Network,
+    pub network: Network,
     /// Dynamic bodies.
     #[arg(long, value_name = "N")]
     pub bodies: Option<String>,
