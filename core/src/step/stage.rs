@@ -36,6 +36,8 @@ pub(crate) struct Hand {
     pub(crate) timings: Timings,
     /// Time booked in this step.
     pub(crate) booked: Duration,
+    /// When its last tile in this stage was done, by the clock that time is booked by.
+    pub(crate) booked_until: Option<Duration>,
     /// What its tiles have to tell at the next sync point.
     pub(crate) outgoing: Mailbag,
     /// Of its tiles, in a step that takes them.

@@ -143,18 +143,24 @@ impl World {
         let team = if apart { Team::ALONE } else { Team::of_pool() };
         let workers = if apart { 1 } else { rayon::current_num_threads() as u32 };
         let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
+        for hand in hands.iter_mut() {
+            hand.get_mut().expect("no stage panicked").booked_until = None;
+        }
         let (hands, inbox) = (&*hands, &*inbox);
         let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
             let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
             if !float_mode_is_default() {
                 tile.counts.fault = Some(Fault::FloatMode);
             }
-            let begun = clock.map(|clock| clock());
+            // Reading such a clock takes a while: where one tile ends the thread's next begins.
+            let begun = clock.map(|clock| hand.booked_until.take().unwrap_or_else(clock));
             let result = stage(&mut Bench::new(shop, tile, inbox.mail(place), &mut hand), own);
             if let Some((clock, begun)) = clock.zip(begun) {
-                let worked = clock().saturating_sub(begun) * workers;
+                let now = clock();
+                let worked = now.saturating_sub(begun) * workers;
                 tile.booked += worked;
                 hand.booked += worked;
+                hand.booked_until = Some(now);
             }
             result
         };
