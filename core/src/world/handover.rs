@@ -40,7 +40,7 @@ impl World {
             if !known || taken.iter().any(|taken: &Tile| taken.id == tile) {
                 return Err(RestoreError::NotToBeTaken { tile });
             }
-            taken.push(snapshot::restore(tile, self.setup.statics_of(tile), block, &self.setup)?);
+            taken.push(snapshot::read(tile, self.setup.statics_of(tile), block, &self.setup)?);
         }
         let mut kept: Vec<_> =
             std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works)).collect();

@@ -78,8 +78,7 @@ const HEADER: usize = size_of::<Header>();
 const UNCHECKED: usize = 16;
 
 impl Header {
-    fn of(tile: &Tile) -> Self {
-        let hashes = tile.hashes();
+    fn of(tile: &Tile, hashes: Hashes) -> Self {
         Self {
             format: SNAPSHOT_FORMAT,
             tile: tile.id,
@@ -166,7 +165,7 @@ impl World {
         let mut rest = &mut bytes[..];
         let blocks = tiles.iter().map(|tile| rest.split_off_mut(..length(tile)).expect("room was made for every tile"));
         let blocks: Vec<_> = blocks.collect();
-        tiles.par_iter().zip(blocks).with_max_len(1).map(|(tile, block)| save(tile, block)).collect()
+        tiles.par_iter().zip(blocks).with_max_len(1).map(|(tile, block)| save(tile, tile.hashes(), block)).collect()
     }
 
     /// Makes a tile what it was when `block` was saved; what it held before is forgotten. On an error it is left as it
@@ -213,8 +212,8 @@ fn length(tile: &Tile) -> usize {
     HEADER + columns(tile).iter().map(|column| column.len()).sum::<usize>()
 }
 
-fn save(tile: &Tile, block: &mut [u8]) -> SavedTile {
-    let mut header = Header::of(tile);
+fn save(tile: &Tile, hashes: Hashes, block: &mut [u8]) -> SavedTile {
+    let mut header = Header::of(tile, hashes);
     let mut at = HEADER;
     for column in columns(tile) {
         block[at..at + column.len()].copy_from_slice(column);
@@ -243,15 +242,25 @@ impl Reader<'_> {
     }
 }
 
-/// The block of one tile.
+/// The block of one tile, without its hashes: for who reads it at once, and has the checksum.
 pub(crate) fn block(tile: &Tile) -> Vec<u8> {
     let mut block = vec![0; length(tile)];
-    save(tile, &mut block);
+    save(tile, Hashes::default(), &mut block);
     block
 }
 
+/// As [`read`], of a block with the hashes of what was saved: then they must be those of what comes of it.
+fn restore(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
+    let restored = read(tile, statics, block, setup)?;
+    let (saved, hashes) = (SavedTile::read(tile, block)?.hashes, restored.hashes());
+    if hashes != saved {
+        return Err(RestoreError::Hashes { tile, saved, restored: hashes });
+    }
+    Ok(restored)
+}
+
 /// The tile that was saved in `block`, which these rows of the statics reach.
-pub(crate) fn restore(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
+pub(crate) fn read(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
     let header = Header::read(tile, block)?;
     let mut reader = Reader(&block[HEADER..]);
     let (owned, dynamic) = (header.bodies as usize, header.bodies as usize + header.ghosts as usize);
@@ -272,10 +281,6 @@ pub(crate) fn restore(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Set
     let empty = Tile::with_statics(tile, statics, setup);
     let restored = Tile { bodies, owned, unseen, ghost_owners, contacts, sleep, ..empty };
     check(&restored, setup)?;
-    let hashes = restored.hashes();
-    if hashes != header.hashes() {
-        return Err(RestoreError::Hashes { tile, saved: header.hashes(), restored: hashes });
-    }
     Ok(restored)
 }
 
