@@ -6,15 +6,17 @@
 //! those that get them. Time is that of threads on a core: who waits, or shares a core with others, is not busy for it.
 
 mod clock;
+mod handover;
 
-use super::halo::{ExchangeError, RankHalo};
+use super::halo::RankHalo;
 use super::{RankError, RankFacts, records, unreadable};
 use crate::config::Balance;
 use crate::plan::{Assignment, Plan};
-use atoll_core::{StepError, StepReport, TileGrid, TileId, World};
-use atoll_transport::{Collective, Counting, Incoming, Rank, Stats, Transport, TransportError};
+use atoll_core::{StepReport, TileGrid, TileId, World};
+use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use bytemuck::{Pod, Zeroable};
 pub(crate) use clock::thread_time;
+use handover::Move;
 use std::time::{Duration, Instant};
 use tracing::info;
 
@@ -199,47 +201,10 @@ impl<'a> Balancer<'a> {
         world: &mut World,
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
-        let own = halo.transport().rank().index();
-        let moves: Vec<(TileId, usize, usize)> = halo.assignment().moves(&assignment).collect();
+        let moves: Vec<Move> = halo.assignment().moves(&assignment).collect();
         halo.assign(assignment);
         self.moved += moves.len() as u64;
         info!(step = world.step_count(), tiles = moves.len(), "tiles move");
-
-        let leaving: Vec<_> = moves.iter().filter(|&&(_, from, _)| from == own).collect();
-        let names: Vec<TileId> = leaving.iter().map(|(tile, ..)| *tile).collect();
-        let mut parcels = vec![Vec::new(); halo.transport().size()];
-        for (&&(.., to), block) in leaving.iter().zip(world.give_up(&names)) {
-            parcels[to].extend_from_slice(&(block.len() as u64).to_le_bytes());
-            parcels[to].extend_from_slice(&block);
-        }
-        let incoming = send(&parcels, halo.transport()).map_err(RankError::Transport)?;
-        for (from, mut bytes) in incoming.iter() {
-            let coming = moves.iter().filter(|&&(_, giver, to)| giver == from.index() && to == own);
-            let blocks: Option<Vec<_>> = coming.map(|&(tile, ..)| Some((tile, next_block(&mut bytes)?))).collect();
-            let blocks = blocks.filter(|_| bytes.is_empty());
-            let blocks = blocks.ok_or_else(|| RankError::Transport(unreadable(from)))?;
-            let taken = world.take_over(&blocks);
-            taken.map_err(|error| RankError::Step(StepError::Halo(ExchangeError::Tile { from, error })))?;
-        }
-        Ok(())
+        handover::hand_over(&moves, world, halo.transport(), handover::ROUND)
     }
-}
-
-/// The first block of some, which it is taken from.
-fn next_block<'a>(bytes: &mut &'a [u8]) -> Option<&'a [u8]> {
-    let (length, rest) = bytes.split_first_chunk()?;
-    let (block, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
-    *bytes = rest;
-    Some(block)
-}
-
-/// Brings each rank what is for it.
-fn send(parcels: &[Vec<u8>], transport: &mut impl Transport) -> Result<Incoming, TransportError> {
-    let lengths: Vec<usize> = parcels.iter().map(Vec::len).collect();
-    for (to, bytes) in transport.prepare(&lengths)?.iter_mut() {
-        bytes.copy_from_slice(&parcels[to.index()]);
-    }
-    let mut incoming = Incoming::default();
-    transport.exchange(&mut incoming)?;
-    Ok(incoming)
 }
