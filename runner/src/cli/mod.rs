@@ -18,14 +18,19 @@ use crate::error::{Exit, RunError};
 use args::{Cli, Command};
 use clap::Parser;
 use clap::error::ErrorKind;
-use std::env;
 use std::process::ExitCode;
+use std::{env, io, panic, thread};
 
 /// Reads the command line and does what it says.
 pub fn main() -> ExitCode {
-    let command = match Cli::try_parse() {
-        Ok(cli) => view::as_run(cli.command),
-        Err(error) => return usage(&error),
+    let parsed = with_room(|| Cli::try_parse().map_err(|error| usage(&error)));
+    let command = match parsed {
+        Ok(Ok(cli)) => view::as_run(cli.command),
+        Ok(Err(exit)) => return exit,
+        Err(error) => {
+            console::complain(&format!("cannot start a thread: {error}"));
+            return ExitCode::from(Exit::Usage as u8);
+        }
     };
     let begun = console::init(matches!(&command, Command::Run(args) if args.trace.is_some()));
     interrupt::outlive_file_limits();
@@ -51,6 +56,32 @@ pub fn main() -> ExitCode {
         }
     });
     ExitCode::from(exit as u8)
+}
+
+/// What describes all options to clap takes more stack than all the rest of a run, and some systems give little of it.
+const ROOM: usize = 1 << 20;
+
+/// Does something, where this thread has little stack on one that has enough. Not always: a thread takes addresses, of which some
+/// systems give few.
+fn with_room<T: Send>(act: impl FnOnce() -> T + Send) -> io::Result<T> {
+    if !has_small_stack() {
+        return Ok(act());
+    }
+    thread::scope(|scope| {
+        let thread = thread::Builder::new().stack_size(ROOM).spawn_scoped(scope, act)?;
+        Ok(thread.join().unwrap_or_else(|payload| panic::resume_unwind(payload)))
+    })
+}
+
+#[cfg(unix)]
+fn has_small_stack() -> bool {
+    let limit = rustix::process::getrlimit(rustix::process::Resource::Stack);
+    limit.current.is_some_and(|bytes| bytes < ROOM as u64)
+}
+
+#[cfg(not(unix))]
+fn has_small_stack() -> bool {
+    false
 }
 
 /// Help and version as they are; complaints on one line.
