@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.first().map(String::as_str) {
         Some("--part") => part(&arguments[1..]),
-        _ => compare(&arguments),
+        _ => compare(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -52,14 +52,8 @@ fn part(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-fn compare(arguments: &[String]) -> Result<(), String> {
-    let number = |at: usize, usual: u64| match arguments.get(at) {
-        Some(text) => {
-            text.parse::<u64>().map_err(|_| format!("not a number: {text}; usage: building [BODIES [RANKS]]"))
-        }
-        None => Ok(usual),
-    };
-    let (bodies, ranks) = (number(0, 50_000_000)?, number(1, 64)?.max(1));
+fn compare() -> Result<(), String> {
+    let [bodies, ranks] = atoll_benches::arguments(["BODIES", "RANKS"], [50_000_000, 64])?;
     let whole = cost(bodies, 1, 0)?;
     eprintln!("{:>8}{:>8}{:>12}{:>10}{:>10}{:>10}{:>10}", "ranks", "rank", "bodies", "s", "MB", "time", "memory");
     for (ranks, rank) in [(1, 0), (ranks, 0), (ranks, ranks / 2), (ranks, ranks - 1)] {

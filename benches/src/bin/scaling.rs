@@ -103,6 +103,11 @@ fn point(run: &Summary) -> Point {
     Point { ranks: run.ranks, threads: run.threads, ms: run.ms_per_step }
 }
 
+/// What one core takes, in milliseconds.
+fn alone(points: &[Point]) -> f64 {
+    points.iter().find(|point| point.cores() == 1.0).map_or(f64::NAN, |point| point.ms)
+}
+
 fn reported(scene: &str) -> Vec<Point> {
     let point = |line: &str| {
         let fields: Vec<&str> = line.split(',').collect();
@@ -127,7 +132,6 @@ fn project(file: File, tiles: &str, steps: u64) -> Result<Vec<Point>, String> {
 }
 
 fn tell(scene: &str, steps: u64, runs: &[Summary], reported: &[Point]) {
-    let alone = |points: &[Point]| points.iter().find(|point| point.cores() == 1.0).map_or(f64::NAN, |point| point.ms);
     let (ours, theirs) = (runs[0].ms_per_step, alone(reported));
     eprintln!("\n{scene}, {steps} steps, measured here, and the report's on as many");
     eprintln!(
@@ -201,7 +205,7 @@ fn draw_speedup(
     mesh.x_desc("ranks x threads").y_desc("times as fast").light_line_style(WHITE);
     mesh.x_label_formatter(&plain).y_label_formatter(&plain).draw()?;
     let ideal = [(1.0, 1.0), (most, most)];
-    let alone = measured[0].ms;
+    let ours = measured[0].ms;
     let mut lines = vec![("as many times as cores".to_owned(), RGBColor(160, 160, 160), ideal.to_vec())];
     let speedups = |points: &[Point], alone: f64, one: fn(&Point) -> usize| {
         let mut points: Vec<_> =
@@ -209,15 +213,15 @@ fn draw_speedup(
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     };
-    let theirs = reported.iter().find(|point| point.cores() == 1.0).map_or(f64::NAN, |point| point.ms);
+    let theirs = alone(reported);
     let by_ranks: fn(&Point) -> usize = |point| point.threads;
     let by_threads: fn(&Point) -> usize = |point| point.ranks;
     lines.push(("reported, ranks".to_owned(), RGBColor(214, 39, 40), speedups(reported, theirs, by_ranks)));
     lines.push(("reported, threads".to_owned(), RGBColor(255, 152, 150), speedups(reported, theirs, by_threads)));
-    lines.push(("measured here, ranks".to_owned(), RGBColor(31, 119, 180), speedups(measured, alone, by_ranks)));
-    lines.push(("measured here, threads".to_owned(), RGBColor(23, 190, 207), speedups(measured, alone, by_threads)));
+    lines.push(("measured here, ranks".to_owned(), RGBColor(31, 119, 180), speedups(measured, ours, by_ranks)));
+    lines.push(("measured here, threads".to_owned(), RGBColor(23, 190, 207), speedups(measured, ours, by_threads)));
     for ((tiles, points), color) in projected.iter().zip([RGBColor(152, 223, 138), RGBColor(44, 160, 44)]) {
-        lines.push((format!("projected, tiles {tiles}"), color, speedups(points, alone, by_ranks)));
+        lines.push((format!("projected, tiles {tiles}"), color, speedups(points, ours, by_ranks)));
     }
     for (name, color, points) in lines {
         chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, color.filled())))?;

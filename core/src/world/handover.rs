@@ -40,7 +40,7 @@ impl World {
             if !known || taken.iter().any(|taken: &Tile| taken.id == tile) {
                 return Err(RestoreError::NotToBeTaken { tile });
             }
-            taken.push(snapshot::read(tile, self.setup.statics_of(tile), block, &self.setup)?);
+            taken.push(snapshot::read(tile, self.setup.statics_of(tile), block, &self.setup)?.0);
         }
         let mut kept: Vec<_> =
             std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works)).collect();
@@ -49,10 +49,6 @@ impl World {
         (self.tiles, self.works) = kept.into_iter().unzip();
         self.find_places();
         Ok(())
-    }
-
-    fn place_of(&self, tile: TileId) -> Option<usize> {
-        self.tiles.binary_search_by_key(&tile, |tile| tile.id).ok()
     }
 
     /// After tiles came or went: where each of them is, and which have something to do.

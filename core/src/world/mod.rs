@@ -136,7 +136,7 @@ impl World {
             return Err(SetupError::BadBody { id: body.id });
         }
         let owner = self.setup.grid.locate(body.position);
-        let Ok(place) = self.tiles.binary_search_by_key(&owner, |tile| tile.id) else { return Ok(false) };
+        let Some(place) = self.place_of(owner) else { return Ok(false) };
         if !self.names.insert(body.id) {
             return Err(SetupError::NameTaken { id: body.id });
         }
@@ -234,6 +234,11 @@ impl World {
     /// Time spent in each phase so far, as shares of the wall clock.
     pub fn timings(&self) -> &Timings {
         &self.timings
+    }
+
+    /// Where among this world's a tile is, if it is there.
+    pub(crate) fn place_of(&self, tile: TileId) -> Option<usize> {
+        self.tiles.binary_search_by_key(&tile, |tile| tile.id).ok()
     }
 
     pub(crate) fn tile_states(&self) -> &[Tile] {

@@ -82,6 +82,18 @@ pub enum Balance {
     Shuffled,
 }
 
+impl Balance {
+    /// As in a configuration.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Bodies => "bodies",
+            Self::Off => "off",
+            Self::Shuffled => "shuffled",
+        }
+    }
+}
+
 /// What carries bytes between ranks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TransportKind {

@@ -20,10 +20,10 @@ pub(super) const MPI_EXCHANGE: Words<MpiExchange> =
 
 /// `run.balance`
 pub(super) const BALANCE: Words<Balance> = &[
-    ("measured", Balance::Measured),
-    ("bodies", Balance::Bodies),
-    ("off", Balance::Off),
-    ("shuffled", Balance::Shuffled),
+    (Balance::Measured.name(), Balance::Measured),
+    (Balance::Bodies.name(), Balance::Bodies),
+    (Balance::Off.name(), Balance::Off),
+    (Balance::Shuffled.name(), Balance::Shuffled),
 ];
 
 /// `run.instructions`

@@ -141,11 +141,7 @@ pub(super) fn predict(course: &Course, grid: &TileGrid, machine: Machine, balanc
     Prediction {
         ranks,
         threads,
-        balance: match balance {
-            Balance::Off => "off",
-            Balance::Bodies => "bodies",
-            _ => "measured",
-        },
+        balance: balance.name(),
         ms_per_step: ms(all.time),
         last_quarter_ms: 1e3 * last.time / last.steps.max(1.0),
         work_ms: ms(all.work),

@@ -175,9 +175,12 @@ impl World {
     /// If this world does not hold the tile, or the block is not one that this version saved of it, whole and
     /// unchanged. Never panics, and allocates in proportion to the bytes given.
     pub fn restore(&mut self, tile: TileId, block: &[u8]) -> Result<(), RestoreError> {
-        let place = self.tile_states().binary_search_by_key(&tile, |tile| tile.id);
-        let place = place.map_err(|_| RestoreError::NotHere { tile })?;
-        let restored = restore(tile, self.tile_states()[place].statics.clone(), block, &self.setup)?;
+        let place = self.place_of(tile).ok_or(RestoreError::NotHere { tile })?;
+        let (restored, saved) = read(tile, self.tile_states()[place].statics.clone(), block, &self.setup)?;
+        let hashes = restored.hashes();
+        if hashes != saved {
+            return Err(RestoreError::Hashes { tile, saved, restored: hashes });
+        }
         self.replace_tile(place, restored);
         Ok(())
     }
@@ -249,18 +252,13 @@ pub(crate) fn block(tile: &Tile) -> Vec<u8> {
     block
 }
 
-/// As [`read`], of a block with the hashes of what was saved: then they must be those of what comes of it.
-fn restore(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
-    let restored = read(tile, statics, block, setup)?;
-    let (saved, hashes) = (SavedTile::read(tile, block)?.hashes, restored.hashes());
-    if hashes != saved {
-        return Err(RestoreError::Hashes { tile, saved, restored: hashes });
-    }
-    Ok(restored)
-}
-
-/// The tile that was saved in `block`, which these rows of the statics reach.
-pub(crate) fn read(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup) -> Result<Tile, RestoreError> {
+/// The tile that was saved in `block`, which these rows of the statics reach, and the hashes that were saved with it.
+pub(crate) fn read(
+    tile: TileId,
+    statics: Vec<u32>,
+    block: &[u8],
+    setup: &Setup,
+) -> Result<(Tile, Hashes), RestoreError> {
     let header = Header::read(tile, block)?;
     let mut reader = Reader(&block[HEADER..]);
     let (owned, dynamic) = (header.bodies as usize, header.bodies as usize + header.ghosts as usize);
@@ -281,7 +279,7 @@ pub(crate) fn read(tile: TileId, statics: Vec<u32>, block: &[u8], setup: &Setup)
     let empty = Tile::with_statics(tile, statics, setup);
     let restored = Tile { bodies, owned, unseen, ghost_owners, contacts, sleep, ..empty };
     check(&restored, setup)?;
-    Ok(restored)
+    Ok((restored, header.hashes()))
 }
 
 /// Whether a tile that somebody else wrote down can be stepped.
