@@ -7,7 +7,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let solid = |width, height| Kind { shape: Shape::rectangle(width, height), material: Material::default() };
     let blueprint = Blueprint {
         params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
-        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
         kinds: vec![solid(1.0, 1.0)],
         statics: vec![StaticBody::new(GlobalId(0), solid(20.0, 2.0), DVec2::new(5.0, -1.0))],
     };

@@ -1,7 +1,7 @@
 //! Two tiles, a halo of one's own, and a disc that flies from one tile into the other.
 
 use atoll_core::{
-    Blueprint, Body, GlobalId, Halo, Inbox, Kind, KindId, Material, Outbox, Params, Shape, TileGrid, World, step,
+    Blueprint, Body, GlobalId, Halo, Inbox, Kind, KindId, Material, Outbox, Params, Partition, Shape, World, step,
 };
 use glam::{DVec2, Vec2};
 use std::convert::Infallible;
@@ -21,9 +21,9 @@ impl Halo for Counting {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let grid = TileGrid::new(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1)?;
+    let partition = Partition::uniform(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1)?;
     let disc = Kind { shape: Shape::circle(0.2), material: Material::default() };
-    let blueprint = Blueprint { params: Params::default(), grid, kinds: vec![disc], statics: vec![] };
+    let blueprint = Blueprint { params: Params::default(), partition, kinds: vec![disc], statics: vec![] };
     let mut world = World::whole(&blueprint)?;
     let disc = Body::at_rest(GlobalId(0), KindId(0), DVec2::new(9.0, 5.0));
     world.add(Body { velocity: Vec2::new(3.0, 0.0), ..disc })?;

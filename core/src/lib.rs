@@ -1,6 +1,6 @@
 //! The physics of Atoll: 2-D rigid bodies on tiles, stepped to the same bits however the tiles are spread.
 //!
-//! The domain is cut into tiles ([`TileGrid`]). A [`World`] holds the tiles of one rank; [`step`] makes one step of them
+//! The domain is cut into tiles ([`Partition`]). A [`World`] holds the tiles of one rank; [`step`] makes one step of them
 //! and reaches the other tiles through a [`Halo`]. One step of a tile is a pure function of its state and of the
 //! messages it received, so the result depends on the tile grid, and not on ranks, threads or transports.
 //!
@@ -17,7 +17,7 @@
 //! let solid = |width, height| Kind { shape: Shape::rectangle(width, height), material: Material::default() };
 //! let blueprint = Blueprint {
 //!     params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
-//!     grid: TileGrid::new(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
+//!     partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
 //!     kinds: vec![solid(1.0, 1.0)],
 //!     statics: vec![StaticBody::new(GlobalId(0), solid(20.0, 2.0), DVec2::new(5.0, -1.0))],
 //! };
@@ -93,5 +93,5 @@ pub use state::view::{ContactView, TileView};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::{Blueprint, halo_width};
-pub use tiling::partition::{Region, TileGrid};
+pub use tiling::partition::{Adaptive, Census, Change, Partition, Region};
 pub use world::{Clock, World};

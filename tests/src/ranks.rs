@@ -76,7 +76,7 @@ pub fn run<R: Send>(scene: &Scene, spread: Spread<'_>, work: impl Fn(World, &mut
     }
     let (blueprint, work) = (&blueprint, &work);
     let one = move |mut halo: RankHalo<'_>| {
-        let all = 0..blueprint.grid.tiles() as u32;
+        let all = 0..blueprint.partition.tiles() as u32;
         let own: Vec<_> = all.map(TileId).filter(|&tile| rank_of(tile) == halo.own).collect();
         let mut world = World::new(blueprint, &own).expect("a world that can be built");
         for &body in &scene.bodies {

@@ -4,8 +4,8 @@
 //! alone in its process; [`crate::ranks::run`] spreads the same tiles over several ranks.
 
 use atoll_core::{
-    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, Kind, KindId, Loopback, Material, Params, Rot, Shape,
-    StaticBody, StepReport, TileGrid, TileId, World, finish, step,
+    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, Kind, KindId, Loopback, Material, Params, Partition, Rot,
+    Shape, StaticBody, StepReport, TileId, World, finish, step,
 };
 use glam::{DVec2, Vec2};
 
@@ -120,10 +120,10 @@ impl Scene {
 
     /// All but the bodies, on any number of tiles.
     pub fn blueprint(&self, (columns, rows): (u32, u32), exchange: Exchange) -> Blueprint {
-        let grid = TileGrid::new(self.middle - self.half, self.middle + self.half, columns, rows);
+        let partition = Partition::uniform(self.middle - self.half, self.middle + self.half, columns, rows);
         Blueprint {
             params: Params { exchange, ..self.params.clone() },
-            grid: grid.expect("a domain with a size"),
+            partition: partition.expect("a domain with a size"),
             kinds: self.kinds.clone(),
             statics: self.statics.clone(),
         }
@@ -137,7 +137,7 @@ impl Scene {
     /// Cuts the world into any number of tiles.
     pub fn start_on(&self, tiles: (u32, u32), exchange: Exchange) -> Sim {
         let blueprint = self.blueprint(tiles, exchange);
-        let all: Vec<_> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
+        let all: Vec<_> = (0..blueprint.partition.tiles() as u32).map(TileId).collect();
         let mut world = World::new(&blueprint, &all).expect("a world that can be built");
         for &body in &self.bodies {
             assert!(world.add(body).expect("a body that can be added"), "body {} has no owner", body.id);

@@ -63,6 +63,7 @@ const CHOICES: &[(&str, Overrides)] = &[
             ("substeps", "3"),
         ],
     ),
+    ("skewed", &[("bodies", "3000"), ("steps", "120"), ("tiles", "2x1"), ("max_bodies", "150"), ("retile_every", "5")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "1x1")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "8x8")]),
@@ -70,6 +71,7 @@ const CHOICES: &[(&str, Overrides)] = &[
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("exchange", "step")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("exchange", "step"), ("ghosts", "frozen")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("solver", "pgs")]),
+    ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "2x1"), ("max_bodies", "60"), ("retile_every", "3")]),
     ("pyramids", &[("bodies", "550"), ("steps", "120"), ("tiles", "1x1"), ("sleep", "true")]),
 ];
 

@@ -1,8 +1,8 @@
 //! The library as somebody uses it who has all tiles in one process: `atoll_core` without a halo of one's own.
 
 use atoll_core::{
-    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, SetupError, Solver,
-    StepError, TileGrid, TileId, World, finish, measure, step,
+    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, Partition, SetupError,
+    Solver, StepError, TileId, World, finish, measure, step,
 };
 use atoll_tests::program;
 use atoll_tests::scenes;
@@ -43,7 +43,7 @@ fn two_tiles() -> Blueprint {
 #[test]
 fn a_halo_that_delivers_on_the_spot_refuses_half_a_world() {
     let mut half = World::new(&two_tiles(), &[TileId(0)]).unwrap();
-    let middle = two_tiles().grid.region(TileId(0)).max.x;
+    let middle = two_tiles().partition.region(TileId(0)).max.x;
     assert!(half.add(Body::at_rest(GlobalId(9), KindId(0), DVec2::new(middle - 0.1, 2.0))).unwrap());
     let refused = step(&mut half, &mut Loopback).unwrap_err();
     assert_eq!(refused, StepError::Halo(NotHere { tile: TileId(1) }));
@@ -53,7 +53,7 @@ fn a_halo_that_delivers_on_the_spot_refuses_half_a_world() {
 #[test]
 fn a_name_is_given_once() {
     let mut world = World::whole(&two_tiles()).unwrap();
-    let (low, high) = (two_tiles().grid.min(), two_tiles().grid.max());
+    let (low, high) = (two_tiles().partition.min(), two_tiles().partition.max());
     let at = |id, part| Body::at_rest(GlobalId(id), KindId(0), low + (high - low) * part);
     for id in [10, 11, u64::MAX] {
         assert!(world.add(at(id, 0.3)).unwrap());
@@ -79,7 +79,7 @@ fn memory_is_foreseen() {
             program::run_to_summary(command.args(["--bodies", &bodies.to_string()]), &json)["peak_rss_bytes"].as_u64();
         let side = 1210.0 * (bodies as f64 / 700_000.0).sqrt();
         let mut blueprint = scenes::room(4, 1).blueprint((1, 1), Exchange::Step);
-        blueprint.grid = TileGrid::new(DVec2::splat(-10.0), DVec2::splat(side - 10.0), tiles, tiles).unwrap();
+        blueprint.partition = Partition::uniform(DVec2::splat(-10.0), DVec2::splat(side - 10.0), tiles, tiles).unwrap();
         let (foreseen, peak) = (blueprint.memory(bodies) as f64, peak.unwrap() as f64);
         assert!(
             foreseen < 2.0 * peak && peak < 1.3 * foreseen,

@@ -16,7 +16,18 @@ use tempfile::tempdir;
 const CONFIG: &str = "configs/quickstart.toml";
 
 /// What every run here has in common.
-const OPTIONS: [&str; 6] = ["--quiet", "--record-every", "20", "--checkpoint-every", "50", "--tiles=5x5"];
+const OPTIONS: [&str; 10] = [
+    "--quiet",
+    "--record-every",
+    "20",
+    "--checkpoint-every",
+    "50",
+    "--tiles=5x5",
+    "--set",
+    "max_bodies=700",
+    "--set",
+    "retile_every=6",
+];
 
 /// How often each kind of death is tried, and over how many steps: `ATOLL_KILLS=20x3000` for one.
 fn kills() -> (u64, String) {

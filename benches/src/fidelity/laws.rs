@@ -5,7 +5,7 @@
 //! latter no more than the coefficient of friction times the former.
 
 use super::{Course, PHASES, Start};
-use atoll_core::{Blueprint, Body, GlobalId, Kind, KindId, Material, Params, Rot, Shape, StaticBody, TileGrid};
+use atoll_core::{Blueprint, Body, GlobalId, Kind, KindId, Material, Params, Partition, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 
 /// A case.
@@ -55,8 +55,8 @@ pub(super) fn world(
     });
     let bodies = made.collect();
     let params = Params { dt: (1.0 / hertz) as f32, gravity: Vec2::new(0.0, gravity), ..Params::default() };
-    let grid = TileGrid::new(DVec2::splat(-40.0), DVec2::splat(40.0), 1, 1).expect("a domain with a size");
-    Start { blueprint: Blueprint { params, grid, kinds, statics }, bodies }
+    let partition = Partition::uniform(DVec2::splat(-40.0), DVec2::splat(40.0), 1, 1).expect("a domain with a size");
+    Start { blueprint: Blueprint { params, partition, kinds, statics }, bodies }
 }
 
 fn floor(material: Material) -> StaticBody {

@@ -35,7 +35,7 @@ impl Given for Start {
     }
 
     fn home(&self, _: u64) -> Corners {
-        [self.blueprint.grid.min().to_array(), self.blueprint.grid.max().to_array()]
+        [self.blueprint.partition.min().to_array(), self.blueprint.partition.max().to_array()]
     }
 
     fn threads(&self) -> usize {

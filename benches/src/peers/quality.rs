@@ -34,7 +34,7 @@ pub fn measure(case: &Case, bodies: &[Body]) -> Result<Quality, Failure> {
         let message = format!("{} of {} bodies are left at the end", bodies.len(), scene.bodies());
         return Err(Failure::broken(message));
     }
-    let tiles: Vec<TileId> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
+    let tiles: Vec<TileId> = (0..blueprint.partition.tiles() as u32).map(TileId).collect();
     let mut world = World::new(blueprint, &tiles).map_err(Failure::broken)?;
     for &body in bodies {
         world.add(body).map_err(|error| Failure::broken(format!("at the end: {error}")))?;

@@ -9,6 +9,7 @@ use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad, Row};
 use crate::parallel::team::Team;
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::partition::Region;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
@@ -53,18 +54,18 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies, of which so many are owned and so many more ghosts. Local coordinates
-    /// count from its `corner`.
+    /// count from the low corner of its `rectangle`.
     pub(crate) fn load(
         &mut self,
         bodies: &Bodies,
         [owned, ghosts]: [usize; 2],
-        corner: DVec2,
+        rectangle: &Region,
         setup: &Setup,
         team: Team,
     ) {
         let (total, dynamic) = (bodies.len(), owned + ghosts);
         let mean = mean(&bodies.velocity[..dynamic]);
-        let load = Load { bodies, dynamic, corner, mean, setup };
+        let load = Load { bodies, dynamic, corner: rectangle.min, mean, setup };
         self.outline.resize(total, [0.0; 4]);
         let mut rest = [&mut self.x, &mut self.y, &mut self.extent, &mut self.radius].map(|column| {
             column.resize(total, 0.0);
@@ -84,7 +85,7 @@ impl Proxies {
         self.weight.resize(owned, 2);
         self.weight.resize(dynamic, 0);
         self.weight.resize(total, 1);
-        self.size = setup.grid.tile_size().as_vec2().to_array();
+        self.size = rectangle.size().as_vec2().to_array();
         self.lanes = setup.lanes;
     }
 

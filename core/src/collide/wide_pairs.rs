@@ -249,7 +249,7 @@ mod tests {
     use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
     use crate::testing::{any_kind, any_rotation, cases};
     use crate::tiling::blueprint::Blueprint;
-    use crate::tiling::partition::TileGrid;
+    use crate::tiling::partition::Partition;
     use glam::DVec2;
     use proptest::prelude::*;
 
@@ -288,9 +288,9 @@ mod tests {
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
             spins in [-40.0_f32..40.0, -40.0_f32..40.0], rotations in [any_rotation(), any_rotation()], fixed: bool,
         ) {
-            let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
+            let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
             let (dynamic, statics) = (kinds.to_vec(), Vec::new());
-            let mut setup = Setup::new(&Blueprint { params: Params::default(), grid, kinds: dynamic, statics }).unwrap();
+            let mut setup = Setup::new(&Blueprint { params: Params::default(), partition, kinds: dynamic, statics }).unwrap();
             if fixed {
                 setup.kinds[1].inv_mass = 0.0;
             }

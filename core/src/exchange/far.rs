@@ -46,7 +46,8 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
         }
         for row in 0..tile.owned + tile.ghosts() {
             let body = Outline::of(tile, row, setup);
-            let is_there = || setup.grid.locate(tile.bodies.position[row]) == owner || body.is_ghost_of(owner, setup);
+            let is_there =
+                || setup.partition.locate(tile.bodies.position[row]) == owner || body.is_ghost_of(owner, setup);
             if row != ghost && way.meets(&body) && !is_there() {
                 sends.push((owner, row));
             }
@@ -65,7 +66,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup) {
     let mut ghosts: Vec<(TileId, Body, Unseen)> = Vec::new();
     for message in mail.messages() {
         ghosts.extend(
-            message.ghosts.iter().map(|ghost| (setup.grid.locate(ghost.body.position), ghost.body, ghost.unseen)),
+            message.ghosts.iter().map(|ghost| (setup.partition.locate(ghost.body.position), ghost.body, ghost.unseen)),
         );
     }
     let owned = tile.owned;

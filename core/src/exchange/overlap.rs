@@ -56,17 +56,17 @@ impl Outline {
     /// Whether it is so near a tile that its contacts with others that are, and with statics, are solved there.
     #[inline]
     pub(crate) fn is_near(&self, tile: TileId, setup: &Setup) -> bool {
-        setup.overlap.is_some_and(|depth| setup.grid.reaches(tile, self.place, self.half, depth))
+        setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, self.place, self.half, depth))
     }
 
     /// Whether a tile that does not own it has it as a ghost.
     pub(crate) fn is_ghost_of(&self, tile: TileId, setup: &Setup) -> bool {
-        setup.grid.reaches(tile, self.place, self.half, setup.halo_width)
+        setup.partition.reaches(tile, self.place, self.half, setup.halo_width)
     }
 
     /// Whether all that its box meets is a ghost of that tile, or lives there.
     pub(crate) fn is_within_halo_of(&self, tile: TileId, setup: &Setup) -> bool {
-        let (region, (low, high)) = (setup.grid.region(tile), self.corners());
+        let (region, (low, high)) = (setup.partition.region(tile), self.corners());
         let halo = DVec2::splat(setup.halo_width);
         (low.cmpge(region.min - halo) & high.cmple(region.max + halo)).all()
     }
@@ -84,7 +84,7 @@ impl Outline {
 
     /// The tiles that it is so near to.
     pub(crate) fn near(&self, setup: &Setup) -> impl Iterator<Item = TileId> {
-        let near = |depth| setup.grid.reached(self.place, self.half, depth);
+        let near = |depth| setup.partition.reached(self.place, self.half, depth);
         setup.overlap.into_iter().flat_map(near)
     }
 }

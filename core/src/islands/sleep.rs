@@ -111,14 +111,14 @@ mod tests {
     use super::*;
     use crate::model::params::Params;
     use crate::tiling::blueprint::Blueprint;
-    use crate::tiling::partition::TileGrid;
+    use crate::tiling::partition::Partition;
     use glam::DVec2;
 
     #[test]
     fn an_island_rests_as_long_as_its_least_rested_body() {
-        let grid = TileGrid::new(DVec2::ZERO, DVec2::ONE, 1, 1).unwrap();
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::ONE, 1, 1).unwrap();
         let params = Params { sleep: true, ..Params::default() };
-        let setup = Setup::new(&Blueprint { params, grid, kinds: Vec::new(), statics: Vec::new() }).unwrap();
+        let setup = Setup::new(&Blueprint { params, partition, kinds: Vec::new(), statics: Vec::new() }).unwrap();
         let mut sleep = Sleep { still: vec![9.0, 0.1, 9.0, 9.0], asleep: vec![true; 4], ..Sleep::default() };
         let mut decide = |nodes: [Option<u32>; 4], roots: &[u32]| {
             let nodes = nodes.map(|node| node.map_or(GraphNode::NO_CONTACT, GraphNode::new));

@@ -11,7 +11,7 @@ use crate::model::params::{Exchange, IslandSearch, Params};
 use crate::parallel::team::Team;
 use crate::testing::{cases, circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 use crate::world::World;
 use crate::{StepReport, step};
@@ -179,7 +179,7 @@ fn a_link_to_no_node() {
 
 /// Columns of bodies that fall onto a floor, on 2 x 2 tiles.
 fn pile() -> World {
-    let grid = TileGrid::new(DVec2::ZERO, DVec2::new(6.0, 3.0), 2, 2).unwrap();
+    let partition = Partition::uniform(DVec2::ZERO, DVec2::new(6.0, 3.0), 2, 2).unwrap();
     let floor = StaticBody {
         id: GlobalId(0),
         position: DVec2::new(3.0, -0.5),
@@ -189,7 +189,7 @@ fn pile() -> World {
     let params = Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() };
     let kinds = vec![circle(0.2), rectangle(0.2, 0.2)];
     let mut world =
-        World::new(&Blueprint { params, grid, kinds, statics: vec![floor] }, &[0, 1, 2, 3].map(TileId)).unwrap();
+        World::new(&Blueprint { params, partition, kinds, statics: vec![floor] }, &[0, 1, 2, 3].map(TileId)).unwrap();
     for i in 0..72_u32 {
         let (column, row) = (i % 12, i / 12);
         // Columns of unequal spacing: some lean on each other, some do not.

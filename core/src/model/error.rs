@@ -58,6 +58,12 @@ pub enum SetupError {
         /// What is asked of it.
         must: &'static str,
     },
+    /// No cut of squares into tiles.
+    #[error("tile {tile} of a forest: its level is not that of a part of a square, or the part would have no width")]
+    BadForest {
+        /// The first tile that is not in order.
+        tile: TileId,
+    },
     /// Sleeping is known within one tile only.
     #[error(
         "sleep = true on {tiles} tiles: an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
@@ -65,6 +71,19 @@ pub enum SetupError {
     SleepAcrossTiles {
         /// How many tiles there are.
         tiles: usize,
+    },
+    /// A tile that holds all bodies may be cut at any time.
+    #[error(
+        "sleep = true with tiles = \"adaptive\": an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
+    )]
+    SleepInForest,
+    /// Tiles that become one are not all of one world, or a partition does not follow from another.
+    #[error(
+        "tile {tile}: the new partition does not follow from the one there is, or joins it with tiles that are elsewhere"
+    )]
+    TornApart {
+        /// Which of the old partition, or the first.
+        tile: TileId,
     },
     /// Frozen ghosts take nothing over within a step.
     #[error("ghosts = \"frozen\" goes with exchange = \"step\" only: read-only copies are heard of once a step")]

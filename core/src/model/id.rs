@@ -8,7 +8,7 @@ use std::fmt;
 #[repr(transparent)]
 pub struct GlobalId(pub u64);
 
-/// A tile of the domain: `row * columns + column`.
+/// A tile of the domain, by its place among all of a [`Partition`](crate::Partition).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct TileId(pub u32);

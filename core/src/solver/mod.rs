@@ -251,15 +251,15 @@ impl Solver {
 mod tests {
     use crate::model::id::KindId;
     use crate::testing::rectangle;
-    use crate::{Blueprint, Body, Exchange, GlobalId, Loopback, Params, StaticBody, TileGrid, TileId, World, step};
+    use crate::{Blueprint, Body, Exchange, GlobalId, Loopback, Params, Partition, StaticBody, TileId, World, step};
     use glam::{DVec2, Vec2};
 
     /// Two towers, one of them on the border of two tiles, and a box that falls onto the other.
     fn towers() -> World {
         let params = Params { exchange: Exchange::Substep, gravity: Vec2::new(0.0, -10.0), ..Params::default() };
-        let grid = TileGrid::new(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1).unwrap();
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1).unwrap();
         let floor = StaticBody::new(GlobalId(0), rectangle(20.0, 1.0), DVec2::new(10.0, 0.0));
-        let blueprint = Blueprint { params, grid, kinds: vec![rectangle(1.0, 1.0)], statics: vec![floor] };
+        let blueprint = Blueprint { params, partition, kinds: vec![rectangle(1.0, 1.0)], statics: vec![floor] };
         let mut world = World::new(&blueprint, &[TileId(0), TileId(1)]).unwrap();
         for i in 0..5 {
             for (tower, x) in [(0, 4.0), (1, 10.0)] {

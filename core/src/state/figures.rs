@@ -226,7 +226,7 @@ impl WideSums {
         spins: &[f32; WIDTH],
         setup: &Setup,
     ) {
-        let low = setup.grid.min();
+        let low = setup.partition.min();
         let (mass, inertia) = (each(|k| f64::from(masses[k][0])), each(|k| f64::from(masses[k][1])));
         let (x, y) = (each(|k| positions[k].x), each(|k| positions[k].y));
         let (dx, dy) = (sub(x, [low.x; WIDTH]), sub(y, [low.y; WIDTH]));

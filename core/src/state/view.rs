@@ -91,7 +91,7 @@ mod tests {
     fn a_body_its_ghost_and_its_contact_are_seen_where_they_are() {
         let blueprint = Blueprint {
             params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
-            grid: TileGrid::new(DVec2::ZERO, DVec2::splat(10.0), 2, 1).unwrap(),
+            partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 2, 1).unwrap(),
             kinds: vec![rectangle(1.0, 1.0)],
             statics: vec![StaticBody::new(GlobalId(0), rectangle(20.0, 2.0), DVec2::new(5.0, -1.0))],
         };

@@ -168,7 +168,7 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
         let (tile, counts) = (&b.tile, [b.tile.owned, b.tile.ghosts()]);
-        b.work.proxies.load(&tile.bodies, counts, tile.corner, b.setup, b.team);
+        b.work.proxies.load(&tile.bodies, counts, &tile.rectangle, b.setup, b.team);
         b.work.proxies.pair_ghosts(tile, b.setup);
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(&b.work.proxies, &b.tile.bodies.id);

@@ -9,7 +9,7 @@ use crate::model::params::{Exchange, Params};
 use crate::model::shape::{Kind, KindRow};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use glam::Vec2;
 
 /// Everything about a world but its dynamic bodies. Every rank must be given the same.
@@ -18,7 +18,7 @@ pub struct Blueprint {
     /// The numbers of a step.
     pub params: Params,
     /// How the domain is cut.
-    pub grid: TileGrid,
+    pub partition: Partition,
     /// Shapes and materials of dynamic bodies; a body names its row. The largest sets the width of the halo.
     pub kinds: Vec<Kind>,
     /// Bodies that never move.
@@ -48,10 +48,10 @@ pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
 }
 
 /// The blueprint, made ready.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) params: Params,
-    pub(crate) grid: TileGrid,
+    pub(crate) partition: Partition,
     /// The dynamic kinds, then one for each static.
     pub(crate) kinds: Vec<KindRow>,
     pub(crate) dynamic_kinds: usize,
@@ -80,8 +80,11 @@ impl Setup {
     pub(crate) fn new(blueprint: &Blueprint) -> Result<Self, SetupError> {
         let params = blueprint.params.clone();
         params.check()?;
-        if params.sleep && blueprint.grid.tiles() > 1 {
-            return Err(SetupError::SleepAcrossTiles { tiles: blueprint.grid.tiles() });
+        if params.sleep && blueprint.partition.tiles() > 1 {
+            return Err(SetupError::SleepAcrossTiles { tiles: blueprint.partition.tiles() });
+        }
+        if params.sleep && blueprint.partition.levels().is_some() {
+            return Err(SetupError::SleepInForest);
         }
         let mut kinds = Vec::with_capacity(blueprint.kinds.len() + blueprint.statics.len());
         for (row, kind) in (0..).zip(&blueprint.kinds) {
@@ -114,7 +117,7 @@ impl Setup {
         let halo_width = halo_width(&blueprint.kinds, &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         Ok(Self {
-            grid: blueprint.grid.clone(),
+            partition: blueprint.partition.clone(),
             halo_width,
             inset: 2.0 * halo_width,
             overlap: overlap::depth(&params).map(|part| part * halo_width),
@@ -131,6 +134,11 @@ impl Setup {
             static_names,
             params,
         })
+    }
+
+    /// The same for another partition of the same domain.
+    pub(crate) fn with_partition(&self, partition: &Partition) -> Self {
+        Self { partition: partition.clone(), ..self.clone() }
     }
 
     /// Whether a static has this name.
@@ -177,7 +185,7 @@ impl Setup {
         let reach = if self.overlap.is_some() { 3.0 * self.halo_width } else { self.halo_width };
         let reaches = |body: &Body| {
             let half = self.kind(body.kind).half_extents(body.rotation);
-            self.grid.reaches(tile, body.position, half, reach)
+            self.partition.reaches(tile, body.position, half, reach)
         };
         (0..).zip(&self.statics).filter(|(_, body)| reaches(body)).map(|(row, _)| row).collect()
     }

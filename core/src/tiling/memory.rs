@@ -2,6 +2,7 @@
 
 use super::blueprint::{Blueprint, halo_width, largest_radius};
 use super::tile::Tile;
+use crate::model::id::TileId;
 
 /// Bytes of a body with its contacts, its share of what a step derives, and some to spare.
 const PER_BODY: u64 = 200;
@@ -15,12 +16,18 @@ impl Blueprint {
         let reach = halo_width(&self.kinds, &self.params)
             + f64::from(largest_radius(&self.kinds))
             + 0.5 * f64::from(self.params.margin_floor + self.params.margin_cap);
-        let size = self.grid.tile_size();
-        // How many tiles a body's grown AABB and the halo around it meet, along an axis.
-        let met = |tiles: usize, side: f64| (1.0 + 2.0 * reach / side).min(tiles as f64);
-        let copies = met(self.grid.columns(), size.x) * met(self.grid.rows(), size.y) - 1.0;
+        let partition = &self.partition;
+        // How many tiles of that size a body's grown AABB and the halo around it meet, along an axis.
+        let met = |tiles: u64, side: f64| (1.0 + 2.0 * reach / side).min(tiles as f64);
+        let copies = |tile: TileId| {
+            let (size, (_, [columns, rows])) = (partition.rectangle(tile).size(), partition.cell(tile));
+            met(columns, size.x) * met(rows, size.y) - 1.0
+        };
+        // Equal tiles are all like the first.
+        let looked_at = partition.levels().map_or(1, |levels| levels.len() as u32);
+        let copies = (0..looked_at).map(|tile| copies(TileId(tile))).sum::<f64>() / f64::from(looked_at);
         let ghosts = (bodies as f64 * copies * PER_GHOST) as u64;
-        let tiles = self.grid.tiles() as u64 * (size_of::<Tile>() as u64 + 64);
+        let tiles = partition.tiles() as u64 * (size_of::<Tile>() as u64 + 64);
         bodies.saturating_mul(PER_BODY).saturating_add(ghosts).saturating_add(tiles)
     }
 }

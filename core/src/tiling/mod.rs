@@ -3,4 +3,5 @@
 pub(crate) mod blueprint;
 mod memory;
 pub(crate) mod partition;
+pub(crate) mod regroup;
 pub(crate) mod tile;

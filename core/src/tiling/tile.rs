@@ -13,7 +13,6 @@ use crate::state::hash::Hashes;
 use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
-use glam::DVec2;
 use std::time::Duration;
 
 /// The unit of physics: one step of a tile is a function of its state and of the messages it received.
@@ -23,8 +22,8 @@ pub(crate) struct Tile {
     pub(crate) region: Region,
     /// Bodies in here are nobody else's business.
     pub(crate) interior: Region,
-    /// Local coordinates, where single precision will do, count from here.
-    pub(crate) corner: DVec2,
+    /// The part of the domain in the region. Local coordinates, where single precision will do, count from its low corner.
+    pub(crate) rectangle: Region,
     /// Owned bodies, then ghosts, then statics.
     pub(crate) bodies: Bodies,
     pub(crate) owned: usize,
@@ -94,13 +93,13 @@ impl Tile {
 
     /// An empty tile whose statics are known already.
     pub(crate) fn with_statics(id: TileId, statics: Vec<u32>, setup: &Setup) -> Self {
-        let region = setup.grid.region(id);
-        let quadtree = || Box::new(Quadtree::new(setup.grid.tile_size().as_vec2().to_array()));
+        let (region, rectangle) = (setup.partition.region(id), setup.partition.rectangle(id));
+        let quadtree = || Box::new(Quadtree::new(rectangle.size().as_vec2().to_array()));
         Self {
             id,
             region,
             interior: region.shrunk(setup.inset),
-            corner: setup.grid.corner(id),
+            rectangle,
             bodies: Bodies::default(),
             owned: 0,
             newcomers: Vec::new(),

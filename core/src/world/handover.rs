@@ -36,7 +36,7 @@ impl World {
     pub fn take_over(&mut self, blocks: &[(TileId, &[u8])]) -> Result<(), RestoreError> {
         let mut taken = Vec::with_capacity(blocks.len());
         for &(tile, block) in blocks {
-            let known = (tile.0 as usize) < self.setup.grid.tiles() && self.place_of(tile).is_none();
+            let known = (tile.0 as usize) < self.setup.partition.tiles() && self.place_of(tile).is_none();
             if !known || taken.iter().any(|taken: &Tile| taken.id == tile) {
                 return Err(RestoreError::NotToBeTaken { tile });
             }
@@ -69,15 +69,15 @@ mod tests {
     use crate::step::step;
     use crate::testing::{circle, rectangle};
     use crate::tiling::blueprint::Blueprint;
-    use crate::tiling::partition::TileGrid;
+    use crate::tiling::partition::Partition;
     use glam::{DVec2, Vec2};
 
     /// A heap of discs and boxes over the borders of four tiles.
     fn world() -> World {
         let params = Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() };
-        let grid = TileGrid::new(DVec2::new(-4.0, 0.0), DVec2::new(4.0, 4.0), 4, 1).unwrap();
+        let partition = Partition::uniform(DVec2::new(-4.0, 0.0), DVec2::new(4.0, 4.0), 4, 1).unwrap();
         let statics = vec![StaticBody::new(GlobalId(0), rectangle(20.0, 2.0), DVec2::new(0.0, -1.0))];
-        let blueprint = Blueprint { params, grid, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics };
+        let blueprint = Blueprint { params, partition, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics };
         let mut world = World::whole(&blueprint).unwrap();
         for k in 0..60_u32 {
             let place = DVec2::new(0.51 * f64::from(k % 12) - 3.0, 0.25 + 0.51 * f64::from(k / 12));

@@ -1,6 +1,7 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
 mod handover;
+mod retile;
 mod stages;
 
 use crate::exchange::mail::{Inbox, Outbox};
@@ -16,6 +17,7 @@ use crate::state::view::TileView;
 use crate::step::phase::Timings;
 use crate::step::stage::{Hand, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
+use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
@@ -71,7 +73,7 @@ impl World {
         let mut names = tiles.to_vec();
         names.sort_unstable();
         let doubled = names.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
-        let outside = names.iter().copied().find(|tile| tile.0 as usize >= setup.grid.tiles());
+        let outside = names.iter().copied().find(|tile| tile.0 as usize >= setup.partition.tiles());
         if let Some(tile) = doubled.or(outside) {
             return Err(SetupError::BadTile { tile });
         }
@@ -85,13 +87,13 @@ impl World {
     /// # Errors
     /// If a parameter, a kind or a static is out of range.
     pub fn whole(blueprint: &Blueprint) -> Result<Self, SetupError> {
-        let all: Vec<_> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
+        let all: Vec<_> = (0..blueprint.partition.tiles() as u32).map(TileId).collect();
         Self::new(blueprint, &all)
     }
 
     /// A world of some tiles, which are in ascending order.
     fn of(setup: Arc<Setup>, tiles: Vec<Tile>) -> Self {
-        let inbox = Inbox::new(tiles.iter().map(|tile| tile.id), setup.grid.tiles(), setup.dynamic_kinds);
+        let inbox = Inbox::new(tiles.iter().map(|tile| tile.id), setup.partition.tiles(), setup.dynamic_kinds);
         Self {
             setup,
             works: tiles.iter().map(|_| None).collect(),
@@ -135,7 +137,7 @@ impl World {
         if !(body.is_finite() && turned && self.setup.knows(&body)) {
             return Err(SetupError::BadBody { id: body.id });
         }
-        let owner = self.setup.grid.locate(body.position);
+        let owner = self.setup.partition.locate(body.position);
         let Some(place) = self.place_of(owner) else { return Ok(false) };
         if !self.names.insert(body.id) {
             return Err(SetupError::NameTaken { id: body.id });
@@ -162,6 +164,11 @@ impl World {
     /// The tiles, ascending.
     pub fn tiles(&self) -> impl Iterator<Item = TileId> + '_ {
         self.tiles.iter().map(|tile| tile.id)
+    }
+
+    /// How the domain is cut, at this step.
+    pub fn partition(&self) -> &Partition {
+        &self.setup.partition
     }
 
     /// Steps made so far.

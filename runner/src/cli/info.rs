@@ -8,6 +8,7 @@ use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::folder::{Ended, LogError, Rows, RunFolder};
+use crate::plan::tiles;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -47,7 +48,8 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, Ru
     let config = Config::load_begun(&folder.configuration())?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
-    let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {} x {} tiles\n", tiles[0], tiles[1]);
+    let tiling = tiles::in_words(tiles, config.run.adaptive.map(|adaptive| adaptive.max_bodies));
+    let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {tiling}\n");
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);

@@ -1,8 +1,8 @@
 //! Forms of values: how each is read from what was given and written again. [`super::keys`] says which key has which.
 
 use super::error::{ConfigError, Origin};
-use super::sections::{Config, MOST_THREADS, MOST_TILES, TransportKind};
-use super::settings::{Settings, one_of};
+use super::sections::{AdaptiveConfig, Config, MOST_THREADS, MOST_TILES, TransportKind};
+use super::settings::{Settings, TilesChoice, one_of};
 use super::words::{self, Words, word_for};
 use crate::scene::SceneKind;
 use glam::Vec2;
@@ -220,17 +220,37 @@ impl Form for Threads {
     }
 }
 
-/// Columns and rows of tiles, if they are chosen.
+/// Columns and rows of tiles, if they are chosen, or that they follow the bodies.
 pub(super) struct Tiles;
 
 impl Form for Tiles {
     fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
-        config.run.tiles = settings.tiles(key, MOST_TILES)?;
+        match settings.tiles(key, MOST_TILES)? {
+            Some(TilesChoice::Adaptive) => config.run.adaptive = Some(AdaptiveConfig::default()),
+            Some(TilesChoice::Counts(counts)) => config.run.tiles = Some(counts),
+            Some(TilesChoice::Auto) | None => {}
+        }
         Ok(())
     }
 
     fn write(&self, config: &mut Config) -> Option<Value> {
         config.run.tiles.map(|tiles| tiles.map(Value::from).to_vec().into())
+    }
+}
+
+/// How many bodies a tile has at most: says that tiles follow the bodies, whatever squares they are cut from.
+pub(super) struct MaxBodies;
+
+impl Form for MaxBodies {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        if let Some(max_bodies) = settings.integer(key, 1..=u64::from(u32::MAX))? {
+            config.run.adaptive.get_or_insert_default().max_bodies = max_bodies;
+        }
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        config.run.adaptive.map(|adaptive| whole(adaptive.max_bodies))
     }
 }
 

@@ -8,8 +8,8 @@
 
 use super::error::ConfigError;
 use super::forms::{
-    Flag, Float, Form, Hertz, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Threads, Tiles,
-    Whole, Word,
+    Flag, Float, Form, Hertz, MaxBodies, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Threads,
+    Tiles, Whole, Word,
 };
 use super::sections::Config;
 use super::settings::Settings;
@@ -73,6 +73,8 @@ pub(super) static KEYS: &[Key] = &[
     key("run.threads", How, &Threads),
     key("run.transport", How, &OptionalWord(|c| &mut c.run.transport, words::TRANSPORT)),
     key("run.tiles", What, &Tiles),
+    key("run.max_bodies", What, &MaxBodies),
+    key("run.retile_every", What, &Whole(retile_every, |_| 1..=MOST_STEPS)),
     key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),
     key("run.instructions", How, &Word(|c| &mut c.params.instructions, words::INSTRUCTIONS)),
     key("run.mpi_exchange", How, &Word(|c| &mut c.run.mpi_exchange, words::MPI_EXCHANGE)),
@@ -111,7 +113,11 @@ pub(super) static KEYS: &[Key] = &[
     key("output.log_every", How, &Whole(|c| Some(&mut c.output.log_every), |_| 1..=MOST_STEPS)),
 ];
 
-// What only some scenes have.
+// What only some tilings and scenes have.
+
+fn retile_every(config: &mut Config) -> Option<&mut u64> {
+    config.run.adaptive.as_mut().map(|adaptive| &mut adaptive.retile_every)
+}
 
 fn power(config: &mut Config) -> Option<&mut f64> {
     if let SceneKind::Rooms { power } = &mut config.scene.kind { Some(power) } else { None }

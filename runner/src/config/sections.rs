@@ -37,14 +37,26 @@ pub struct RunConfig {
     pub threads: Option<usize>,
     /// What carries bytes between ranks; `None` chooses by their number.
     pub transport: Option<TransportKind>,
-    /// Columns and rows of tiles; `None` chooses by scene and physics, never by ranks or threads.
+    /// Columns and rows of tiles, or of the squares that are cut into tiles where these are adaptive; `None` chooses by scene and
+    /// physics, never by ranks or threads.
     pub tiles: Option<[u32; 2]>,
+    /// Whether tiles follow the bodies, and how; `None` leaves all of them equal.
+    pub adaptive: Option<AdaptiveConfig>,
     /// A rank that stays silent for so long is given up.
     pub peer_timeout: Duration,
     /// How ranks exchange messages with transport mpi.
     pub mpi_exchange: MpiExchange,
     /// By what tiles move from rank to rank.
     pub balance: Balance,
+}
+
+/// How tiles follow the bodies.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AdaptiveConfig {
+    /// A tile with more bodies is cut in four; four that together have less than half of that are joined.
+    pub max_bodies: u64,
+    /// So many steps lie between two times at which that is looked at.
+    pub retile_every: u64,
 }
 
 /// `[output]`: of runs that were given a folder for it, or a file for their log.
@@ -138,10 +150,17 @@ impl Default for RunConfig {
             threads: None,
             transport: None,
             tiles: None,
+            adaptive: None,
             peer_timeout: Duration::from_secs(30),
             mpi_exchange: MpiExchange::default(),
             balance: Balance::default(),
         }
+    }
+}
+
+impl Default for AdaptiveConfig {
+    fn default() -> Self {
+        Self { max_bodies: 16000, retile_every: 32 }
     }
 }
 

@@ -7,6 +7,17 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use toml::{Table, Value};
 
+/// What may be said of tiles.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum TilesChoice {
+    /// As suits the scene.
+    Auto,
+    /// They follow the bodies.
+    Adaptive,
+    /// Columns and rows.
+    Counts([u32; 2]),
+}
+
 /// A value for a key from the command line. It wins over the file, and a later one over an earlier one.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {
@@ -179,23 +190,27 @@ impl Settings {
         Ok(self.get(key, format!("\"auto\", or a whole number within 1 to {most}"), threads)?.flatten())
     }
 
-    /// `"auto"`, `[columns, rows]` or `"COLUMNSxROWS"`; `None` stands for auto.
-    pub(super) fn tiles(&mut self, key: &'static str, most: u32) -> Result<Option<[u32; 2]>, ConfigError> {
+    /// `"auto"`, `"adaptive"`, `[columns, rows]` or `"COLUMNSxROWS"`.
+    pub(super) fn tiles(&mut self, key: &'static str, most: u32) -> Result<Option<TilesChoice>, ConfigError> {
         let count = |number: u64| u32::try_from(number).ok().filter(|number| (1..=most).contains(number));
         let tiles = |value: &Value| match value {
-            Value::String(text) if text == "auto" => Some(None),
+            Value::String(text) if text == "auto" => Some(TilesChoice::Auto),
+            Value::String(text) if text == "adaptive" => Some(TilesChoice::Adaptive),
             Value::String(text) => {
                 let (columns, rows) = text.split_once(['x', 'X'])?;
-                Some(Some([count(columns.parse().ok()?)?, count(rows.parse().ok()?)?]))
+                Some(TilesChoice::Counts([count(columns.parse().ok()?)?, count(rows.parse().ok()?)?]))
             }
             Value::Array(pair) => match pair.as_slice() {
-                [columns, rows] => Some(Some([count(value_as_u64(columns)?)?, count(value_as_u64(rows)?)?])),
+                [columns, rows] => {
+                    Some(TilesChoice::Counts([count(value_as_u64(columns)?)?, count(value_as_u64(rows)?)?]))
+                }
                 _ => None,
             },
             _ => None,
         };
-        let must = format!("\"auto\", or columns and rows as [17, 17] or \"17x17\", each within 1 to {most}");
-        Ok(self.get(key, must, tiles)?.flatten())
+        let must =
+            format!("\"auto\", \"adaptive\", or columns and rows as [17, 17] or \"17x17\", each within 1 to {most}");
+        self.get(key, must, tiles)
     }
 
     /// Yes or no.

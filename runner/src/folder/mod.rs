@@ -5,6 +5,7 @@
 //! DIR/summary.json    as --json writes it, once the run has ended
 //! DIR/log.csv         figures over time, a row after every so many steps (log_file.rs)
 //! DIR/timings.csv     as --timings writes it, once the run has ended
+//! DIR/tilings.jsonl   the tiles, where these follow the bodies (tilings.rs)
 //! DIR/lock            held by every process of the run
 //! DIR/rank-00000/     segments of the recording, a folder for each rank (recording/)
 //! DIR/snapshots/      (snapshot/)
@@ -18,6 +19,7 @@ mod log_file;
 pub(crate) mod recording;
 mod run_folder;
 pub(crate) mod snapshot;
+mod tilings;
 
 pub(crate) use claim::Claim;
 pub use ended::{Ended, EndedError};
@@ -25,3 +27,4 @@ pub use error::FolderError;
 pub use log_file::LogError;
 pub(crate) use log_file::{LogFile, Rows};
 pub use run_folder::RunFolder;
+pub(crate) use tilings::TilingsFile;

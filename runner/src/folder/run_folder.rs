@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 /// The name of what every process of a run holds.
 const LOCK: &str = "lock";
 
+/// The name of what tells of tiles that follow the bodies.
+pub(super) const TILINGS: &str = "tilings.jsonl";
+
 /// A folder that is, or is to be, that of a run.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RunFolder {
@@ -48,6 +51,11 @@ impl RunFolder {
     /// Where the time of each rank went.
     pub fn timings(&self) -> PathBuf {
         self.path.join("timings.csv")
+    }
+
+    /// The tiles, where these follow the bodies.
+    pub fn tilings(&self) -> PathBuf {
+        self.path.join(TILINGS)
     }
 
     /// The snapshots.
@@ -93,7 +101,7 @@ impl RunFolder {
     /// Whether a run keeps a file or a folder of that name in its folder: nobody else may write there.
     pub fn owns(&self, name: &OsStr) -> bool {
         let written = [self.configuration(), self.summary(), self.timings()];
-        let fixed = [self.log(), self.snapshots(), self.lock()];
+        let fixed = [self.log(), self.tilings(), self.snapshots(), self.lock()];
         written.iter().chain(&fixed).any(|path| path.file_name() == Some(name))
             || name.to_str().is_some_and(recording::is_rank_folder)
             || self.is_unfinished(name)
@@ -145,7 +153,7 @@ impl RunFolder {
         for entry in fs::read_dir(&self.path)? {
             let entry = entry?;
             let ended = [self.summary(), self.timings()].contains(&entry.path());
-            let begins_anew = step.is_none() && entry.path() == self.log();
+            let begins_anew = step.is_none() && [self.log(), self.tilings()].contains(&entry.path());
             if ended || begins_anew || self.is_unfinished(&entry.file_name()) {
                 fs::remove_file(entry.path())?;
             }

@@ -2,14 +2,15 @@
 //! a run under way, pictures and files for other programs are made of this.
 
 use crate::folder::recording::Row;
-use atoll_core::{Kind, StaticBody, TileGrid};
+use atoll_core::{Kind, Partition, StaticBody};
 use glam::DVec2;
+use std::sync::Arc;
 
 /// What stays as it is throughout a run.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Setting {
-    /// The tiles of the domain.
-    pub grid: TileGrid,
+    /// The tiles of the domain; where they change, those of the beginning.
+    pub partition: Partition,
     /// Shapes and materials, which bodies refer to by number.
     pub kinds: Vec<Kind>,
     /// What never moves.
@@ -25,10 +26,19 @@ pub(crate) struct Frame {
     pub step: u64,
     /// The dynamic bodies: those of one rank after those of another.
     pub bodies: Vec<Row>,
+    /// The tiles, if they may change in the run.
+    pub tiling: Option<Arc<Partition>>,
     /// Ranks, ascending, and where the bodies of each end.
     pub ranks: Vec<(u32, usize)>,
     /// What only a run under way knows.
     pub live: Option<Live>,
+}
+
+impl Frame {
+    /// The tiles of this step.
+    pub(crate) fn partition<'a>(&'a self, setting: &'a Setting) -> &'a Partition {
+        self.tiling.as_deref().unwrap_or(&setting.partition)
+    }
 }
 
 /// What is known while a run is under way, and not recorded.

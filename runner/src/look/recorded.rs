@@ -4,7 +4,7 @@ use super::frame::{Frame, Setting};
 use crate::config::Config;
 use crate::folder::recording::{Recording, RecordingError, Row, Stage};
 use crate::scene::Scene;
-use atoll_core::TileGrid;
+use atoll_core::Partition;
 use std::path::Path;
 
 /// A recording, to be read frame by frame.
@@ -26,7 +26,9 @@ impl Recorded {
         let bad = |reason| RecordingError::BadSegment { path: recording.files()[0].clone(), reason };
         let facts = recording.facts();
         let [low, high] = facts.domain;
-        let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).map_err(|error| bad(error.to_string()))?;
+        let equal = || Partition::uniform(low, high, facts.tiles[0], facts.tiles[1]);
+        let first = recording.tiling(0).map(|partition| (**partition).clone());
+        let partition = first.map_or_else(equal, Ok).map_err(|error| bad(error.to_string()))?;
         let hertz = facts.hertz().ok_or_else(|| bad("atoll.canonical has no physics.hertz".to_owned()))?;
         let (stage, scene) = match recording.stage() {
             Some(stage) => (stage.clone(), None),
@@ -36,7 +38,7 @@ impl Recorded {
             }
         };
         let Stage { kinds, statics } = stage;
-        Ok(Self { recording, setting: Setting { grid, kinds, statics, hertz }, scene })
+        Ok(Self { recording, setting: Setting { partition, kinds, statics, hertz }, scene })
     }
 
     /// The recording itself.
@@ -54,8 +56,8 @@ impl Recorded {
     /// # Errors
     /// If there is no such record, or its files are damaged.
     pub(crate) fn read(&self, step: u64, frame: &mut Frame) -> Result<(), RecordingError> {
-        let Frame { step: of, bodies, ranks, live } = frame;
-        (*of, *live) = (step, None);
+        let Frame { step: of, bodies, tiling, ranks, live } = frame;
+        (*of, *live, *tiling) = (step, None, self.recording.tiling(step).cloned());
         ranks.clear();
         self.recording.read_ranks(step, bodies, |rank, end| ranks.push((rank, end)))?;
         let Some(scene) = &self.scene else { return Ok(()) };
@@ -108,8 +110,8 @@ mod tests {
         record(folder.path(), &strange, 3, 0..1, bodies);
         let recorded = Recorded::open(folder.path()).unwrap();
         let (kinds, statics) = stage();
-        let grid = TileGrid::new(facts(5).domain[0], facts(5).domain[1], 4, 2).unwrap();
-        assert_eq!(recorded.setting(), &Setting { grid, kinds, statics, hertz: 50.0 });
+        let partition = Partition::uniform(facts(5).domain[0], facts(5).domain[1], 4, 2).unwrap();
+        assert_eq!(recorded.setting(), &Setting { partition, kinds, statics, hertz: 50.0 });
         let mut frame = Frame { ranks: vec![(9, 9)], ..Frame::default() };
         recorded.read(0, &mut frame).unwrap();
         assert_eq!((frame.step, frame.bodies.len(), frame.ranks), (0, 20, vec![(0, 7), (1, 14), (2, 20)]));

@@ -3,7 +3,7 @@
 use super::Plan;
 use crate::config::{OutputConfig, TransportKind};
 use crate::folder::Ended;
-use atoll_core::{Blueprint, Exchange, Kind, Shape};
+use atoll_core::{Blueprint, Exchange, Kind, Shape, TileId};
 use std::thread;
 
 /// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
@@ -15,7 +15,7 @@ impl Plan {
     /// What the user may want to know before it starts, a sentence each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.found.unusable.iter().map(|error| error.to_string()).collect();
-        let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.grid.tiles());
+        let (idle, tiles) = (self.assignment.idle_ranks(), self.blueprint.partition.tiles());
         if idle > 0 {
             let ranks = self.assignment.ranks();
             let tiles = if tiles == 1 { "is only one tile".to_owned() } else { format!("are only {tiles} tiles") };
@@ -31,7 +31,8 @@ impl Plan {
             ));
         }
         let halo = atoll_core::halo_width(&self.blueprint.kinds, &self.blueprint.params);
-        let side = self.blueprint.grid.tile_size().min_element();
+        // Tiles that are cut by need are never so small.
+        let side = self.blueprint.partition.rectangle(TileId(0)).size().min_element();
         if tiles > 1 && side < halo {
             notes.push(format!(
                 "tiles are only {side:.3} m wide and the halo around each is {halo:.3} m: steps will be slow; use fewer tiles"
@@ -62,7 +63,7 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
     let kinds = || blueprint.kinds.iter().chain(blueprint.statics.iter().map(|fixed| &fixed.kind));
     let mut notes = Vec::new();
     let restitution = kinds().map(|kind| kind.material.restitution).fold(0.0, f32::max);
-    if restitution > BOUNCY && blueprint.grid.tiles() > 1 && params.exchange == Exchange::Step {
+    if restitution > BOUNCY && blueprint.partition.tiles() > 1 && params.exchange == Exchange::Step {
         notes.push(format!(
             "restitution is {restitution}, and with exchange = \"step\" bounces over borders of tiles may gain energy: set \
              exchange=substep, or use one tile"

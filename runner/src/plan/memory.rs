@@ -24,7 +24,7 @@ pub(super) fn check(
     threads: usize,
     output: Option<&OutputConfig>,
 ) -> Result<(), RunError> {
-    let (ranks, tiles) = (config.run.ranks as u64, blueprint.grid.tiles() as u64);
+    let (ranks, tiles) = (config.run.ranks as u64, blueprint.partition.tiles() as u64);
     // What is written is copied first: records twice.
     let copies = if output.is_some_and(|output| output.record_every.is_some()) { 100 } else { 0 };
     let saved = if output.is_some() { 200 } else { 0 };

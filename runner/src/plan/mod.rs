@@ -16,7 +16,7 @@ use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
 use crate::scene::Scene;
-use atoll_core::{Blueprint, Body, TileGrid};
+use atoll_core::{Blueprint, Body};
 use std::path::PathBuf;
 
 /// A configuration, checked and resolved.
@@ -28,7 +28,7 @@ pub struct Plan {
     pub scene: Scene,
     /// Everything about the world but its bodies.
     pub blueprint: Blueprint,
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles, or of the squares that adaptive ones are cut from.
     pub tiles: [u32; 2],
     /// Which rank holds which tiles.
     pub assignment: Assignment,
@@ -163,24 +163,27 @@ impl Plan {
         folder: Option<(RunFolder, bool)>,
     ) -> Result<Self, RunError> {
         let transport = config.transport();
-        let (low, high) = scene.domain();
-        let grid = TileGrid::new(low, high, tiles[0], tiles[1])?;
+        let first = tiles::first_partition(config, &scene, tiles)?;
+        let partition = match found.snapshots.first() {
+            Some(snapshot) => snapshot.partition(&first)?,
+            None => first,
+        };
         let params = config.params.clone();
-        let blueprint = Blueprint { params, grid, kinds: scene.kinds(), statics: scene.statics().to_vec() };
+        let blueprint = Blueprint { params, partition, kinds: scene.kinds(), statics: scene.statics().to_vec() };
         blueprint.check()?;
         let threads = threads::of_each_rank(config);
         memory::check(&blueprint, scene.bodies(), config, threads, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;
         let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
-            let mut weights = vec![0; blueprint.grid.tiles()];
+            let mut weights = vec![0; blueprint.partition.tiles()];
             if ranks > 1 {
-                let tile = |body: &Body| blueprint.grid.locate(body.position).0 as usize;
+                let tile = |body: &Body| blueprint.partition.locate(body.position).0 as usize;
                 scene.sample().for_each(|(bodies, body)| weights[tile(&body)] += bodies);
             }
             weights
         });
-        let assignment = Assignment::balanced(&blueprint.grid, &weights, ranks);
+        let assignment = Assignment::balanced(&blueprint.partition, &weights, ranks);
         let output = folder.map(|(folder, begins)| Output {
             folder,
             configuration: config.to_toml(tiles),

@@ -3,7 +3,7 @@
 
 use crate::config::{Config, MOST_TILES};
 use crate::scene::Scene;
-use atoll_core::{Kind, Params};
+use atoll_core::{Adaptive, Kind, Params, Partition, SetupError};
 use glam::DVec2;
 
 /// Bodies in a tile of the default grid, on the average. So many stay in a core's L2 cache for a whole step; half as many
@@ -13,15 +13,66 @@ const BODIES_PER_TILE: f64 = 8000.0;
 /// A tile of the default grid is at least this many halo widths wide; below, most of a tile's work would be ghosts.
 const HALOS_PER_TILE: f64 = 4.0;
 
-/// Columns and rows of tiles: those given, else the default for the scene.
+/// Tiles that follow the bodies are cut from squares of which each is so many tiles wide where bodies are spread evenly: then four
+/// and sixteen of them can be joined where few are.
+const CUT_IN: u32 = 4;
+
+/// Columns and rows of tiles, or of the squares that adaptive ones are cut from: those given, else the default for the scene.
 pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
     config.run.tiles.unwrap_or_else(|| {
         if config.params.sleep {
             return [1, 1]; // islands sleep within one tile only
         }
         let (low, high) = scene.domain();
-        default_counts(scene.bodies(), high - low, halo_width(&scene.kinds(), &config.params))
+        let halo_width = halo_width(&scene.kinds(), &config.params);
+        match config.run.adaptive {
+            None => default_counts(scene.bodies() as f64 / BODIES_PER_TILE, high - low, halo_width),
+            // Cut from these as often as is usual, evenly spread bodies fill tiles by half.
+            Some(adaptive) => {
+                let tiles = scene.bodies() as f64 / (0.5 * adaptive.max_bodies as f64);
+                default_counts(tiles, high - low, halo_width).map(|count| ((count + CUT_IN / 2) / CUT_IN).max(1))
+            }
+        }
     })
+}
+
+/// By which rule tiles follow the bodies of such kinds, if they do.
+pub(crate) fn rule(config: &Config, kinds: &[Kind]) -> Option<Adaptive> {
+    let halo_width = atoll_core::halo_width(kinds, &config.params);
+    config.run.adaptive.map(|adaptive| Adaptive::new(adaptive.max_bodies, halo_width))
+}
+
+/// The tiles that a run begins with. Where they follow the bodies, these are counted by a sample: what that misses is put right
+/// before the first step.
+///
+/// # Errors
+/// If there are no such tiles.
+pub(crate) fn first_partition(
+    config: &Config,
+    scene: &Scene,
+    [columns, rows]: [u32; 2],
+) -> Result<Partition, SetupError> {
+    let (low, high) = scene.domain();
+    let Some(rule) = rule(config, &scene.kinds()) else { return Partition::uniform(low, high, columns, rows) };
+    Partition::adaptive(low, high, [columns, rows], &rule, scene.sample().map(|(bodies, body)| (body.position, bodies)))
+}
+
+/// How the domain is cut.
+pub(crate) fn in_words([columns, rows]: [u32; 2], max_bodies: Option<u64>) -> String {
+    match max_bodies {
+        None => format!("{columns} x {rows} tiles"),
+        Some(most) => format!("tiles of {most} bodies at most, cut from {columns} x {rows} squares"),
+    }
+}
+
+/// The levels of a forest's tiles as text: a letter for each.
+pub(crate) fn in_letters(levels: &[u8]) -> String {
+    levels.iter().map(|level| char::from(b'a' + level)).collect()
+}
+
+/// The levels that were written as letters.
+pub(crate) fn of_letters(text: &str) -> Option<Vec<u8>> {
+    text.bytes().map(|letter| letter.is_ascii_lowercase().then(|| letter - b'a')).collect()
 }
 
 /// The width of the halo in meters that the default is made with, which no change may bend: without what
@@ -31,8 +82,8 @@ fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
     radii.fold(0.0, f64::max) + f64::from(params.margin_cap)
 }
 
-fn default_counts(bodies: u64, size: DVec2, halo_width: f64) -> [u32; 2] {
-    let tiles = bodies as f64 / BODIES_PER_TILE;
+/// About so many tiles.
+fn default_counts(tiles: f64, size: DVec2, halo_width: f64) -> [u32; 2] {
     let count = |along: f64, across: f64| {
         let square = (tiles * (along / across)).sqrt().round();
         let most = (along / (HALOS_PER_TILE * halo_width)).floor().clamp(1.0, MOST_TILES.into());
@@ -47,15 +98,15 @@ mod tests {
 
     #[test]
     fn the_reported_sizes() {
-        assert_eq!(default_counts(700_000, DVec2::splat(1210.0), 0.7), [9, 9]);
-        assert_eq!(default_counts(20_000, DVec2::splat(204.5), 0.7), [2, 2]);
-        assert_eq!(default_counts(100_000, DVec2::new(225.0, 112.5), 0.7), [5, 3]);
+        assert_eq!(default_counts(87.5, DVec2::splat(1210.0), 0.7), [9, 9]);
+        assert_eq!(default_counts(2.5, DVec2::splat(204.5), 0.7), [2, 2]);
+        assert_eq!(default_counts(12.5, DVec2::new(225.0, 112.5), 0.7), [5, 3]);
     }
 
     #[test]
     fn few_bodies_or_little_space_make_few_tiles() {
-        assert_eq!(default_counts(1, DVec2::new(1.0, 1.5), 0.7), [1, 1]);
-        assert_eq!(default_counts(1_000_000, DVec2::new(28.0, 5.0), 0.7), [10, 1]);
+        assert_eq!(default_counts(1e-4, DVec2::new(1.0, 1.5), 0.7), [1, 1]);
+        assert_eq!(default_counts(125.0, DVec2::new(28.0, 5.0), 0.7), [10, 1]);
     }
 
     #[test]

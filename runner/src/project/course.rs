@@ -53,7 +53,7 @@ impl Course {
     pub(super) fn run(plan: &Plan, observer: &Observer) -> Result<Option<Self>, RunError> {
         let mut world = part_of_scene(plan, Rank(0)).map_err(RunError::Setup)?;
         world.book_time(thread_time);
-        let (steps, tiles) = (plan.config.run.steps, plan.blueprint.grid.tiles());
+        let (steps, tiles) = (plan.config.run.steps, plan.blueprint.partition.tiles());
         let stride = (steps * tiles as u64).div_ceil(MOST_TIMES).max(1);
         let mut course = Self { moments: Vec::new(), traffic: Vec::new(), bodies: vec![bodies(&world)], syncs: 0.0 };
         let mut tap = Tap::default();

@@ -71,11 +71,11 @@ impl Projection {
         let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| failed(error.to_string()))?;
         let Some(course) = pool.install(|| Course::run(plan, observer))? else { return Ok(None) };
         let &Wanted { ref ranks, threads, network } = wanted;
-        let grid = &plan.blueprint.grid;
-        let one = |ranks: usize, rule| predict(&course, grid, Machine { ranks, threads, network }, rule);
+        let partition = &plan.blueprint.partition;
+        let one = |ranks: usize, rule| predict(&course, partition, Machine { ranks, threads, network }, rule);
         let rules = |ranks: usize| if ranks == 1 { &RULES[..1] } else { &RULES };
         let predictions = ranks.iter().flat_map(|&ranks| rules(ranks).iter().map(move |&rule| (ranks, rule)));
-        let alone = predict(&course, grid, Machine { ranks: 1, threads: 1, network }, Balance::Off);
+        let alone = predict(&course, partition, Machine { ranks: 1, threads: 1, network }, Balance::Off);
         Ok(Some(Self {
             scene: plan.config.scene.kind.name(),
             config_hash: plan.config.hash(plan.tiles),

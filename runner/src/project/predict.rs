@@ -5,7 +5,7 @@ use super::network::{Load, Network};
 use crate::config::Balance;
 use crate::plan::Assignment;
 use crate::rank::balance::{is_uneven, steps_between};
-use atoll_core::{TileGrid, TileId};
+use atoll_core::{Partition, TileId};
 use serde::Serialize;
 
 /// What handing over a tile costs who gives it up and who takes it over together, in seconds for each of its bodies: measured with
@@ -86,11 +86,11 @@ impl Sums {
 }
 
 /// Goes through a course as if so many ranks made it.
-pub(super) fn predict(course: &Course, grid: &TileGrid, machine: Machine, balance: Balance) -> Prediction {
+pub(super) fn predict(course: &Course, partition: &Partition, machine: Machine, balance: Balance) -> Prediction {
     let Machine { ranks, threads, network } = machine;
-    let mut assignment = Assignment::balanced(grid, course.bodies(0), ranks);
+    let mut assignment = Assignment::balanced(partition, course.bodies(0), ranks);
     let (every, mut since) = (steps_between(ranks) as u64, 0);
-    let mut costs = vec![0.0; grid.tiles()];
+    let mut costs = vec![0.0; partition.tiles()];
     let (mut loads, mut loads_of) = (Vec::new(), None);
     let (mut all, mut last, mut tiles_moved) = (Sums::default(), Sums::default(), 0);
     let steps = course.moments.last().map_or(0, |moment| moment.step + moment.steps);
@@ -121,7 +121,7 @@ pub(super) fn predict(course: &Course, grid: &TileGrid, machine: Machine, balanc
                 Balance::Bodies => course.bodies(window).to_vec(),
                 _ => costs.iter().map(|cost| (cost * 1e9) as u64).collect(),
             };
-            if let Some(better) = better(&assignment, grid, &nanos, balance) {
+            if let Some(better) = better(&assignment, partition, &nanos, balance) {
                 let (moved, seconds) = moving(&assignment, &better, course.bodies(window), &network);
                 (tiles_moved, assignment, loads_of) = (tiles_moved + moved, better, None);
                 one.moving = seconds / moment.steps as f64;
@@ -213,14 +213,14 @@ fn messages(course: &Course, window: usize, assignment: &Assignment) -> Vec<Load
 }
 
 /// The assignment that ranks would change to.
-fn better(assignment: &Assignment, grid: &TileGrid, costs: &[u64], balance: Balance) -> Option<Assignment> {
+fn better(assignment: &Assignment, partition: &Partition, costs: &[u64], balance: Balance) -> Option<Assignment> {
     let mut sums = vec![0; assignment.ranks()];
     for (&rank, &cost) in assignment.ranks_of_tiles().iter().zip(costs) {
         sums[rank as usize] += cost;
     }
     let (most, mean) = (sums.iter().copied().max().unwrap_or(0), sums.iter().sum::<u64>() / sums.len() as u64);
     let may_move = balance == Balance::Bodies || is_uneven(most, mean);
-    may_move.then(|| assignment.refined(grid, costs)).flatten()
+    may_move.then(|| assignment.refined(partition, costs)).flatten()
 }
 
 /// How many tiles move, and how long that takes.
@@ -242,11 +242,11 @@ mod tests {
     use glam::DVec2;
 
     /// Eight tiles in a row, of which each tells its neighbours a thousand bytes, over 64 steps.
-    fn course(tiles: [f32; 8]) -> (Course, TileGrid) {
+    fn course(tiles: [f32; 8]) -> (Course, Partition) {
         let moment = |step| Moment { step, steps: 1, tiles: tiles.to_vec(), rest: 0.0 };
         let told = (0..7).flat_map(|tile| [(tile, tile + 1, 1e3), (tile + 1, tile, 1e3)]).collect();
         let course = Course::of((0..64).map(moment).collect(), told, vec![1000; 8]);
-        (course, TileGrid::new(DVec2::ZERO, DVec2::new(8.0, 1.0), 8, 1).unwrap())
+        (course, Partition::uniform(DVec2::ZERO, DVec2::new(8.0, 1.0), 8, 1).unwrap())
     }
 
     fn machine(ranks: usize, threads: usize) -> Machine {
@@ -255,26 +255,26 @@ mod tests {
 
     #[test]
     fn one_rank_takes_what_its_tiles_take_and_even_ones_their_share() {
-        let (course, grid) = course([1e-3; 8]);
-        let alone = predict(&course, &grid, machine(1, 1), Balance::Off);
+        let (course, partition) = course([1e-3; 8]);
+        let alone = predict(&course, &partition, machine(1, 1), Balance::Off);
         assert!((alone.ms_per_step - 8.0).abs() < 1e-5 && (alone.efficiency - 1.0).abs() < 1e-9, "{alone:?}");
         assert_eq!((alone.exchange_ms, alone.waiting_ms), (0.0, 0.0));
-        let two = predict(&course, &grid, machine(2, 1), Balance::Measured);
+        let two = predict(&course, &partition, machine(2, 1), Balance::Measured);
         assert!((two.work_ms - 4.0).abs() < 1e-5 && (two.imbalance - 1.0).abs() < 1e-6 && two.tiles_moved == 0);
         // A sync point: two latencies and what a rank does; the rest are its messages.
         let sync = 1e3 * machine(2, 1).network.sync(2);
         assert!(two.exchange_ms > sync && two.exchange_ms < sync + 0.01, "{two:?}");
-        let threads = predict(&course, &grid, machine(1, 4), Balance::Off);
+        let threads = predict(&course, &partition, machine(1, 4), Balance::Off);
         assert!((threads.work_ms - 2.0).abs() < 1e-5 && (threads.efficiency - 1.0).abs() < 1e-5, "{threads:?}");
-        let many = predict(&course, &grid, machine(100, 1), Balance::Off);
+        let many = predict(&course, &partition, machine(100, 1), Balance::Off);
         assert!(many.idle_ranks == 92 && many.work_ms > 0.99 && many.efficiency < 0.08, "{many:?}");
     }
 
     #[test]
     fn tiles_that_take_longer_are_dealt_anew_where_that_is_measured() {
-        let (course, grid) = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
-        let [off, bodies, measured] =
-            [Balance::Off, Balance::Bodies, Balance::Measured].map(|rule| predict(&course, &grid, machine(2, 1), rule));
+        let (course, partition) = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
+        let [off, bodies, measured] = [Balance::Off, Balance::Bodies, Balance::Measured]
+            .map(|rule| predict(&course, &partition, machine(2, 1), rule));
         // By bodies all tiles are alike.
         assert!((off.work_ms - 10.0).abs() < 1e-4 && (bodies.work_ms - 10.0).abs() < 1e-4, "{off:?} {bodies:?}");
         assert!(measured.tiles_moved == 3 && (7.0..8.0).contains(&measured.work_ms), "{measured:?}");

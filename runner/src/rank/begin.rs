@@ -4,14 +4,16 @@ use super::trouble::{Refusal, all_well};
 use super::{Observer, RankError};
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
-use crate::plan::{Holding, Plan};
-use atoll_core::{SetupError, World};
+use crate::plan::{Assignment, Holding, Plan};
+use atoll_core::{Blueprint, SetupError, World};
 use atoll_transport::{Rank, Transport};
 use tracing::info;
 
 /// A world about to be stepped.
 pub(super) struct Beginning {
     pub(super) world: World,
+    /// Which rank holds which of its tiles.
+    pub(super) assignment: Assignment,
     /// The step after which it was saved, if it was.
     pub(super) resumed: Option<u64>,
 }
@@ -30,7 +32,9 @@ pub(super) fn build(
         // What cannot be read just now is no reason to give it up.
         all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
         let error = match (all_well(transport, restored.as_ref().err()), restored) {
-            (Ok(()), Ok(world)) => return Ok(Beginning { world, resumed: Some(snapshot.step()) }),
+            (Ok(()), Ok((world, assignment))) => {
+                return Ok(Beginning { world, assignment, resumed: Some(snapshot.step()) });
+            }
             (Ok(()), Err(error)) | (Err(Refusal::Known(error)), _) => error,
             (Err(refusal), _) => return Err(refusal.into()),
         };
@@ -41,17 +45,33 @@ pub(super) fn build(
             observer.note(&format!("{error}; going on after step {next} instead"));
         }
     }
-    Ok(Beginning { world: scene(plan, rank).map_err(RankError::Setup)?, resumed: None })
+    let world = scene(plan, rank).map_err(RankError::Setup)?;
+    Ok(Beginning { world, assignment: plan.assignment.clone(), resumed: None })
 }
 
-/// This rank's tiles of a snapshot. That they cannot be read is for all ranks to hear.
-fn restore(plan: &Plan, rank: Rank, snapshot: &Snapshot) -> Result<Result<World, SnapshotError>, RankError> {
-    let mut world = World::new(&plan.blueprint, &plan.assignment.tiles_of(rank.index())).map_err(RankError::Setup)?;
+/// This rank's tiles of a snapshot, and who holds which. That they cannot be read is for all ranks to hear.
+fn restore(
+    plan: &Plan,
+    rank: Rank,
+    snapshot: &Snapshot,
+) -> Result<Result<(World, Assignment), SnapshotError>, RankError> {
+    let partition = match snapshot.partition(&plan.blueprint.partition) {
+        Ok(partition) => partition,
+        Err(error) => return Ok(Err(error)),
+    };
+    // The plan is for the newest snapshot; another may have other tiles.
+    let assignment = if partition == plan.blueprint.partition {
+        plan.assignment.clone()
+    } else {
+        Assignment::balanced(&partition, &snapshot.weights(), plan.assignment.ranks())
+    };
+    let blueprint = Blueprint { partition, ..plan.blueprint.clone() };
+    let mut world = World::new(&blueprint, &assignment.tiles_of(rank.index())).map_err(RankError::Setup)?;
     let restored = snapshot.restore(&mut world);
     if restored.is_ok() {
         info!(step = snapshot.step(), bodies = world.bodies().count(), "restored");
     }
-    Ok(restored.map(|()| world))
+    Ok(restored.map(|()| (world, assignment)))
 }
 
 /// This rank's part of the scene.
@@ -62,7 +82,7 @@ pub fn scene(plan: &Plan, rank: Rank) -> Result<World, SetupError> {
     let tiles = plan.assignment.tiles_of(rank.index());
     let mut world = World::new(&plan.blueprint, &tiles)?;
     let mut bodies = 0_u64;
-    let held = Holding::new(&plan.blueprint.grid, &tiles);
+    let held = Holding::new(&plan.blueprint.partition, &tiles);
     for body in plan.scene.near(|low, high| held.meets(low, high)) {
         bodies += u64::from(world.add(body)?);
     }

@@ -50,6 +50,8 @@ pub struct RankFacts {
     pub output_nanos: u64,
     /// Time in which ranks told each other how busy they are, and tiles went from one to another.
     pub balance_nanos: u64,
+    /// Tiles of all ranks after the last step.
+    pub tile_count: u64,
     /// Tiles that went from one rank to another, of all ranks.
     pub tiles_moved: u64,
     /// The busiest rank's time on a core over the mean of all ranks, the mean over all steps, in millionths.
@@ -81,6 +83,7 @@ impl RankFacts {
             largest_island: last.largest_island,
             asleep: last.asleep,
             colors: last.colors,
+            tile_count: world.partition().tiles() as u64,
             phase_nanos: Phase::ALL.map(|phase| world.timings().total(phase).as_nanos() as u64),
             ..Self::default()
         }
@@ -135,6 +138,7 @@ impl RankFacts {
             output_nanos: most(|rank| rank.output_nanos),
             balance_nanos: most(|rank| rank.balance_nanos),
             // These all ranks know alike.
+            tile_count: most(|rank| rank.tile_count),
             tiles_moved: most(|rank| rank.tiles_moved),
             imbalance: most(|rank| rank.imbalance),
             phase_nanos: std::array::from_fn(|phase| self.phase_nanos[phase].max(other.phase_nanos[phase])),

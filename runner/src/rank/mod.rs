@@ -28,7 +28,7 @@ use crate::error::Exit;
 use crate::plan::Plan;
 use atoll_core::{Phase, SetupError, StepError, StepReport, TileFacts};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
-use balance::Balancer;
+use balance::{Balancer, Retiler};
 use begin::Beginning;
 use bytemuck::Pod;
 use log::Log;
@@ -139,7 +139,8 @@ fn run<T: Transport>(
     // Before the halo: where this rank fails, the others hear of it before the last of what it writes is written.
     let mut recorder;
     let mut halo = RankHalo::new(Counting::new(transport), plan.assignment.clone());
-    let Beginning { mut world, resumed } = begin::build(plan, rank, observer, halo.transport())?;
+    let Beginning { mut world, assignment, resumed } = begin::build(plan, rank, observer, halo.transport())?;
+    halo.assign(assignment);
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
     let logs = log::find(plan, resumed, halo.transport())?;
@@ -161,6 +162,7 @@ fn run<T: Transport>(
         recorder.write_due(&world, false);
     }
     let mut balancer = Balancer::start(plan, &mut world);
+    let mut retiler = Retiler::start(plan, resumed, &world, rank, recorder.as_ref());
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan.config.run.peer_timeout);
     meetings.linger(&world, &last, &mut halo)?;
@@ -168,6 +170,9 @@ fn run<T: Transport>(
         let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
         if observer.stop.is_requested() || unwritten {
             world.request_stop();
+        }
+        if let Some(retiler) = &mut retiler {
+            retiler.before_step(&mut world, &mut halo, recorder.as_ref())?;
         }
         if observer.panic_at == Some(PanicAt { rank: rank.0, step: world.step_count() }) {
             panic!("as --panic-at asks");
@@ -186,7 +191,8 @@ fn run<T: Transport>(
         observer.complete.store(*complete, Ordering::Relaxed);
         if let Some(log) = &mut log {
             let written = recorder.as_ref().map_or(Duration::ZERO, Recorder::time);
-            let balanced = balancer.as_ref().map_or(Duration::ZERO, Balancer::time);
+            let balanced = balancer.as_ref().map_or(Duration::ZERO, Balancer::time)
+                + retiler.as_ref().map_or(Duration::ZERO, Retiler::time);
             log.write_due(&world, &last, (migrations, written, balanced), &mut halo)?;
             match (log.take_failure(), &recorder) {
                 // Before a snapshot that would be gone on from without the rows until then.
@@ -233,6 +239,10 @@ fn run<T: Transport>(
     if let Some(balancer) = &balancer {
         sent = sent.since(&balancer.sent);
         balancer.tell_of(&mut facts);
+    }
+    if let Some(retiler) = &retiler {
+        sent = sent.since(&retiler.sent);
+        facts.balance_nanos += retiler.time().as_nanos() as u64;
     }
     facts.interrupted = interrupted.into();
     facts.migrations = migrations;

@@ -48,8 +48,13 @@ pub struct Summary {
     pub ranks: usize,
     /// Threads of each rank.
     pub threads: usize,
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles, or of the squares that they are cut from.
     pub tiles: [u32; 2],
+    /// Bodies that a tile has at most before it is cut, if tiles follow the bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_bodies: Option<u64>,
+    /// How many tiles there are after the last step.
+    pub tile_count: u64,
     /// What carried bytes between ranks.
     pub transport: &'static str,
     /// The machine of rank 0, in words.
@@ -149,6 +154,8 @@ impl Summary {
             ranks: ranks.len(),
             threads,
             tiles: plan.tiles,
+            max_bodies: plan.config.run.adaptive.map(|adaptive| adaptive.max_bodies),
+            tile_count: all.tile_count,
             transport: plan.transport.name(),
             machine: machine::words(),
             build_s: all.build_nanos as f64 * 1e-9,

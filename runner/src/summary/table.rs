@@ -1,15 +1,16 @@
 //! A summary as people read it.
 
 use super::Summary;
+use crate::plan::tiles;
 use std::fmt;
 
 /// The closing words of a run.
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [columns, rows] = self.tiles;
         let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
-        writeln!(f, "{}: {} bodies, seed {}, {columns} x {rows} tiles", self.scene, self.bodies, self.seed)?;
+        let tiling = tiles::in_words(self.tiles, self.max_bodies);
+        writeln!(f, "{}: {} bodies, seed {}, {tiling}", self.scene, self.bodies, self.seed)?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
         let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };

@@ -3,7 +3,7 @@
 use super::Outcome;
 use atoll_core::{
     Blueprint, Body, BorderImpulse, CodecError, ContactRecord, Exchange, FORMAT, GhostRecord, GhostRefresh, Halo,
-    Inbox, Kind, Material, Message, Outbox, Params, Shape, StepError, TileGrid, TileId, World, step,
+    Inbox, Kind, Material, Message, Outbox, Params, Partition, Shape, StepError, TileId, World, step,
 };
 use bytemuck::cast_slice;
 use glam::DVec2;
@@ -51,7 +51,7 @@ impl<F: FnOnce(&mut Inbox) -> R, R> Halo for Ear<F, R> {
 fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
     let blueprint = Blueprint {
         params: Params { exchange: Exchange::Substep, ..Params::default() },
-        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(20.0), 2, TILES / 2).expect("a domain with a size"),
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 2, TILES / 2).expect("a domain with a size"),
         kinds: vec![Kind { shape: Shape::circle(0.2), material: Material::default() }],
         statics: Vec::new(),
     };

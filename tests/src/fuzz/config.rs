@@ -75,8 +75,8 @@ fn check_plan(plan: &Plan) {
     plan.notes().iter().for_each(assert_one_line);
     let (low, high) = plan.scene.domain();
     assert!(low.is_finite() && high.is_finite() && low.cmplt(high).all(), "{low} to {high}");
-    assert_eq!(plan.blueprint.grid.tiles(), plan.tiles.iter().product::<u32>() as usize);
+    assert_eq!(plan.blueprint.partition.tiles(), plan.tiles.iter().product::<u32>() as usize);
     assert!(!plan.scene.iter().any(|body| plan.scene.has_escaped(&body)), "a body starts outside of its home");
     let tiles: usize = (0..plan.assignment.ranks()).map(|rank| plan.assignment.tiles_of(rank).len()).sum();
-    assert_eq!(tiles, plan.blueprint.grid.tiles(), "every tile is somebody's");
+    assert_eq!(tiles, plan.blueprint.partition.tiles(), "every tile is somebody's");
 }

@@ -14,7 +14,7 @@ use crate::parallel::lanes::LaneSet;
 use crate::parallel::team::Team;
 use crate::testing::{any_kind, any_rotation, cases, circle, distance, rectangle};
 use crate::tiling::blueprint::{Blueprint, Setup};
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
@@ -45,13 +45,13 @@ impl Stuffed {
     /// Of the given bodies so many are owned, the others are ghosts. Nothing asks where they are: a tile may hold any
     /// body anywhere.
     pub(super) fn named(size: Vec2, kinds: Vec<Kind>, bodies: &[Body], owned: usize, statics: Vec<StaticBody>) -> Self {
-        let grid = TileGrid::new(DVec2::ZERO, 3.0 * size.as_dvec2(), 3, 3).unwrap();
-        let blueprint = Blueprint { params: Params::default(), grid, kinds, statics };
+        let partition = Partition::uniform(DVec2::ZERO, 3.0 * size.as_dvec2(), 3, 3).unwrap();
+        let blueprint = Blueprint { params: Params::default(), partition, kinds, statics };
         let setup = Setup::new(&blueprint).unwrap();
         let mut tile = Tile::new(TileId(4), &setup);
         tile.owned = owned;
         for &body in bodies {
-            tile.bodies.push(Body { position: body.position + tile.corner, ..body });
+            tile.bodies.push(Body { position: body.position + tile.rectangle.min, ..body });
         }
         tile.unseen.resize(bodies.len() - tile.owned, Unseen::default());
         tile.ghost_owners.resize(bodies.len() - tile.owned, TileId(5));
@@ -59,7 +59,7 @@ impl Stuffed {
             tile.bodies.push(*body);
         }
         let mut proxies = Proxies::default();
-        proxies.load(&tile.bodies, [tile.owned, tile.ghosts()], tile.corner, &setup, Team::ALONE);
+        proxies.load(&tile.bodies, [tile.owned, tile.ghosts()], &tile.rectangle, &setup, Team::ALONE);
         Self { setup, tile, proxies }
     }
 
@@ -193,8 +193,8 @@ impl std::fmt::Debug for Stuffed {
         writeln!(
             f,
             "a tile of {} from {}, {} bodies owned:",
-            self.setup.grid.tile_size(),
-            self.tile.corner,
+            self.tile.rectangle.size(),
+            self.tile.rectangle.min,
             self.tile.owned
         )?;
         let kinds = self.tile.bodies.kind.iter().map(|&kind| self.setup.kind(kind).shape);

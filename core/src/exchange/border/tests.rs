@@ -9,7 +9,7 @@ use crate::model::params::{Exchange, Params};
 use crate::model::shape::{Kind, Material, Shape};
 use crate::step;
 use crate::tiling::blueprint::Blueprint;
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::world::World;
 use glam::{DVec2, Vec2};
 use std::convert::Infallible;
@@ -44,11 +44,12 @@ impl Halo for Counting {
 
 /// A row of four discs that touch, the border between the second and the third.
 fn row(restitution: f32) -> World {
-    let grid = TileGrid::new(DVec2::new(-20.0, -20.0), DVec2::new(20.0, 20.0), 2, 1).unwrap();
+    let partition = Partition::uniform(DVec2::new(-20.0, -20.0), DVec2::new(20.0, 20.0), 2, 1).unwrap();
     let material = Material { restitution, ..Material::default() };
     let kinds = vec![Kind { shape: Shape::circle(0.5), material }];
     let params = Params { exchange: Exchange::Substep, ..Params::default() };
-    let mut world = World::new(&Blueprint { params, grid, kinds, statics: vec![] }, &[TileId(0), TileId(1)]).unwrap();
+    let mut world =
+        World::new(&Blueprint { params, partition, kinds, statics: vec![] }, &[TileId(0), TileId(1)]).unwrap();
     for k in 0..4_u32 {
         let body = Body {
             id: GlobalId(u64::from(k)),

@@ -109,7 +109,7 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
     for Border { rim: place, owner, .. } in border.drain(..) {
         if owner != tile.id {
             tile.gaps.push(rim[place as usize].index);
-            tile.counts.leaps += u64::from(!setup.grid.are_neighbours(tile.id, owner));
+            tile.counts.leaps += u64::from(!setup.partition.are_neighbours(tile.id, owner));
             parcels.push(Parcel::new(owner, place));
         }
     }
@@ -135,13 +135,13 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     work.mark.resize(tile.owned + 1, 0);
     Rim::find(tile, setup);
     tile.rim.is_known = false;
-    let grid = &setup.grid;
+    let partition = &setup.partition;
     for (place, rim) in (0..).zip(&tile.rim.bodies) {
         let (position, goes_far) = (rim.body.position, setup.goes_far(rim.body.velocity));
         tile.counts.far |= goes_far;
-        let (owner, outline) = (grid.locate(position), Outline::of_rim(rim));
+        let (owner, outline) = (partition.locate(position), Outline::of_rim(rim));
         let first_send = work.sends.len() as u32;
-        for target in grid.reached(position, rim.half, setup.halo_width).filter(|&target| target != owner) {
+        for target in partition.reached(position, rim.half, setup.halo_width).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);
             work.sends.push(Send { rim: place, target, near, unseen: Unseen::default() });
         }

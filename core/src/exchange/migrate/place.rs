@@ -6,13 +6,13 @@ use crate::tiling::tile::Tile;
 
 /// Sorts the owned bodies by (cell, GlobalId).
 pub(super) fn sort(tile: &mut Tile, setup: &Setup) {
-    let per_meter = 1.0 / setup.halo_width;
+    let (per_meter, corner) = (1.0 / setup.halo_width, tile.rectangle.min);
     // What lies before the first cell or after the last counts as in there.
     let cell = |v: f64, corner: f64| u128::from(((v - corner) * per_meter) as u16);
     let bodies = tile.bodies.position.iter().zip(&tile.bodies.id).zip(0_u128..);
     let mut order: Vec<u128> = bodies
         .map(|((position, id), index)| {
-            let (row, column) = (cell(position.y, tile.corner.y), cell(position.x, tile.corner.x));
+            let (row, column) = (cell(position.y, corner.y), cell(position.x, corner.x));
             row << 112 | column << 96 | u128::from(id.0) << 32 | index
         })
         .collect();

@@ -98,13 +98,13 @@ fn take_ghosts(tile: &mut Tile, mail: Mail<'_>, Ghosts { records, order }: &mut 
     records.clear();
     order.clear();
     for message in mail.messages().filter(|message| !message.ghosts.is_empty()) {
-        let home = setup.grid.region(message.from);
+        let home = setup.partition.region(message.from);
         let places = records.len() as u128..;
         records.extend_from_slice(message.ghosts);
         order.extend(places.zip(message.ghosts).map(|(place, GhostRecord { body, .. })| {
             // Most of them live where they came from.
             let is_home = home.contains(body.position);
-            let owner = if is_home { message.from } else { setup.grid.locate(body.position) };
+            let owner = if is_home { message.from } else { setup.partition.locate(body.position) };
             u128::from(owner.0) << 96 | u128::from(body.id.0) << 32 | place
         }));
     }

@@ -14,7 +14,7 @@ use crate::model::params::{Exchange, Params};
 use crate::model::shape::Kind;
 use crate::testing::{any_kind, any_rotation, cases, circle, rectangle};
 use crate::tiling::blueprint::{Blueprint, Setup};
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 use crate::world::World;
 use crate::{StepError, step};
@@ -31,7 +31,7 @@ struct Scene {
 
 impl Scene {
     fn world(&self) -> World {
-        let tiles: Vec<_> = (0..self.blueprint.grid.tiles() as u32).map(TileId).collect();
+        let tiles: Vec<_> = (0..self.blueprint.partition.tiles() as u32).map(TileId).collect();
         let mut world = World::new(&self.blueprint, &tiles).unwrap();
         for &body in &self.bodies {
             assert!(world.add(body).unwrap());
@@ -42,8 +42,8 @@ impl Scene {
     /// The same bodies where nothing has a border.
     fn on_one_tile(&self) -> Self {
         let mut scene = self.clone();
-        let grid = &self.blueprint.grid;
-        scene.blueprint.grid = TileGrid::new(grid.min(), grid.max(), 1, 1).unwrap();
+        let grid = &self.blueprint.partition;
+        scene.blueprint.partition = Partition::uniform(grid.min(), grid.max(), 1, 1).unwrap();
         scene
     }
 }
@@ -94,8 +94,8 @@ fn any_scene(bodies: usize, gravity: f32) -> impl Strategy<Value = Scene> {
             bodies.sort_by_key(|body| body.id);
             bodies.dedup_by_key(|body| body.id);
             bodies.reverse();
-            let grid = TileGrid::new(DVec2::ZERO, domain, columns, rows).unwrap();
-            Scene { blueprint: Blueprint { params, grid, kinds, statics: vec![floor] }, bodies }
+            let partition = Partition::uniform(DVec2::ZERO, domain, columns, rows).unwrap();
+            Scene { blueprint: Blueprint { params, partition, kinds, statics: vec![floor] }, bodies }
         })
 }
 
@@ -124,7 +124,7 @@ fn grown(world: &World, body: &Body) -> DVec2 {
 
 /// Whether that box meets the region of a tile grown by so much, with tiles half-open.
 fn reaches(world: &World, tile: TileId, body: &Body, far: f64) -> bool {
-    let region = world.setup.grid.region(tile);
+    let region = world.setup.partition.region(tile);
     let reach = grown(world, body) + DVec2::splat(far);
     let (low, high) = (body.position - reach, body.position + reach);
     low.x < region.max.x && high.x >= region.min.x && low.y < region.max.y && high.y >= region.min.y
@@ -143,7 +143,7 @@ fn is_on_the_way(world: &World, body: &Body, far: &Body) -> bool {
 
 /// Who owns what, and who has a ghost of whom, after a step, given the bodies before it.
 fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
-    let grid = &world.setup.grid;
+    let grid = &world.setup.partition;
     let after = by_name(world);
     assert!(after.keys().eq(before.keys()), "a body was lost or made");
     for tile in world.tile_states() {
@@ -339,8 +339,8 @@ proptest! {
 }
 
 fn two_tiles(exchange: Exchange, kinds: Vec<Kind>) -> Blueprint {
-    let grid = TileGrid::new(DVec2::new(-10.0, -10.0), DVec2::new(10.0, 10.0), 2, 1).unwrap();
-    Blueprint { params: Params { exchange, ..Params::default() }, grid, kinds, statics: vec![] }
+    let partition = Partition::uniform(DVec2::new(-10.0, -10.0), DVec2::new(10.0, 10.0), 2, 1).unwrap();
+    Blueprint { params: Params { exchange, ..Params::default() }, partition, kinds, statics: vec![] }
 }
 
 fn disc(id: u64, x: f64, y: f64, vx: f32) -> Body {

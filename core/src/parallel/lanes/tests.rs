@@ -8,7 +8,7 @@ use crate::model::math::{self, Rot};
 use crate::model::params::{Exchange, Instructions, Params, Solver};
 use crate::testing::{circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::world::World;
 use glam::{DVec2, Vec2};
 use std::hint::black_box;
@@ -229,7 +229,7 @@ fn every_operation_does_in_each_lane_what_plain_numbers_do() {
 
 /// A heap of discs and boxes that bounce, over four tiles.
 fn heap(solver: Solver, exchange: Exchange, instructions: Instructions) -> World {
-    let grid = TileGrid::new(DVec2::ZERO, DVec2::splat(8.0), 2, 2).unwrap();
+    let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(8.0), 2, 2).unwrap();
     let mut kinds = vec![circle(0.2), rectangle(0.5, 0.3), rectangle(0.3, 0.4)];
     kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.4);
     let wall = |id, x, y, width, height| StaticBody {
@@ -242,7 +242,7 @@ fn heap(solver: Solver, exchange: Exchange, instructions: Instructions) -> World
     let params =
         Params { solver, exchange, instructions, max_linear_speed: 9.0, max_angular_speed: 7.0, ..Params::default() };
     let tiles: Vec<TileId> = (0..4).map(TileId).collect();
-    let mut world = World::new(&Blueprint { params, grid, kinds, statics }, &tiles).unwrap();
+    let mut world = World::new(&Blueprint { params, partition, kinds, statics }, &tiles).unwrap();
     for i in 0..120_u32 {
         let (x, y) = (f64::from(i % 12), f64::from(i / 12));
         let body = Body {

@@ -8,7 +8,7 @@ fn heap(kinds: u32, tiles: (u32, u32), params: Params) -> World {
     let wall = |id, x, y| StaticBody::new(GlobalId(id), rectangle(0.5, 20.0), DVec2::new(x, y));
     let blueprint = Blueprint {
         params: Params { gravity: Vec2::new(1.0, -10.0), ..params },
-        grid: TileGrid::new(DVec2::new(-4.0, -1.0), DVec2::new(4.0, 11.0), tiles.0, tiles.1).unwrap(),
+        partition: Partition::uniform(DVec2::new(-4.0, -1.0), DVec2::new(4.0, 11.0), tiles.0, tiles.1).unwrap(),
         kinds: vec![rectangle(0.5, 0.4), circle(0.25)],
         statics: vec![
             StaticBody::new(GlobalId(0), rectangle(20.0, 1.0), DVec2::new(0.0, -0.5)),
@@ -103,7 +103,7 @@ fn nothing_is_told_that_was_not_asked_for() {
 fn ranks_and_threads_change_no_bit() {
     let blueprint = |tiles| Blueprint {
         params: Params { gravity: Vec2::new(0.3, -9.81), ..Params::default() },
-        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(100.0), tiles, 1).unwrap(),
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(100.0), tiles, 1).unwrap(),
         kinds: vec![circle(0.3), rectangle(0.4, 0.7)],
         statics: Vec::new(),
     };
@@ -143,7 +143,7 @@ fn free_flight_loses_the_energy_that_its_integrator_must() {
     let low = DVec2::new(-10.0, -20.0);
     let blueprint = Blueprint {
         params: Params { gravity: Vec2::new(0.0, -8.0), dt: 1.0 / 64.0, ..Params::default() },
-        grid: TileGrid::new(low, DVec2::splat(30.0), 1, 1).unwrap(),
+        partition: Partition::uniform(low, DVec2::splat(30.0), 1, 1).unwrap(),
         kinds: vec![rectangle(0.5, 0.25)],
         statics: Vec::new(),
     };
@@ -176,7 +176,7 @@ fn free_flight_loses_the_energy_that_its_integrator_must() {
 fn what_nothing_turns_keeps_its_angular_momentum() {
     let blueprint = Blueprint {
         params: Params { gravity: Vec2::ZERO, ..Params::default() },
-        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(100.0), 2, 2).unwrap(),
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(100.0), 2, 2).unwrap(),
         kinds: vec![circle(0.5)],
         statics: Vec::new(),
     };

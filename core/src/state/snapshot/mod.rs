@@ -298,7 +298,7 @@ fn check(tile: &Tile, setup: &Setup) -> Result<(), RestoreError> {
     let ghosts = (tile.owned..).map(|i| tile.bodies.get(i));
     let bad_ghost = tile.ghost_owners.iter().zip(ghosts).find(|(owner, ghost)| {
         let ascends = last.replace((**owner, ghost.id)) <= Some((**owner, ghost.id));
-        let elsewhere = **owner != id && (owner.0 as usize) < setup.grid.tiles();
+        let elsewhere = **owner != id && (owner.0 as usize) < setup.partition.tiles();
         !(ascends && elsewhere && ghost.is_finite() && setup.knows(ghost))
     });
     if let Some((_, ghost)) = bad_ghost {

@@ -12,7 +12,7 @@ use crate::state::snapshot::RestoreError;
 use crate::step::step;
 use crate::testing::{circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
-use crate::tiling::partition::TileGrid;
+use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 use crate::world::World;
 use glam::{DVec2, Vec2};
@@ -22,14 +22,14 @@ const FLOOR: GlobalId = GlobalId(0);
 /// Boxes and discs on a floor, close together.
 fn blueprint(columns: u32, sleep: bool) -> Blueprint {
     let params = Params { gravity: Vec2::new(0.0, -10.0), sleep, ..Params::default() };
-    let grid = TileGrid::new(DVec2::new(-4.0, -1.0), DVec2::new(4.0, 4.0), columns, 1).unwrap();
+    let partition = Partition::uniform(DVec2::new(-4.0, -1.0), DVec2::new(4.0, 4.0), columns, 1).unwrap();
     let floor =
         StaticBody { id: FLOOR, position: DVec2::new(0.0, -1.0), rotation: Rot::IDENTITY, kind: rectangle(20.0, 2.0) };
-    Blueprint { params, grid, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics: vec![floor] }
+    Blueprint { params, partition, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics: vec![floor] }
 }
 
 fn empty(blueprint: &Blueprint) -> World {
-    let tiles: Vec<_> = (0..blueprint.grid.tiles() as u32).map(TileId).collect();
+    let tiles: Vec<_> = (0..blueprint.partition.tiles() as u32).map(TileId).collect();
     World::new(blueprint, &tiles).unwrap()
 }
 

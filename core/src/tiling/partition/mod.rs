@@ -1,166 +1,181 @@
 //! Who owns what, and who needs to know: the geometry of tiles.
 
-use crate::model::error::SetupError;
-use crate::model::id::TileId;
-use glam::{DVec2, Vec2};
-use std::ops::RangeInclusive;
-
+mod census;
+mod forest;
+mod grid;
 #[cfg(test)]
 mod tests;
 
-/// The domain cut into columns x rows equal tiles.
+pub use census::{Adaptive, Census, Change};
+
+use crate::model::error::SetupError;
+use crate::model::id::TileId;
+use forest::{Forest, Meeting};
+use glam::{DVec2, Vec2};
+use grid::{Grid, Span};
+
+/// How the domain is cut into tiles.
 ///
-/// A tile holds the half-open rectangle between its edges; the outermost ones reach to infinity, so that every point of
-/// the plane belongs to exactly one tile.
+/// Each tile holds the half-open rectangle between its edges; the outermost ones reach to infinity, so that every point of
+/// the plane belongs to exactly one tile. Tiles may be of any sizes, and border any number of others.
 #[derive(Clone, PartialEq, Debug)]
-pub struct TileGrid {
-    x: Axis,
-    y: Axis,
-}
+pub struct Partition(Cut);
 
-/// One direction of the grid: its edges, computed once, so that every rank compares against the same bits.
 #[derive(Clone, PartialEq, Debug)]
-struct Axis {
-    edges: Vec<f64>,
-    per_meter: f64,
+enum Cut {
+    /// Equal tiles.
+    Uniform(Grid),
+    /// Tiles that are cut in four as often as there is reason to.
+    Forest(Forest),
 }
 
-impl Axis {
-    fn new(min: f64, max: f64, count: u32) -> Self {
-        let edges = (0..=count).map(|i| min + (max - min) * (f64::from(i) / f64::from(count))).collect();
-        Self { edges, per_meter: f64::from(count) / (max - min) }
+impl Partition {
+    /// Cuts the rectangle from `min` to `max` into columns x rows of equal tiles, of which tile `row * columns + column` lies
+    /// there.
+    ///
+    /// # Errors
+    /// If that makes no tiles.
+    pub fn uniform(min: DVec2, max: DVec2, columns: u32, rows: u32) -> Result<Self, SetupError> {
+        Grid::new(min, max, columns, rows).map(|grid| Self(Cut::Uniform(grid)))
     }
 
-    fn count(&self) -> usize {
-        self.edges.len() - 1
+    /// Cuts the rectangle into columns x rows of equal squares, and those into four again and again, until each has the level
+    /// that is given: how often it was cut. Tiles are counted square by square, and in each in the order of a Z curve: lower
+    /// left, lower right, upper left, upper right.
+    ///
+    /// # Errors
+    /// If that makes no tiles, or the levels are not those of such a cut.
+    pub fn forest(min: DVec2, max: DVec2, columns: u32, rows: u32, levels: &[u8]) -> Result<Self, SetupError> {
+        Forest::new(Grid::new(min, max, columns, rows)?, levels).map(|forest| Self(Cut::Forest(forest)))
     }
 
-    /// The slot that holds `v`: a guess by multiplication, settled by comparing with the edges. NaN goes to the first.
-    #[inline]
-    fn locate(&self, v: f64) -> usize {
-        let last = self.count() - 1;
-        let mut slot = (((v - self.edges[0]) * self.per_meter) as usize).min(last);
-        while slot < last && v >= self.edges[slot + 1] {
-            slot += 1;
+    /// The levels of all tiles, if it is a [`forest`](Self::forest): with [`roots`](Self::roots) they tell all of it.
+    pub fn levels(&self) -> Option<&[u8]> {
+        match &self.0 {
+            Cut::Uniform(_) => None,
+            Cut::Forest(forest) => Some(forest.levels()),
         }
-        while slot > 0 && v < self.edges[slot] {
-            slot -= 1;
-        }
-        slot
     }
 
-    fn span(&self, slot: usize) -> (f64, f64) {
-        let low = if slot == 0 { f64::NEG_INFINITY } else { self.edges[slot] };
-        let high = if slot + 1 == self.count() { f64::INFINITY } else { self.edges[slot + 1] };
-        (low, high)
-    }
-}
-
-impl TileGrid {
-    /// Cuts the rectangle from `min` to `max` into equal tiles.
-    pub fn new(min: DVec2, max: DVec2, columns: u32, rows: u32) -> Result<Self, SetupError> {
-        let size = max - min;
-        let refuse = |must| SetupError::BadGrid { columns, rows, width: size.x, height: size.y, must };
-        if !(min.is_finite() && max.is_finite() && size.x > 0.0 && size.y > 0.0) {
-            return Err(refuse("the domain must be finite, its maximum above its minimum"));
-        }
-        if columns == 0 || rows == 0 {
-            return Err(refuse("there must be at least one column and one row"));
-        }
-        if u64::from(columns) * u64::from(rows) > u64::from(u32::MAX) {
-            return Err(refuse("at most 2^32 tiles can be named"));
-        }
-        let grid = Self { x: Axis::new(min.x, max.x, columns), y: Axis::new(min.y, max.y, rows) };
-        let rising = |axis: &Axis| axis.edges.windows(2).all(|pair| pair[0] < pair[1]);
-        if rising(&grid.x) && rising(&grid.y) { Ok(grid) } else { Err(refuse("the tiles must have a width")) }
-    }
-
-    /// Tiles along x.
-    pub fn columns(&self) -> usize {
-        self.x.count()
-    }
-
-    /// Tiles along y.
-    pub fn rows(&self) -> usize {
-        self.y.count()
+    /// Columns and rows of tiles; of a forest those of the squares that are cut further.
+    pub fn roots(&self) -> [u32; 2] {
+        [self.grid().columns() as u32, self.grid().rows() as u32]
     }
 
     /// How many tiles there are.
     pub fn tiles(&self) -> usize {
-        self.columns() * self.rows()
+        match &self.0 {
+            Cut::Uniform(grid) => grid.cells(),
+            Cut::Forest(forest) => forest.levels().len(),
+        }
     }
 
     /// The low corner of the domain.
     pub fn min(&self) -> DVec2 {
-        DVec2::new(self.x.edges[0], self.y.edges[0])
+        self.grid().min()
     }
 
     /// The high corner of the domain.
     pub fn max(&self) -> DVec2 {
-        DVec2::new(self.x.edges[self.columns()], self.y.edges[self.rows()])
+        self.grid().max()
     }
 
-    /// Width and height of a tile, in meters.
-    pub fn tile_size(&self) -> DVec2 {
-        (self.max() - self.min()) / DVec2::new(self.columns() as f64, self.rows() as f64)
+    fn grid(&self) -> &Grid {
+        match &self.0 {
+            Cut::Uniform(grid) => grid,
+            Cut::Forest(forest) => forest.roots(),
+        }
     }
 
     /// The tile that owns a body whose center of mass is at `point`.
     #[inline]
     pub fn locate(&self, point: DVec2) -> TileId {
-        self.tile_at(self.x.locate(point.x), self.y.locate(point.y))
+        match &self.0 {
+            Cut::Uniform(grid) => TileId(grid.locate(point)),
+            Cut::Forest(forest) => forest.locate(point),
+        }
     }
 
     /// The rectangle a tile owns; infinite where the tile is outermost.
     #[inline]
     pub fn region(&self, tile: TileId) -> Region {
-        // In 32 bits, in which division is fast.
-        let columns = self.columns() as u32;
-        let (column, row) = ((tile.0 % columns) as usize, (tile.0 / columns) as usize);
-        let ((min_x, max_x), (min_y, max_y)) = (self.x.span(column), self.y.span(row));
-        Region { min: DVec2::new(min_x, min_y), max: DVec2::new(max_x, max_y) }
+        match &self.0 {
+            Cut::Uniform(grid) => grid.region(tile.0),
+            Cut::Forest(forest) => forest.region(tile),
+        }
     }
 
-    /// A finite point to measure a tile's coordinates from: the low corner of its rectangle.
-    pub(crate) fn corner(&self, tile: TileId) -> DVec2 {
-        let (column, row) = (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
-        DVec2::new(self.x.edges[column], self.y.edges[row])
+    /// The part of the domain that a tile owns.
+    pub fn rectangle(&self, tile: TileId) -> Region {
+        match &self.0 {
+            Cut::Uniform(grid) => grid.rectangle(tile.0),
+            Cut::Forest(forest) => forest.rectangle(tile),
+        }
+    }
+
+    /// Where a tile's low corner is, counted in columns and rows of the smallest tiles, and how many of these there are.
+    pub fn cell(&self, tile: TileId) -> ([u64; 2], [u64; 2]) {
+        match &self.0 {
+            Cut::Uniform(grid) => {
+                (grid.place(tile.0).map(|place| place as u64), [grid.columns() as u64, grid.rows() as u64])
+            }
+            Cut::Forest(forest) => forest.cell(tile),
+        }
     }
 
     /// Every tile whose region, grown by `reach` on all sides, meets the box of the given half extents around `center`.
     /// In ascending order. Never assumes that these are neighbours of anything.
+    #[inline]
     pub fn reached(&self, center: DVec2, half: Vec2, reach: f64) -> impl Iterator<Item = TileId> + '_ {
-        let (columns, rows) = self.reached_span(center, half, reach);
-        rows.flat_map(move |row| columns.clone().map(move |column| self.tile_at(column, row)))
+        let half = half.as_dvec2() + DVec2::splat(reach);
+        self.met(center - half, center + half)
+    }
+
+    /// The tiles that share an edge or a corner with one, and this itself, in ascending order.
+    pub fn around(&self, tile: TileId) -> impl Iterator<Item = TileId> + '_ {
+        let Region { min, max } = self.rectangle(tile);
+        self.met(DVec2::new(min.x.next_down(), min.y.next_down()), max)
+    }
+
+    /// The tiles that meet a box, both of whose corners belong to it, in ascending order.
+    #[inline]
+    pub fn met(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = TileId> + '_ {
+        match &self.0 {
+            Cut::Uniform(grid) => Met::Uniform(grid.span(low, high)),
+            Cut::Forest(forest) => Met::Forest(forest.meeting(low, high)),
+        }
     }
 
     /// Whether two tiles share an edge or a corner, or are the same.
     pub(crate) fn are_neighbours(&self, a: TileId, b: TileId) -> bool {
-        let place = |tile: TileId| (tile.0 as usize % self.columns(), tile.0 as usize / self.columns());
-        let ((ax, ay), (bx, by)) = (place(a), place(b));
-        ax.abs_diff(bx) <= 1 && ay.abs_diff(by) <= 1
+        let (a, b) = (self.region(a), self.region(b));
+        a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
     }
 
-    /// Whether a tile is among those [`TileGrid::reached`].
+    /// Whether a tile is among those [`reached`](Self::reached).
     #[inline]
     pub(crate) fn reaches(&self, tile: TileId, center: DVec2, half: Vec2, reach: f64) -> bool {
-        let (region, half) = (self.region(tile), half.as_dvec2() + DVec2::splat(reach));
-        let (low, high) = (center - half, center + half);
-        // Bitwise `&`: four comparisons without a branch.
-        (low.x < region.max.x) & (low.y < region.max.y) & (high.x >= region.min.x) & (high.y >= region.min.y)
+        let half = half.as_dvec2() + DVec2::splat(reach);
+        self.region(tile).meets(center - half, center + half)
     }
+}
+
+/// The tiles that meet a box, ascending.
+#[derive(Clone, Debug)]
+enum Met<'a> {
+    Uniform(Span),
+    Forest(Meeting<'a>),
+}
+
+impl Iterator for Met<'_> {
+    type Item = TileId;
 
     #[inline]
-    fn reached_span(&self, center: DVec2, half: Vec2, reach: f64) -> (RangeInclusive<usize>, RangeInclusive<usize>) {
-        let (half_x, half_y) = (f64::from(half.x) + reach, f64::from(half.y) + reach);
-        (
-            self.x.locate(center.x - half_x)..=self.x.locate(center.x + half_x),
-            self.y.locate(center.y - half_y)..=self.y.locate(center.y + half_y),
-        )
-    }
-
-    fn tile_at(&self, column: usize, row: usize) -> TileId {
-        TileId((row * self.columns() + column) as u32)
+    fn next(&mut self) -> Option<TileId> {
+        match self {
+            Met::Uniform(span) => span.next().map(TileId),
+            Met::Forest(meeting) => meeting.next(),
+        }
     }
 }
 
@@ -177,6 +192,24 @@ impl Region {
     /// The same rectangle moved inward on every side; a point within it is further than `inset` from any other tile.
     pub(crate) fn shrunk(&self, inset: f64) -> Self {
         Self { min: self.min + DVec2::splat(inset), max: self.max - DVec2::splat(inset) }
+    }
+
+    /// Width and height, in meters.
+    pub fn size(&self) -> DVec2 {
+        self.max - self.min
+    }
+
+    /// Whether it meets a box, both of whose corners belong to that.
+    #[inline(always)]
+    pub(crate) fn meets(&self, low: DVec2, high: DVec2) -> bool {
+        // Bitwise `&`: four comparisons without a branch.
+        (low.x < self.max.x) & (low.y < self.max.y) & (high.x >= self.min.x) & (high.y >= self.min.y)
+    }
+
+    /// The point within that is nearest to a point; what is no number counts as little.
+    pub(crate) fn nearest(&self, point: DVec2) -> DVec2 {
+        let nearest = |v: f64, min: f64, max: f64| v.max(min).min(max.next_down());
+        DVec2::new(nearest(point.x, self.min.x, self.max.x), nearest(point.y, self.min.y, self.max.y))
     }
 
     /// Whether a point lies within.

@@ -1,26 +1,50 @@
 //! Owners and regions against each other and against trying every tile.
 
-use super::TileGrid;
+use super::{Adaptive, Partition, Region};
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
 use crate::testing::cases;
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 
-fn any_grid() -> impl Strategy<Value = TileGrid> {
+/// The levels of a forest, in which squares are cut as a list of choices has it.
+fn levels(roots: usize, choices: &[bool]) -> Vec<u8> {
+    fn grow(level: u8, choices: &mut impl Iterator<Item = bool>, levels: &mut Vec<u8>) {
+        if level < 6 && choices.next() == Some(true) {
+            (0..4).for_each(|_| grow(level + 1, choices, levels));
+        } else {
+            levels.push(level);
+        }
+    }
+    let (mut levels, mut choices) = (Vec::new(), choices.iter().copied());
+    (0..roots).for_each(|_| grow(0, &mut choices, &mut levels));
+    levels
+}
+
+fn any_uniform(most: u32) -> impl Strategy<Value = Partition> {
     let low = prop_oneof![Just(0.0), -1e3..1e3, -1e9..1e9];
     let size = (-2.0_f64..6.0).prop_map(|exponent| 10.0_f64.powf(exponent));
-    (low.clone(), low, size.clone(), size, 1_u32..=40, 1_u32..=40).prop_filter_map(
+    (low.clone(), low, size.clone(), size, 1..=most, 1..=most).prop_filter_map(
         "tiles without a width",
         |(x, y, width, height, columns, rows)| {
             let min = DVec2::new(x, y);
-            TileGrid::new(min, min + DVec2::new(width, height), columns, rows).ok()
+            Partition::uniform(min, min + DVec2::new(width, height), columns, rows).ok()
         },
     )
 }
 
-fn tiles(grid: &TileGrid) -> impl Iterator<Item = TileId> + use<> {
-    (0..grid.tiles() as u32).map(TileId)
+fn any_partition() -> impl Strategy<Value = Partition> {
+    let choices = prop::collection::vec(any::<bool>(), 1..200);
+    let forest = (any_uniform(3), choices).prop_filter_map("tiles without a width", |(squares, choices)| {
+        let [columns, rows] = squares.roots();
+        let levels = levels(squares.tiles(), &choices);
+        Partition::forest(squares.min(), squares.max(), columns, rows, &levels).ok()
+    });
+    prop_oneof![any_uniform(40), forest]
+}
+
+fn tiles(partition: &Partition) -> impl Iterator<Item = TileId> + use<> {
+    (0..partition.tiles() as u32).map(TileId)
 }
 
 /// One coordinate: anywhere, outside, or exactly upon or right beside one of the edges.
@@ -36,30 +60,18 @@ fn coordinate(edges: &[f64], pick: prop::sample::Index, part: f64, how: u8) -> f
     }
 }
 
-fn any_point_in(grid: TileGrid) -> impl Strategy<Value = (TileGrid, DVec2)> {
+fn any_point_in(partition: Partition) -> impl Strategy<Value = (Partition, DVec2)> {
     let axis = (any::<prop::sample::Index>(), 0.0..1.0, 0_u8..8);
     (axis.clone(), axis).prop_map(move |((px, x, how_x), (py, y, how_y))| {
-        let edges = |low: f64, high: f64, count: usize| -> Vec<f64> {
-            let region = |i: usize| {
-                if i == 0 {
-                    low
-                } else if i == count {
-                    high
-                } else {
-                    f64::NAN
-                }
-            };
-            (0..=count).map(region).collect()
+        let edges = |axis: fn(DVec2) -> f64| {
+            let rectangles = tiles(&partition).map(|tile| partition.rectangle(tile));
+            let mut edges: Vec<f64> = rectangles.flat_map(|Region { min, max }| [axis(min), axis(max)]).collect();
+            edges.sort_unstable_by(f64::total_cmp);
+            edges.dedup();
+            edges
         };
-        let mut columns = edges(grid.min().x, grid.max().x, grid.columns());
-        let mut rows = edges(grid.min().y, grid.max().y, grid.rows());
-        for (i, edge) in columns.iter_mut().enumerate().skip(1).take(grid.columns() - 1) {
-            *edge = grid.region(TileId(i as u32)).min.x;
-        }
-        for (i, edge) in rows.iter_mut().enumerate().skip(1).take(grid.rows() - 1) {
-            *edge = grid.region(TileId((i * grid.columns()) as u32)).min.y;
-        }
-        (grid.clone(), DVec2::new(coordinate(&columns, px, x, how_x), coordinate(&rows, py, y, how_y)))
+        let (columns, rows) = (edges(|point| point.x), edges(|point| point.y));
+        (partition.clone(), DVec2::new(coordinate(&columns, px, x, how_x), coordinate(&rows, py, y, how_y)))
     })
 }
 
@@ -67,36 +79,137 @@ proptest! {
     #![proptest_config(cases(512))]
 
     #[test]
-    fn every_point_belongs_to_the_tile_that_contains_it((grid, point) in any_grid().prop_flat_map(any_point_in)) {
-        let owner = grid.locate(point);
-        let containing: Vec<_> = tiles(&grid).filter(|&tile| grid.region(tile).contains(point)).collect();
+    fn every_point_belongs_to_the_tile_that_contains_it(
+        (partition, point) in any_partition().prop_flat_map(any_point_in)
+    ) {
+        let owner = partition.locate(point);
+        let containing: Vec<_> = tiles(&partition).filter(|&tile| partition.region(tile).contains(point)).collect();
         prop_assert_eq!(containing, vec![owner]);
+        prop_assert_eq!(partition.region(owner).nearest(point), point);
+        let elsewhere = partition.region(TileId(0)).nearest(point);
+        prop_assert_eq!(partition.locate(elsewhere), TileId(0));
     }
 
     #[test]
     fn a_box_reaches_the_tiles_that_it_meets(
-        (grid, point) in any_grid().prop_flat_map(any_point_in),
+        (partition, point) in any_partition().prop_flat_map(any_point_in),
         half in (0.0_f32..1.0, 0.0_f32..1.0),
         reach in 0.0_f64..0.3,
     ) {
         // Some tiles wide.
-        let half = Vec2::new(half.0, half.1) * grid.tile_size().as_vec2() * 3.0;
-        let reach = reach * grid.tile_size().x;
+        let size = partition.rectangle(TileId(0)).size();
+        let half = Vec2::new(half.0, half.1) * size.as_vec2() * 3.0;
+        let reach = reach * size.x;
         let grown = half.as_dvec2() + DVec2::splat(reach);
         let (low, high) = (point - grown, point + grown);
         let meets = |tile: &TileId| {
-            let region = grid.region(*tile);
+            let region = partition.region(*tile);
             low.x < region.max.x && high.x >= region.min.x && low.y < region.max.y && high.y >= region.min.y
         };
-        let reached: Vec<_> = grid.reached(point, half, reach).collect();
-        prop_assert_eq!(&reached, &tiles(&grid).filter(meets).collect::<Vec<_>>());
-        prop_assert!(reached.contains(&grid.locate(point)));
+        let reached: Vec<_> = partition.reached(point, half, reach).collect();
+        prop_assert_eq!(&reached, &tiles(&partition).filter(meets).collect::<Vec<_>>());
+        prop_assert!(reached.contains(&partition.locate(point)));
+        prop_assert!(tiles(&partition).all(|tile| reached.contains(&tile) == partition.reaches(tile, point, half, reach)));
+    }
+
+    #[test]
+    fn neighbours_share_an_edge_or_a_corner(partition in any_partition(), pick in any::<prop::sample::Index>()) {
+        let tile = TileId(pick.index(partition.tiles()) as u32);
+        let own = partition.rectangle(tile);
+        let touches = |other: &TileId| {
+            let other = partition.rectangle(*other);
+            own.min.cmple(other.max).all() && other.min.cmple(own.max).all()
+        };
+        let expected: Vec<_> = tiles(&partition).filter(touches).collect();
+        prop_assert_eq!(partition.around(tile).collect::<Vec<_>>(), &expected[..]);
+        prop_assert!(tiles(&partition).all(|other| partition.are_neighbours(tile, other) == expected.contains(&other)));
+    }
+
+    /// Of one forest from another over the same squares.
+    #[test]
+    fn what_changes_takes_up_the_same_place(
+        squares in any_uniform(3),
+        choices in [prop::collection::vec(any::<bool>(), 1..90), prop::collection::vec(any::<bool>(), 1..90)],
+    ) {
+        let [columns, rows] = squares.roots();
+        let forests = choices.map(|choices| {
+            Partition::forest(squares.min(), squares.max(), columns, rows, &levels(squares.tiles(), &choices))
+        });
+        let [Ok(old), Ok(new)] = forests else { return Ok(()) };
+        let changes = old.changes(&new).unwrap();
+        let ends = changes.last().map(|last| (last.old.end as usize, last.new.end as usize));
+        prop_assert_eq!(ends, Some((old.tiles(), new.tiles())));
+        for change in changes {
+            prop_assert!(change.old.len() == 1 || change.new.len() == 1);
+            let corners = |partition: &Partition, range: &std::ops::Range<u32>| {
+                let first = partition.rectangle(TileId(range.start)).min;
+                (first, partition.rectangle(TileId(range.end - 1)).max)
+            };
+            prop_assert_eq!(corners(&old, &change.old), corners(&new, &change.new));
+        }
+    }
+
+    #[test]
+    fn tiles_are_cut_where_many_are_and_joined_where_few_are(
+        places in prop::collection::vec((0.0_f64..1.0, 0.0_f64..1.0), 0..600),
+        skew in 1.0_f64..6.0,
+        most in 1_u64..60,
+    ) {
+        let rule = Adaptive { max_bodies: most, least_side: 1e-2 };
+        let place = |&(x, y): &(f64, f64)| DVec2::new(x.powf(skew), y.powf(skew));
+        let count = |partition: &Partition| {
+            let mut counts = vec![0; partition.tiles()];
+            places.iter().for_each(|at| counts[partition.locate(place(at)).0 as usize] += 1);
+            counts
+        };
+        let bodies = || places.iter().map(|at| (place(at), 1));
+        let cut = Partition::adaptive(DVec2::ZERO, DVec2::ONE, [2, 1], &rule, bodies()).unwrap();
+        let small = |tile: usize| cut.rectangle(TileId(tile as u32)).size().min_element() < 2e-2;
+        prop_assert!(count(&cut).iter().enumerate().all(|(tile, &bodies)| bodies <= most || small(tile)));
+        // A census of it changes nothing; with nobody left all is joined; and from there all is cut again.
+        let census = |partition: &Partition, rule: &Adaptive, bodies: &[DVec2]| {
+            let mut census = Vec::new();
+            for tile in tiles(partition) {
+                let mut own: Vec<DVec2> = bodies.iter().copied().filter(|at| partition.locate(*at) == tile).collect();
+                let level = partition.levels().unwrap()[tile.0 as usize];
+                rule.count(tile, level, partition.rectangle(tile), &mut own, &mut census);
+            }
+            census
+        };
+        let all: Vec<DVec2> = places.iter().map(place).collect();
+        prop_assert_eq!(cut.adapted(&rule, &census(&cut, &rule, &all)).unwrap(), None);
+        let empty = cut.adapted(&rule, &census(&cut, &rule, &[])).unwrap();
+        let empty = empty.unwrap_or_else(|| cut.clone());
+        prop_assert_eq!(empty.levels(), Some(&[0, 0][..]));
+        let again = empty.adapted(&rule, &census(&empty, &rule, &all)).unwrap().unwrap_or(empty);
+        prop_assert_eq!(&again, &cut);
+        // What is no census of it is refused.
+        let short = census(&cut, &rule, &all);
+        prop_assert!(cut.adapted(&rule, &short[1..]).is_err());
     }
 }
 
 #[test]
+fn levels_that_are_no_cut_are_refused() {
+    let forest = |levels: &[u8]| Partition::forest(DVec2::ZERO, DVec2::ONE, 1, 1, levels);
+    let z = [1, 1, 2, 2, 2, 2, 1];
+    assert_eq!(forest(&z).unwrap().levels(), Some(&z[..]));
+    let corners: Vec<_> =
+        tiles(&forest(&z).unwrap()).map(|tile| forest(&z).unwrap().rectangle(tile).min.to_array()).collect();
+    assert_eq!(corners, [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.25, 0.5], [0.0, 0.75], [0.25, 0.75], [0.5, 0.5]]);
+    assert_eq!(forest(&z).unwrap().cell(TileId(3)), ([1, 2], [4, 4]));
+    for (levels, tile) in [(&[][..], 0), (&[1, 1, 1], 3), (&[1, 1, 1, 1, 1], 4), (&[2, 1, 1, 1, 1], 1), (&[25; 4], 0)] {
+        let error = forest(levels).unwrap_err();
+        assert_eq!(error, SetupError::BadForest { tile: TileId(tile) }, "{levels:?}");
+    }
+    // Between two neighbouring numbers there is no middle.
+    let far = DVec2::splat(1e16);
+    assert!(Partition::forest(far, far + 2.0, 1, 1, &[1; 4]).is_err());
+}
+
+#[test]
 fn what_is_no_point_belongs_to_some_tile_all_the_same() {
-    let grid = TileGrid::new(DVec2::ZERO, DVec2::new(4.0, 3.0), 4, 3).unwrap();
+    let partition = Partition::uniform(DVec2::ZERO, DVec2::new(4.0, 3.0), 4, 3).unwrap();
     let (inf, nan) = (f64::INFINITY, f64::NAN);
     for (x, y, tile) in [
         (inf, inf, 11),
@@ -108,36 +221,36 @@ fn what_is_no_point_belongs_to_some_tile_all_the_same() {
         (2.5, nan, 2),
         (nan, nan, 0),
     ] {
-        assert_eq!(grid.locate(DVec2::new(x, y)), TileId(tile), "({x}, {y})");
+        assert_eq!(partition.locate(DVec2::new(x, y)), TileId(tile), "({x}, {y})");
     }
-    assert!(tiles(&grid).all(|tile| !grid.region(tile).contains(DVec2::new(nan, 1.0))));
+    assert!(tiles(&partition).all(|tile| !partition.region(tile).contains(DVec2::new(nan, 1.0))));
     // Nor does a box without bounds break anything: it reaches everywhere.
-    assert_eq!(grid.reached(DVec2::ONE, Vec2::splat(f32::INFINITY), 0.0).count(), 12);
+    assert_eq!(partition.reached(DVec2::ONE, Vec2::splat(f32::INFINITY), 0.0).count(), 12);
 }
 
 #[test]
 fn regions_are_half_open_and_share_their_edges() {
-    let grid = TileGrid::new(DVec2::new(-1.0, 2.0), DVec2::new(1.1, 3.3), 7, 5).unwrap();
+    let partition = Partition::uniform(DVec2::new(-1.0, 2.0), DVec2::new(1.1, 3.3), 7, 5).unwrap();
     for row in 0..5 {
         for column in 0..7 {
-            let region = |column: u32, row: u32| grid.region(TileId(row * 7 + column));
+            let region = |column: u32, row: u32| partition.region(TileId(row * 7 + column));
             let own = region(column, row);
             let right = if column < 6 { region(column + 1, row).min.x } else { f64::INFINITY };
             let above = if row < 4 { region(column, row + 1).min.y } else { f64::INFINITY };
             assert_eq!((own.max.x, own.max.y), (right, above));
             if column > 0 && row > 0 {
                 assert!(own.contains(own.min));
-                assert_eq!(grid.corner(TileId(row * 7 + column)), own.min);
+                assert_eq!(partition.rectangle(TileId(row * 7 + column)).min, own.min);
             }
         }
     }
-    assert_eq!(grid.region(TileId(0)).min, DVec2::splat(f64::NEG_INFINITY));
-    assert_eq!(grid.corner(TileId(0)), grid.min());
+    assert_eq!(partition.region(TileId(0)).min, DVec2::splat(f64::NEG_INFINITY));
+    assert_eq!(partition.rectangle(TileId(0)).min, partition.min());
 }
 
 #[test]
 fn grids_without_sense_are_refused() {
-    let refused = |min: DVec2, max: DVec2, columns, rows| match TileGrid::new(min, max, columns, rows) {
+    let refused = |min: DVec2, max: DVec2, columns, rows| match Partition::uniform(min, max, columns, rows) {
         Err(error @ SetupError::BadGrid { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };

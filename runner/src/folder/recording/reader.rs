@@ -6,10 +6,14 @@ use super::segment::Segment;
 use super::stage::{Stage, StageText};
 use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
 use crate::folder::ended::Ended;
+use crate::folder::run_folder::TILINGS;
+use crate::folder::tilings::Tilings;
+use atoll_core::Partition;
 use std::fs;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A recording. Its files are opened as they are needed, never all at once.
 #[derive(Clone, Debug)]
@@ -24,6 +28,8 @@ pub struct Recording {
     steps: Vec<u64>,
     incomplete: usize,
     ended: Option<Ended>,
+    /// Empty where tiles stay as they are.
+    tilings: Tilings,
 }
 
 /// What one rank recorded of one step.
@@ -76,6 +82,8 @@ impl Recording {
         let bad = |reason| RecordingError::BadSegment { path: recording.files[0].clone(), reason };
         recording.stage = stage.map_err(bad)?;
         recording.ended = Ended::read(folder).ok().flatten();
+        let RunFacts { domain, tiles, .. } = recording.facts;
+        recording.tilings = Tilings::read(&folder.join(TILINGS), domain, tiles);
         (recording.steps, recording.incomplete) =
             recording.find_complete(recording.ended.as_ref().map(|ended| ended.steps))?;
         if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
@@ -131,8 +139,26 @@ impl Recording {
         let (folder, stage) = (folder.to_owned(), first.and_then(|first| first.stage));
         Ok(last.map(|(_, facts)| {
             let steps = Vec::new();
-            (Self { folder, facts, stage: None, files, parts, steps, incomplete: 0, ended: None }, stage)
+            (
+                Self {
+                    folder,
+                    facts,
+                    stage: None,
+                    files,
+                    parts,
+                    steps,
+                    incomplete: 0,
+                    ended: None,
+                    tilings: Tilings::default(),
+                },
+                stage,
+            )
         }))
+    }
+
+    /// The tiles with which a step was made, if they follow the bodies.
+    pub(crate) fn tiling(&self, step: u64) -> Option<&Arc<Partition>> {
+        self.tilings.at(step)
     }
 
     /// The folder it is in.

@@ -38,8 +38,11 @@ pub struct Facts {
     pub rank: u32,
     /// Of so many.
     pub ranks: u32,
-    /// Columns and rows of tiles of the whole world.
+    /// Columns and rows of tiles of the whole world, or of the squares that they are cut from.
     pub tiles: [u32; 2],
+    /// Of tiles that follow the bodies: how often each was cut from its square, a letter for each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels: Option<String>,
     /// Of its run, as [`Config::identity`](crate::Config::identity).
     pub identity: String,
 }
@@ -82,11 +85,11 @@ impl SnapshotWriter {
     /// Writes what a rank of so many has to save; `tiles` and `identity` are those of the whole run.
     pub(crate) fn new(rank: u32, ranks: u32, tiles: [u32; 2], identity: String) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, identity } }
+        Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, levels: None, identity } }
     }
 
     /// Writes the tiles that were saved after `step` to `blocks`, one after the other, to a file that is whole and durable
-    /// when it has its name. Returns that name.
+    /// when it has its name. Returns that name. `levels` are those of all tiles, if these follow the bodies.
     ///
     /// # Errors
     /// What the system says, with the file.
@@ -94,10 +97,12 @@ impl SnapshotWriter {
         &mut self,
         snapshots: &Path,
         step: u64,
+        levels: Option<&str>,
         tiles: &[SavedTile],
         blocks: &[u8],
     ) -> Result<PathBuf, (PathBuf, io::Error)> {
         self.facts.step = step;
+        self.facts.levels = levels.map(str::to_owned);
         let folder = snapshots.join(super::store::folder_name(step));
         let path = folder.join(super::store::file_name(self.facts.rank, self.facts.ranks));
         let head = head(&self.facts, tiles);

@@ -2,7 +2,8 @@
 
 use super::{SnapshotError, SnapshotFile, store};
 use crate::config::other_run;
-use atoll_core::{Hashes, TileId, World};
+use crate::plan::tiles::of_letters;
+use atoll_core::{Hashes, Partition, TileId, World};
 use std::path::{Path, PathBuf};
 
 /// A snapshot of which all files are there, with every tile in one of them.
@@ -27,14 +28,16 @@ impl Snapshot {
         let files: Vec<_> = paths.iter().map(|path| SnapshotFile::open(path)).collect::<Result<_, _>>()?;
         let (first, ranks) = (&files[0].facts, files.len() as u32);
         let tiles: usize = files.iter().map(|file| file.blocks.len()).sum();
-        if u64::from(first.tiles[0]) * u64::from(first.tiles[1]) != tiles as u64 {
+        let [columns, rows] = first.tiles.map(u64::from);
+        if first.levels.as_ref().map_or(columns * rows, |levels| levels.len() as u64) != tiles as u64 {
             return Err(SnapshotError::damaged(folder, format!("its files have {tiles} tiles, not those of its grid")));
         }
         let mut places = vec![None; tiles];
         for ((number, file), path) in (0..).zip(&files).zip(&paths) {
             let facts = &file.facts;
             let alike = (facts.rank, facts.ranks) == (number, ranks)
-                && (facts.step, facts.tiles, &facts.identity) == (first.step, first.tiles, &first.identity);
+                && (facts.step, facts.tiles, &facts.levels) == (first.step, first.tiles, &first.levels)
+                && facts.identity == first.identity;
             if !alike {
                 return Err(SnapshotError::damaged(path, "it belongs to another snapshot"));
             }
@@ -72,7 +75,23 @@ impl Snapshot {
         self.files[0].facts.step
     }
 
-    /// Columns and rows of tiles.
+    /// The tiles that it was saved with, in a run that began with these.
+    ///
+    /// # Errors
+    /// If there are no such tiles.
+    pub fn partition(&self, first: &Partition) -> Result<Partition, SnapshotError> {
+        let facts = &self.files[0].facts;
+        let damaged = || SnapshotError::damaged(&self.folder, "its tiles are not those of its run");
+        if facts.levels.is_some() != first.levels().is_some() {
+            return Err(damaged());
+        }
+        let Some(levels) = &facts.levels else { return Ok(first.clone()) };
+        let levels = of_letters(levels).ok_or_else(damaged)?;
+        let [columns, rows] = first.roots();
+        Partition::forest(first.min(), first.max(), columns, rows, &levels).map_err(|_| damaged())
+    }
+
+    /// Columns and rows of tiles, or of the squares that they are cut from.
     pub fn tiles(&self) -> [u32; 2] {
         self.files[0].facts.tiles
     }

@@ -33,7 +33,7 @@ fn write(plan: &Plan, snapshots: &Path, step: u64) -> Hashes {
     for (rank, tiles) in [(0, [0, 3]), (1, [1, 2])] {
         let (world, mut blocks) = (world(plan, &tiles), Vec::new());
         let saved = world.save(&mut blocks);
-        SnapshotWriter::new(rank, 2, plan.tiles, identity(plan)).write(snapshots, step, &saved, &blocks).unwrap();
+        SnapshotWriter::new(rank, 2, plan.tiles, identity(plan)).write(snapshots, step, None, &saved, &blocks).unwrap();
         hashes = hashes.merge(world.hashes());
     }
     hashes

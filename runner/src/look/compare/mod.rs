@@ -15,7 +15,7 @@ pub use plot::svg;
 use crate::config;
 use crate::folder::Ended;
 use crate::folder::recording::{Recording, RecordingError, Row};
-use atoll_core::TileGrid;
+use atoll_core::Partition;
 use glam::DVec2;
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -231,7 +231,7 @@ fn in_letters<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Err
 
 impl Difference {
     fn new(step: u64, rows: [&[Row]; 2], sides: [&Recording; 2]) -> Self {
-        let [a, b] = [0, 1].map(|i| rows[i].first().map(|row| State::new(row, sides[i])));
+        let [a, b] = [0, 1].map(|i| rows[i].first().map(|row| State::new(step, row, sides[i])));
         let id = rows.iter().find_map(|rows| rows.first()).map_or(0, |row| row.id);
         let times = rows.map(<[Row]>::len);
         let once = a.zip(b).filter(|_| times == [1, 1]);
@@ -241,13 +241,14 @@ impl Difference {
 }
 
 impl State {
-    fn new(row: &Row, recording: &Recording) -> Self {
+    fn new(step: u64, row: &Row, recording: &Recording) -> Self {
         let facts = recording.facts();
         let [low, high] = facts.domain;
         // A domain that makes no grid comes from no run.
-        let grid = TileGrid::new(low, high, facts.tiles[0], facts.tiles[1]).ok();
+        let equal = || Partition::uniform(low, high, facts.tiles[0], facts.tiles[1]).ok();
+        let partition = recording.tiling(step).map(|partition| (**partition).clone()).or_else(equal);
         let position = DVec2::new(row.x, row.y);
-        let tile = grid.filter(|_| position.is_finite()).map(|grid| grid.locate(position).0);
+        let tile = partition.filter(|_| position.is_finite()).map(|partition| partition.locate(position).0);
         let &Row { id: _, x, y, angle, vx, vy, omega, kind, padding: _ } = row;
         let kind = recording.stage().map(|_| kind);
         Self { tile, x, y, angle, vx, vy, omega, kind }

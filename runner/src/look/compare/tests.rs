@@ -82,8 +82,8 @@ fn the_last_bit_of_one_body_at_one_step_is_found() {
     assert_eq!((first.step, first.id, first.columns.as_slice(), first.times), (35, 111, &["vx"][..], [1, 1]));
     let (was, state) = (body(111, 35), first.a.unwrap());
     assert_eq!((state.x, state.vx, first.b.unwrap().vx), (was.position.x, was.velocity.x, was.velocity.x.next_up()));
-    let grid = TileGrid::new(DVec2::new(-20.0, 0.0), DVec2::new(20.0, 20.0), 4, 2).unwrap();
-    assert_eq!(state.tile, Some(grid.locate(was.position).0));
+    let partition = Partition::uniform(DVec2::new(-20.0, 0.0), DVec2::new(20.0, 20.0), 4, 2).unwrap();
+    assert_eq!(state.tile, Some(partition.locate(was.position).0));
     for step in &comparison.steps {
         let change = f64::from(was.velocity.x.next_up()) - f64::from(was.velocity.x);
         let expected = if step.step == 35 { (1, change, Some(111)) } else { (0, 0.0, None) };

@@ -88,9 +88,9 @@ impl Viewer {
         let blueprint = plan.blueprint.clone();
         let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
         let hertz = facts.hertz().expect("every configuration has a frequency");
-        let (grid, kinds, statics) = (blueprint.grid, blueprint.kinds, blueprint.statics);
+        let (partition, kinds, statics) = (blueprint.partition, blueprint.kinds, blueprint.statics);
         let ranks_of_tiles = plan.assignment.ranks_of_tiles().to_vec();
-        let setting = Setting { grid, kinds, statics, hertz };
+        let setting = Setting { partition, kinds, statics, hertz };
         let last_step = plan.config.run.steps;
         if let Some(desk) = &desk {
             let source = scenery::source(name.to_owned(), &setting, ranks_of_tiles.clone());

@@ -248,7 +248,7 @@ fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range:
     let mut sketch = Sketch::new(paper, setting, gaze, None::<Empty<Region>>);
     let (by, tint) = (gaze.color, Tint::new(gaze.color, range));
     let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
-    let mut from = 0;
+    let (mut from, partition) = (0, frame.partition(setting));
     for &(rank, to) in &frame.ranks {
         let of_rank = Tint::numbered(rank);
         for row in &frame.bodies[from..to] {
@@ -256,7 +256,7 @@ fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range:
             let color = || match by {
                 ColorBy::Kind => kinds.get(row.kind as usize).copied().unwrap_or(Tint::asleep(None)),
                 ColorBy::Speed | ColorBy::Spin => tint.moving(row.vx, row.vy, row.omega),
-                ColorBy::Tile => Tint::tile(setting.grid.locate(place).0 as usize, setting.grid.columns()),
+                ColorBy::Tile => Tint::tile(partition.locate(place), partition),
                 ColorBy::Rank => of_rank,
                 // No recording tells.
                 ColorBy::Contacts | ColorBy::Asleep => Tint::asleep(None),
@@ -285,7 +285,7 @@ impl Track {
         let near = frame.bodies.iter().enumerate().filter_map(|(i, row)| Some((distance(row)?, i)));
         let (_, i) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let row = &frame.bodies[i];
-        let tile = setting.grid.locate(DVec2::new(row.x, row.y)).0;
+        let tile = frame.partition(setting).locate(DVec2::new(row.x, row.y)).0;
         let rank = frame.ranks.get(frame.ranks.partition_point(|(_, end)| *end <= i)).map_or(0, |(rank, _)| *rank);
         Some((Found { tile, angle: row.angle, ..Found::of(&body(row)) }, rank))
     }

@@ -87,16 +87,16 @@ fn measure(by: ColorBy, world: &World) -> Vec<f32> {
 
 fn look(gaze: &Gaze, most: f32, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
     let begun = Instant::now();
-    let regions = held.world.views().map(|tile| setting.grid.region(tile.id()));
+    let regions = held.world.views().map(|tile| held.world.partition().region(tile.id()));
     let mut sketch = Sketch::new(paper, setting, gaze, Some(regions));
     let tint = Tint::new(gaze.color, Range { most });
     let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
     let rank = Tint::numbered(held.rank.0);
     for tile in held.world.views() {
-        if !sketch.sees(&setting.grid.region(tile.id())) {
+        if !sketch.sees(&held.world.partition().region(tile.id())) {
             continue;
         }
-        let of_tile = Tint::tile(tile.id().0 as usize, setting.grid.columns());
+        let of_tile = Tint::tile(tile.id(), held.world.partition());
         let counts = if gaze.color == ColorBy::Contacts { contacts(&tile) } else { Vec::new() };
         let asleep = tile.asleep();
         // One loop for each, that each is quick.
@@ -163,7 +163,7 @@ pub(super) fn portion(answer: &[u8]) -> Option<Answered<'_>> {
 fn find(id: Option<u64>, place: DVec2, reach: f64, setting: &Setting, world: &World) -> Option<Found> {
     let near = |tile: &TileView<'_>| {
         let radius = setting.kinds.iter().map(|kind| f64::from(kind.shape.bounding_radius())).fold(0.0, f64::max);
-        let (region, far) = (setting.grid.region(tile.id()), DVec2::splat(reach + 2.0 * radius));
+        let (region, far) = (world.partition().region(tile.id()), DVec2::splat(reach + 2.0 * radius));
         id.is_some() || ((region.min - far).cmple(place).all() && (region.max + far).cmpge(place).all())
     };
     let mut best: Option<(f64, TileView<'_>, usize, Body)> = None;

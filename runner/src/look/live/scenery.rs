@@ -20,7 +20,7 @@ pub(super) fn hello(sources: Vec<Source>, recorded: bool, steps: Vec<u64>, last_
 
 /// A world.
 pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) -> Source {
-    let (low, high) = (setting.grid.min(), setting.grid.max());
+    let (low, high) = (setting.partition.min(), setting.partition.max());
     let fixed = |body: &atoll_core::StaticBody| {
         let [half_x, half_y, radius] = outline(&body.kind.shape).map(f64::from);
         let (c, s) = (f64::from(body.rotation.c), f64::from(body.rotation.s));
@@ -29,7 +29,7 @@ pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) ->
     Source {
         name,
         domain: [low.x, low.y, high.x, high.y],
-        tiles: [setting.grid.columns() as u32, setting.grid.rows() as u32],
+        tiles: setting.partition.roots(),
         rank_of_tile,
         shapes: setting.kinds.iter().map(|kind| outline(&kind.shape)).collect(),
         statics: setting.statics.iter().map(fixed).collect(),

@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn coarse_densities_lie_where_fine_ones_do() {
         let setting = Setting {
-            grid: atoll_core::TileGrid::new(DVec2::ZERO, DVec2::splat(100.0), 1, 1).unwrap(),
+            partition: atoll_core::Partition::uniform(DVec2::ZERO, DVec2::splat(100.0), 1, 1).unwrap(),
             kinds: vec![atoll_core::Kind {
                 shape: atoll_core::Shape::Circle { radius: 0.05 },
                 material: atoll_core::Material::default(),

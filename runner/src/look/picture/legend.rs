@@ -56,7 +56,11 @@ impl Legend {
             ColorBy::Asleep => ("state", None, vec![square(colors::AWAKE, "awake"), square(colors::ASLEEP, "asleep")]),
         };
         if by == ColorBy::Tile {
-            let count = format!("{} × {}, told apart by color", setting.grid.columns(), setting.grid.rows());
+            let [columns, lines] = setting.partition.roots();
+            let count = match setting.partition.levels() {
+                Some(_) => "as many as are needed, told apart by color".to_owned(),
+                None => format!("{columns} × {lines}, told apart by color"),
+            };
             rows.push((Sign::Square(colors::tile(0, 0)), count));
         }
         rows.push(square(colors::STATIC, "never moves"));

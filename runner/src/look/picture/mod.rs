@@ -147,7 +147,7 @@ impl Painter {
 
     fn draw_tiles(&mut self, frame: &Frame, fit: &Fit) {
         let unit = self.canvas.size()[1] / 1080.0;
-        let edges = Edges::new(&self.setting.grid, fit);
+        let edges = Edges::new(frame.partition(&self.setting), fit);
         edges.draw_grid(&mut self.canvas, unit);
         let mut ranks = take(&mut self.ranks);
         tiles::ranks_of_tiles(&self.setting, frame, &mut ranks);

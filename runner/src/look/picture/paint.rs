@@ -4,6 +4,7 @@ use super::canvas::Rgb;
 use super::colors::{self, Scale};
 use crate::folder::recording::Row;
 use crate::look::frame::{Frame, Setting};
+use atoll_core::{Partition, TileId};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -130,9 +131,11 @@ impl Tint {
         self.table[along as usize]
     }
 
-    /// Of a body in a tile of a grid with so many columns.
-    pub(crate) fn tile(tile: usize, columns: usize) -> Rgb {
-        colors::tile(tile % columns, tile / columns)
+    /// Of a body in a tile.
+    pub(crate) fn tile(tile: TileId, partition: &Partition) -> Rgb {
+        // Equal tiles are told apart by columns and rows; others, which have none, by their names.
+        let columns = if partition.levels().is_some() { u32::MAX } else { partition.roots()[0] };
+        colors::tile((tile.0 % columns) as usize, (tile.0 / columns) as usize)
     }
 
     /// Of a kind, or a rank.
@@ -178,8 +181,8 @@ impl<'a> Paint<'a> {
             ColorBy::Kind => Tint::numbered(row.kind),
             ColorBy::Speed | ColorBy::Spin => self.tint.moving(row.vx, row.vy, row.omega),
             ColorBy::Tile => {
-                let tile = self.setting.grid.locate(DVec2::new(row.x, row.y)).0 as usize;
-                Tint::tile(tile, self.setting.grid.columns())
+                let partition = self.frame.partition(self.setting);
+                Tint::tile(partition.locate(DVec2::new(row.x, row.y)), partition)
             }
             ColorBy::Rank => {
                 let ranks = &self.frame.ranks;

@@ -7,7 +7,7 @@ use super::paint::round_up;
 use super::*;
 use crate::folder::recording::Row;
 use crate::look::frame::Live;
-use atoll_core::{GlobalId, Kind, Material, Rot, Shape, StaticBody, TileGrid};
+use atoll_core::{GlobalId, Kind, Material, Partition, Rot, Shape, StaticBody};
 use glam::DVec2;
 
 /// One pixel is a meter wide: a domain as large as the image, and its view.
@@ -23,7 +23,7 @@ fn setting(kinds: &[Shape], statics: &[(Shape, f32, DVec2)]) -> Setting {
         ..StaticBody::new(GlobalId(id), kind(shape), position)
     };
     Setting {
-        grid: TileGrid::new(DVec2::ZERO, DVec2::splat(f64::from(SIZE)), 4, 4).unwrap(),
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(f64::from(SIZE)), 4, 4).unwrap(),
         kinds: kinds.iter().map(|shape| kind(*shape)).collect(),
         statics: (0..).zip(statics).map(fixed).collect(),
         hertz: 60.0,
@@ -31,7 +31,7 @@ fn setting(kinds: &[Shape], statics: &[(Shape, f32, DVec2)]) -> Setting {
 }
 
 fn frame(bodies: Vec<Row>) -> Frame {
-    Frame { step: 120, ranks: vec![(0, bodies.len())], bodies, live: None }
+    Frame { step: 120, ranks: vec![(0, bodies.len())], bodies, tiling: None, live: None }
 }
 
 fn row(kind: u32, x: f64, y: f64, angle: f32) -> Row {

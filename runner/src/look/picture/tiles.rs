@@ -1,10 +1,10 @@
-//! The grid of tiles, and which rank has which.
+//! The tiles, and which rank has which.
 
 use super::canvas::{Canvas, Form, Letters};
 use super::colors;
 use super::view::Fit;
 use crate::look::frame::{Frame, Setting};
-use atoll_core::TileGrid;
+use atoll_core::{Partition, Region, TileId};
 use glam::DVec2;
 
 /// Lines nearer than this, in pixels, are not drawn, and from thrice as much on they are drawn fully.
@@ -17,12 +17,13 @@ pub(super) fn ranks_of_tiles(setting: &Setting, frame: &Frame, ranks: &mut Vec<O
     if let Some(live) = frame.live.as_ref().filter(|live| !live.rank_of_tile.is_empty()) {
         return ranks.extend(live.rank_of_tile.iter().map(|&rank| Some(rank)));
     }
+    let partition = frame.partition(setting);
     // Who has the majority of a tile's bodies, if anyone has, is left by the vote of Boyer and Moore.
-    let mut votes = vec![(0, 0_u32); setting.grid.tiles()];
+    let mut votes = vec![(0, 0_u32); partition.tiles()];
     let mut begin = 0;
     for &(rank, end) in &frame.ranks {
         for row in &frame.bodies[begin..end] {
-            let vote = &mut votes[setting.grid.locate(DVec2::new(row.x, row.y)).0 as usize];
+            let vote = &mut votes[partition.locate(DVec2::new(row.x, row.y)).0 as usize];
             match vote {
                 (_, 0) => *vote = (rank, 1),
                 (holder, lead) if *holder == rank => *lead += 1,
@@ -35,71 +36,112 @@ pub(super) fn ranks_of_tiles(setting: &Setting, frame: &Frame, ranks: &mut Vec<O
 }
 
 /// Where the edges of tiles are on an image.
-#[derive(Debug)]
-pub(super) struct Edges {
-    columns: Vec<f64>,
-    /// From the lowest row of tiles upwards.
-    rows: Vec<f64>,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edges<'a> {
+    partition: &'a Partition,
+    fit: &'a Fit,
 }
 
-impl Edges {
-    pub(super) fn new(grid: &TileGrid, fit: &Fit) -> Self {
-        let at = |column, row| {
-            fit.place(grid.min() + grid.tile_size() * DVec2::new(column as f64, row as f64)).map(f64::round)
-        };
-        Self {
-            columns: (0..=grid.columns()).map(|column| at(column, 0)[0]).collect(),
-            rows: (0..=grid.rows()).map(|row| at(0, row)[1]).collect(),
-        }
+impl<'a> Edges<'a> {
+    pub(super) fn new(partition: &'a Partition, fit: &'a Fit) -> Self {
+        Self { partition, fit }
+    }
+
+    fn tiles(self) -> impl Iterator<Item = TileId> {
+        (0..self.partition.tiles() as u32).map(TileId)
     }
 
     /// Upper left and lower right corner of a tile.
-    fn corners(&self, column: usize, row: usize) -> [[f64; 2]; 2] {
-        [[self.columns[column], self.rows[row + 1]], [self.columns[column + 1], self.rows[row]]]
+    fn corners(self, tile: TileId) -> [[f64; 2]; 2] {
+        let Region { min, max } = self.partition.rectangle(tile);
+        [DVec2::new(min.x, max.y), DVec2::new(max.x, min.y)].map(|corner| self.fit.place(corner).map(f64::round))
     }
 
-    /// The shortest side of a tile.
-    fn shortest(&self) -> f64 {
-        let side = |edges: &[f64]| (edges[edges.len() - 1] - edges[0]).abs() / (edges.len() - 1) as f64;
-        side(&self.columns).min(side(&self.rows))
+    /// Width and height of a tile.
+    fn size(self, tile: TileId) -> DVec2 {
+        self.partition.rectangle(tile).size() * self.fit.scale
     }
 
-    /// Thin lines between tiles. A grid too fine to be seen is left out.
-    pub(super) fn draw_grid(&self, canvas: &mut Canvas, unit: f64) {
-        let part = 0.4 * ((self.shortest() - NEAREST) / (2.0 * NEAREST)).clamp(0.0, 1.0);
+    /// Thin lines between tiles. Where they are too small to be seen, they are left out.
+    pub(super) fn draw_grid(self, canvas: &mut Canvas, unit: f64) {
         let half = 0.5 * unit.round().max(1.0);
-        let [left, right] = [self.columns[0], self.columns[self.columns.len() - 1]];
-        let [bottom, top] = [self.rows[0], self.rows[self.rows.len() - 1]];
-        for x in &self.columns {
-            canvas.draw(&Form::rectangle([x - half, top], [x + half, bottom]), colors::INK, part);
+        let part = |tile| 0.4 * ((self.size(tile).min_element() - NEAREST) / (2.0 * NEAREST)).clamp(0.0, 1.0);
+        let mut upright = |x: f64, top, bottom, part| {
+            canvas.draw(&Form::rectangle([x - half, top], [x + half, bottom]), colors::INK, part)
+        };
+        let [columns, rows] = self.partition.roots();
+        let last = TileId(self.partition.tiles() as u32 - 1);
+        let ([[left, _], [_, bottom]], [[_, top], [right, _]]) = (self.corners(TileId(0)), self.corners(last));
+        if self.partition.levels().is_some() {
+            for tile in self.tiles() {
+                let [[x, top], [_, bottom]] = self.corners(tile);
+                upright(x, top, bottom, part(tile));
+            }
+        } else {
+            (0..columns).for_each(|column| upright(self.corners(TileId(column))[0][0], top, bottom, part(last)));
         }
-        for y in &self.rows {
-            canvas.draw(&Form::rectangle([left, y - half], [right, y + half]), colors::INK, part);
+        upright(right, top, bottom, part(last));
+        let mut level = |y: f64, left, right, part| {
+            canvas.draw(&Form::rectangle([left, y - half], [right, y + half]), colors::INK, part)
+        };
+        if self.partition.levels().is_some() {
+            for tile in self.tiles() {
+                let [[left, _], [right, y]] = self.corners(tile);
+                level(y, left, right, part(tile));
+            }
+        } else {
+            (0..rows).for_each(|row| level(self.corners(TileId(row * columns))[1][1], left, right, part(last)));
         }
+        level(top, left, right, part(last));
     }
 
     /// Along the borders of each rank's tiles a line in its color, on its own side.
-    pub(super) fn outline_ranks(&self, canvas: &mut Canvas, ranks: &[Option<u32>], unit: f64) {
-        let (columns, rows) = (self.columns.len() - 1, self.rows.len() - 1);
-        let width = (3.0 * unit).min(0.3 * self.shortest()).max(1.0);
-        for (tile, rank) in ranks.iter().enumerate().filter_map(|(tile, rank)| Some((tile, (*rank)?))) {
-            let (column, row) = (tile % columns, tile / columns);
-            let [low, high] = self.corners(column, row);
-            let is_edge = |is_outermost: bool, other: usize| is_outermost || ranks[other] != Some(rank);
-            let strips = [
-                (is_edge(column == 0, tile.wrapping_sub(1)), low, [low[0] + width, high[1]]),
-                (is_edge(column + 1 == columns, tile + 1), [high[0] - width, low[1]], high),
-                (is_edge(row == 0, tile.wrapping_sub(columns)), [low[0], high[1] - width], high),
-                (is_edge(row + 1 == rows, tile + columns), low, [high[0], low[1] + width]),
+    pub(super) fn outline_ranks(self, canvas: &mut Canvas, ranks: &[Option<u32>], unit: f64) {
+        let (domain_low, domain_high) = (self.partition.min(), self.partition.max());
+        for (tile, rank) in self.tiles().zip(ranks).filter_map(|(tile, rank)| Some((tile, (*rank)?))) {
+            let width = (3.0 * unit).min(0.3 * self.size(tile).min_element()).max(1.0);
+            let own = self.partition.rectangle(tile);
+            let [low, high] = self.corners(tile);
+            let mut draw = |low: [f64; 2], high: [f64; 2]| {
+                if low[0] < high[0] && low[1] < high[1] {
+                    canvas.draw(&Form::rectangle(low, high), colors::distinct(rank), 1.0);
+                }
+            };
+            // Along the part of a side that is before another tile, or before none.
+            let mut side = |is_side: [bool; 4], [from, to]: [[f64; 2]; 2]| {
+                let ([x, y], [end_x, end_y]) =
+                    ([from[0].max(low[0]), from[1].max(low[1])], [to[0].min(high[0]), to[1].min(high[1])]);
+                let strips = [
+                    ([low[0], y], [low[0] + width, end_y]),
+                    ([high[0] - width, y], [high[0], end_y]),
+                    ([x, high[1] - width], [end_x, high[1]]),
+                    ([x, low[1]], [end_x, low[1] + width]),
+                ];
+                strips
+                    .into_iter()
+                    .zip(is_side)
+                    .filter(|(_, is_side)| *is_side)
+                    .for_each(|((low, high), _)| draw(low, high));
+            };
+            let at = |min: DVec2, max: DVec2| {
+                [own.min.x == max.x, own.max.x == min.x, own.min.y == max.y, own.max.y == min.y]
+            };
+            let outermost = [
+                own.min.x == domain_low.x,
+                own.max.x == domain_high.x,
+                own.min.y == domain_low.y,
+                own.max.y == domain_high.y,
             ];
-            for (_, low, high) in strips.into_iter().filter(|(is_edge, ..)| *is_edge) {
-                canvas.draw(&Form::rectangle(low, high), colors::distinct(rank), 1.0);
+            side(outermost, [low, high]);
+            for other in self.partition.around(tile).filter(|other| ranks[other.0 as usize] != Some(rank)) {
+                let Region { min, max } = self.partition.rectangle(other);
+                side(at(min, max), self.corners(other));
             }
         }
     }
 
     /// In the middle of what each rank has, where there is room, which rank it is.
-    pub(super) fn name_ranks(&self, canvas: &mut Canvas, letters: &Letters, ranks: &[Option<u32>], size: f64) {
+    pub(super) fn name_ranks(self, canvas: &mut Canvas, letters: &Letters, ranks: &[Option<u32>], size: f64) {
         let mut named: Vec<u32> = ranks.iter().flatten().copied().collect();
         named.sort_unstable();
         named.dedup();
@@ -107,7 +149,8 @@ impl Edges {
             let text = format!("rank {rank}");
             let [x, y] = self.middle(ranks, rank);
             let half = [0.5 * letters.width(&text, size) + 0.6 * size, 0.85 * size];
-            let area = ranks.iter().filter(|holder| **holder == Some(rank)).count() as f64 * self.area();
+            let of_rank = self.tiles().zip(ranks).filter(|(_, holder)| **holder == Some(rank));
+            let area: f64 = of_rank.map(|(tile, _)| self.size(tile).element_product()).sum();
             if area > 6.0 * 4.0 * half[0] * half[1] {
                 let (low, high) = ([x - half[0], y - half[1]], [x + half[0], y + half[1]]);
                 canvas.draw(&Form::Plate { low, high, radius: half[1] }, colors::PAPER, 0.9);
@@ -119,26 +162,23 @@ impl Edges {
         }
     }
 
-    /// Of a tile.
-    fn area(&self) -> f64 {
-        let side = |edges: &[f64]| (edges[edges.len() - 1] - edges[0]).abs() / (edges.len() - 1) as f64;
-        side(&self.columns) * side(&self.rows)
-    }
-
-    /// The center of that tile of a rank which is nearest to the mean of all of them.
-    fn middle(&self, ranks: &[Option<u32>], rank: u32) -> [f64; 2] {
-        let columns = self.columns.len() - 1;
-        let centers = ranks.iter().enumerate().filter(|(_, holder)| **holder == Some(rank)).map(|(tile, _)| {
-            let [low, high] = self.corners(tile % columns, tile / columns);
-            DVec2::new(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]))
-        });
-        let (sum, count) = centers.clone().fold((DVec2::ZERO, 0.0), |(sum, count), center| (sum + center, count + 1.0));
-        let mean = sum / count;
-        let nearest = centers.min_by(|a, b| a.distance_squared(mean).total_cmp(&b.distance_squared(mean)));
-        let nearest = nearest.unwrap_or(mean);
+    /// A point of that tile of a rank which is nearest to the middle of all of them.
+    fn middle(self, ranks: &[Option<u32>], rank: u32) -> [f64; 2] {
+        let of_rank = || self.tiles().zip(ranks).filter(|(_, holder)| **holder == Some(rank)).map(|(tile, _)| tile);
+        let center = |tile| {
+            let [low, high] = self.corners(tile);
+            0.5 * (DVec2::from(low) + DVec2::from(high))
+        };
+        let sum = |(sum, area): (DVec2, f64), tile| {
+            let own = self.size(tile).element_product();
+            (sum + own * center(tile), area + own)
+        };
+        let (sum, area) = of_rank().fold((DVec2::ZERO, 0.0), sum);
+        let mean = sum / area;
         // A tile that holds the mean needs no other place.
-        let holds = (nearest - mean).abs() * 2.0;
-        let side = DVec2::new((self.columns[1] - self.columns[0]).abs(), (self.rows[1] - self.rows[0]).abs());
-        if holds.cmple(side + 1.0).all() { mean.to_array() } else { nearest.to_array() }
+        let holds = |tile| (center(tile) - mean).abs().cmple(0.5 * (self.size(tile) + 1.0)).all();
+        let nearest =
+            of_rank().min_by(|&a, &b| center(a).distance_squared(mean).total_cmp(&center(b).distance_squared(mean)));
+        if of_rank().any(holds) { mean.to_array() } else { nearest.map_or(mean, center).to_array() }
     }
 }

@@ -46,7 +46,7 @@ impl From<View> for [f64; 4] {
 
 /// The domain, and of what stands around it so much that one sees what it is.
 pub(crate) fn whole_view(setting: &Setting) -> View {
-    let (low, high) = (setting.grid.min(), setting.grid.max());
+    let (low, high) = (setting.partition.min(), setting.partition.max());
     let side = (high - low).max_element();
     let extents = setting.statics.iter().map(extent);
     let (least, most) = extents.fold((low, high), |(least, most), (from, to)| (least.min(from), most.max(to)));

@@ -40,11 +40,11 @@ impl Live {
 
     /// That of a plan whose ranks are threads.
     pub(crate) fn new(plan: Plan) -> Self {
-        let Blueprint { grid, kinds, statics, .. } = plan.blueprint.clone();
+        let Blueprint { partition, kinds, statics, .. } = plan.blueprint.clone();
         // As a recording of it would tell.
         let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
         let hertz = facts.hertz().expect("every configuration has a frequency");
-        Self { setting: Setting { grid, kinds, statics, hertz }, plan }
+        Self { setting: Setting { partition, kinds, statics, hertz }, plan }
     }
 
     /// The plan.

@@ -8,7 +8,7 @@ use crate::rank::Watcher;
 use atoll_core::{Body, TileId, TileView, World};
 use atoll_transport::Rank;
 use glam::DVec2;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// A part of a frame from each rank. Together with the frame they are put into, this is memory for two.
 #[derive(Debug)]
@@ -65,10 +65,13 @@ impl Parts {
         for (rank, part) in (0..).zip(&self.parts) {
             let Part { frame: part, tiles } = &*lock(part);
             frame.step = part.step;
+            frame.tiling.clone_from(&part.tiling);
             frame.bodies.extend_from_slice(&part.bodies);
             frame.ranks.push((rank, frame.bodies.len()));
             if let Some((to, from)) = frame.live.as_mut().zip(part.live.as_ref()) {
                 append(to, from);
+                // Tiles that were joined are there no more.
+                to.rank_of_tile.truncate(frame.tiling.as_ref().map_or(usize::MAX, |tiling| tiling.tiles()));
                 for tile in tiles {
                     let tile = tile.0 as usize;
                     to.rank_of_tile.resize(to.rank_of_tile.len().max(tile + 1), 0);
@@ -159,6 +162,7 @@ fn fill(Part { frame: part, tiles }: &mut Part, world: &World, live: bool) {
     tiles.clear();
     tiles.extend(world.tiles());
     part.step = world.step_count();
+    part.tiling = world.partition().levels().map(|_| Arc::new(world.partition().clone()));
     let bodies: usize = world.views().map(|tile| tile.bodies().len()).sum();
     // Bodies come and go a few at a time, and twice the memory would be much.
     if part.bodies.capacity() < bodies {

@@ -42,7 +42,7 @@ pub(super) fn write_bodies(setting: &Setting, rows: &[Row], rank: u32, file: &mu
         }),
         Box::new(|out| rows.iter().try_for_each(|row| out.write_all(&row.omega.to_le_bytes()))),
         Box::new(|out| {
-            let mut tiles = rows.iter().map(|row| setting.grid.locate(center(row)).0);
+            let mut tiles = rows.iter().map(|row| setting.partition.locate(center(row)).0);
             tiles.try_for_each(|tile| out.write_all(&tile.to_le_bytes()))
         }),
         Box::new(|out| rows.iter().try_for_each(|_| out.write_all(&rank.to_le_bytes()))),

@@ -73,7 +73,7 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
         let kinds: Vec<u32> = of_rank.iter().map(|body| body.kind.0).collect();
         assert_eq!(piece.numbers("kind", u32::from_le_bytes), kinds);
         assert_eq!(piece.numbers("rank", u32::from_le_bytes), [rank as u32; 10]);
-        let tiles: Vec<u32> = of_rank.iter().map(|body| recorded.setting().grid.locate(body.position).0).collect();
+        let tiles: Vec<u32> = of_rank.iter().map(|body| recorded.setting().partition.locate(body.position).0).collect();
         assert_eq!(piece.numbers("tile", u32::from_le_bytes), tiles);
         let velocities = of_rank.iter().flat_map(|body| [body.velocity.x, body.velocity.y, 0.0]);
         assert!(piece.numbers("velocity", f32::from_le_bytes).into_iter().eq(velocities));

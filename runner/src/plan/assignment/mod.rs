@@ -7,7 +7,7 @@
 mod curve;
 mod refine;
 
-use atoll_core::{TileGrid, TileId};
+use atoll_core::{Change, Partition, TileId};
 use curve::hilbert_order;
 
 /// A rank for every tile.
@@ -26,10 +26,10 @@ impl Assignment {
     ///
     /// # Panics
     /// If there is not one weight per tile, or if there are no ranks.
-    pub fn balanced(grid: &TileGrid, weights: &[u64], ranks: usize) -> Self {
-        assert_eq!(weights.len(), grid.tiles(), "one weight per tile");
+    pub fn balanced(partition: &Partition, weights: &[u64], ranks: usize) -> Self {
+        assert_eq!(weights.len(), partition.tiles(), "one weight per tile");
         assert!(ranks > 0, "a run has ranks");
-        let curve = hilbert_order(grid.columns(), grid.rows());
+        let curve = hilbert_order(partition);
         // An empty tile costs a little too, and so the total is never zero.
         let weight = |tile: usize| u128::from(weights[tile]) + 1;
         let total: u128 = (0..weights.len()).map(weight).sum();
@@ -57,6 +57,25 @@ impl Assignment {
         let goes = |tile: u64| ((tile << 32 | step & 0xffff_ffff).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) & 1;
         let next = |(tile, &rank): (u64, &u32)| (rank + goes(tile) as u32) % self.ranks as u32;
         Self { rank_of: (0..).zip(&self.rank_of).map(next).collect(), ranks: self.ranks }
+    }
+
+    /// The ranks that tiles of another partition go to, which take up the same places: each to that of the first of the old ones.
+    pub fn followed(&self, changes: &[Change]) -> Self {
+        let next = changes.iter().flat_map(|change| {
+            let rank = self.rank_of[change.old.start as usize];
+            change.new.clone().map(move |_| rank)
+        });
+        Self { rank_of: next.collect(), ranks: self.ranks }
+    }
+
+    /// One by which tiles that are about to be joined are held by one rank, that of the first.
+    pub fn joined(&self, changes: &[Change]) -> Self {
+        let next = changes.iter().flat_map(|change| {
+            // Either there is one old tile, or they become one.
+            let rank = self.rank_of[change.old.start as usize];
+            change.old.clone().map(move |_| rank)
+        });
+        Self { rank_of: next.collect(), ranks: self.ranks }
     }
 
     /// The rank that holds a tile.
@@ -91,8 +110,8 @@ mod tests {
     use super::*;
     use glam::DVec2;
 
-    fn grid(columns: u32, rows: u32) -> TileGrid {
-        TileGrid::new(DVec2::ZERO, DVec2::new(f64::from(columns), f64::from(rows)), columns, rows).unwrap()
+    fn grid(columns: u32, rows: u32) -> Partition {
+        Partition::uniform(DVec2::ZERO, DVec2::new(f64::from(columns), f64::from(rows)), columns, rows).unwrap()
     }
 
     fn loads(assignment: &Assignment, weights: &[u64]) -> Vec<u64> {
@@ -108,10 +127,8 @@ mod tests {
             for ranks in [1, 2, 3, 4, 7, 64] {
                 let assignment = Assignment::balanced(&grid, &weights, ranks);
                 assert_eq!(assignment, Assignment::balanced(&grid, &weights, ranks));
-                let along: Vec<usize> = hilbert_order(grid.columns(), grid.rows())
-                    .into_iter()
-                    .map(|tile| assignment.rank_of(TileId(tile as u32)))
-                    .collect();
+                let along: Vec<usize> =
+                    hilbert_order(&grid).into_iter().map(|tile| assignment.rank_of(TileId(tile as u32))).collect();
                 assert!(along.windows(2).all(|pair| pair[1] == pair[0] || pair[1] == pair[0] + 1));
                 assert_eq!(along.first(), Some(&0));
                 assert_eq!(along.last(), Some(&(ranks.min(grid.tiles()) - 1)));

@@ -7,7 +7,7 @@
 //! finds the same from the same costs.
 
 use super::Assignment;
-use atoll_core::{TileGrid, TileId};
+use atoll_core::{Partition, TileId};
 
 /// With more tiles for each rank than this, runs of the curve are even enough, and more compact than what moves leave behind.
 const TILES_OF_A_RUN: usize = 32;
@@ -27,12 +27,12 @@ impl Assignment {
     ///
     /// # Panics
     /// If there is not one cost per tile.
-    pub fn refined(&self, grid: &TileGrid, costs: &[u64]) -> Option<Self> {
-        assert_eq!(costs.len(), grid.tiles(), "one cost per tile");
-        let mut loads = Loads::new(self.clone(), grid, costs);
+    pub fn refined(&self, partition: &Partition, costs: &[u64]) -> Option<Self> {
+        assert_eq!(costs.len(), partition.tiles(), "one cost per tile");
+        let mut loads = Loads::new(self.clone(), partition, costs);
         let before = loads.most();
         if costs.len() > TILES_OF_A_RUN * self.ranks && !loads.are_even(before) {
-            loads = Loads::new(Self::balanced(grid, costs, self.ranks), grid, costs);
+            loads = Loads::new(Self::balanced(partition, costs, self.ranks), partition, costs);
         }
         for _ in 0..4 * self.ranks + 64 {
             if !loads.improve() {
@@ -56,7 +56,7 @@ impl Assignment {
 /// What each rank has to do.
 struct Loads<'a> {
     assignment: Assignment,
-    grid: &'a TileGrid,
+    partition: &'a Partition,
     costs: &'a [u64],
     /// By rank.
     sums: Vec<u64>,
@@ -76,7 +76,7 @@ struct Action {
 }
 
 impl<'a> Loads<'a> {
-    fn new(assignment: Assignment, grid: &'a TileGrid, costs: &'a [u64]) -> Self {
+    fn new(assignment: Assignment, partition: &'a Partition, costs: &'a [u64]) -> Self {
         let mut sums = vec![0; assignment.ranks];
         let mut tiles = vec![Vec::new(); assignment.ranks];
         for (tile, (&rank, cost)) in (0..).zip(assignment.rank_of.iter().zip(costs)) {
@@ -84,7 +84,7 @@ impl<'a> Loads<'a> {
             tiles[rank as usize].push(tile);
         }
         let mean = sums.iter().sum::<u64>() / assignment.ranks as u64;
-        Self { assignment, grid, costs, sums, tiles, mean }
+        Self { assignment, partition, costs, sums, tiles, mean }
     }
 
     fn most(&self) -> u64 {
@@ -152,12 +152,12 @@ impl<'a> Loads<'a> {
     }
 
     fn has_neighbour(&self, tile: u32, rank: usize) -> bool {
-        neighbours(self.grid, tile).any(|tile| self.assignment.rank_of[tile as usize] as usize == rank)
+        neighbours(self.partition, tile).any(|tile| self.assignment.rank_of[tile as usize] as usize == rank)
     }
 
     /// The ranks that hold neighbours of a rank's tiles, ascending.
     fn neighbours_of_rank(&self, rank: usize) -> Vec<usize> {
-        let tiles = self.tiles[rank].iter().flat_map(|&tile| neighbours(self.grid, tile));
+        let tiles = self.tiles[rank].iter().flat_map(|&tile| neighbours(self.partition, tile));
         let mut ranks: Vec<usize> = tiles.map(|tile| self.assignment.rank_of[tile as usize] as usize).collect();
         ranks.sort_unstable();
         ranks.dedup();
@@ -167,13 +167,8 @@ impl<'a> Loads<'a> {
 }
 
 /// The tiles that share an edge or a corner with one.
-fn neighbours(grid: &TileGrid, tile: u32) -> impl Iterator<Item = u32> + use<> {
-    let (columns, rows) = (grid.columns() as u32, grid.rows() as u32);
-    let (column, row) = (tile % columns, tile / columns);
-    let around = |at: u32, count: u32| at.saturating_sub(1)..(at + 2).min(count);
-    let rows = around(row, rows);
-    let all = rows.flat_map(move |row| around(column, columns).map(move |column| row * columns + column));
-    all.filter(move |&other| other != tile)
+fn neighbours(partition: &Partition, tile: u32) -> impl Iterator<Item = u32> + '_ {
+    partition.around(TileId(tile)).map(|tile| tile.0).filter(move |&other| other != tile)
 }
 
 #[cfg(test)]
@@ -181,21 +176,21 @@ mod tests {
     use super::*;
     use glam::DVec2;
 
-    fn grid(columns: u32, rows: u32) -> TileGrid {
-        TileGrid::new(DVec2::ZERO, DVec2::new(f64::from(columns), f64::from(rows)), columns, rows).unwrap()
+    fn grid(columns: u32, rows: u32) -> Partition {
+        Partition::uniform(DVec2::ZERO, DVec2::new(f64::from(columns), f64::from(rows)), columns, rows).unwrap()
     }
 
     /// The most a rank has to do, in means.
-    fn imbalance(assignment: &Assignment, grid: &TileGrid, costs: &[u64]) -> f64 {
+    fn imbalance(assignment: &Assignment, grid: &Partition, costs: &[u64]) -> f64 {
         let loads = Loads::new(assignment.clone(), grid, costs);
         loads.most() as f64 * loads.sums.len() as f64 / loads.sums.iter().sum::<u64>() as f64
     }
 
     /// A corner that is ever denser, as at the end of NORMAL.
-    fn skewed(grid: &TileGrid) -> Vec<u64> {
+    fn skewed(grid: &Partition) -> Vec<u64> {
         let cost = |tile: usize| {
-            let (x, y) = (tile % grid.columns(), tile / grid.columns());
-            let near = 1.0 - (x + y) as f64 / (grid.columns() + grid.rows()) as f64;
+            let (x, y) = (tile % grid.roots()[0] as usize, tile / grid.roots()[0] as usize);
+            let near = 1.0 - (x + y) as f64 / (grid.roots()[0] as usize + grid.roots()[1] as usize) as f64;
             (1e5 * near.powi(3)) as u64 + 7 * tile as u64
         };
         (0..grid.tiles()).map(cost).collect()

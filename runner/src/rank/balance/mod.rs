@@ -7,16 +7,18 @@
 
 mod clock;
 mod handover;
+mod retile;
 
 use super::halo::RankHalo;
 use super::{RankError, RankFacts, records, unreadable};
 use crate::config::Balance;
 use crate::plan::{Assignment, Plan};
-use atoll_core::{StepReport, TileGrid, TileId, World};
+use atoll_core::{StepReport, TileId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use bytemuck::{Pod, Zeroable};
 pub(crate) use clock::thread_time;
 use handover::Move;
+pub(super) use retile::Retiler;
 use std::time::{Duration, Instant};
 use tracing::info;
 
@@ -43,9 +45,8 @@ const RARELY: usize = 100;
 const TOO_BUSY: u64 = 20;
 
 /// How busy a rank has been, and what has come of it.
-pub(super) struct Balancer<'a> {
+pub(super) struct Balancer {
     by: Balance,
-    grid: &'a TileGrid,
     every: usize,
     /// How long this rank had worked before the step under way.
     before: Duration,
@@ -69,9 +70,9 @@ struct TileCost {
     cost: u64,
 }
 
-impl<'a> Balancer<'a> {
+impl Balancer {
     /// Begins to book times, if there is more than one rank.
-    pub(super) fn start(plan: &'a Plan, world: &mut World) -> Option<Self> {
+    pub(super) fn start(plan: &Plan, world: &mut World) -> Option<Self> {
         let ranks = plan.assignment.ranks();
         if ranks == 1 {
             return None;
@@ -86,7 +87,6 @@ impl<'a> Balancer<'a> {
         world.book_time(thread_time);
         Some(Self {
             by,
-            grid: &plan.blueprint.grid,
             every,
             before: Duration::ZERO,
             worked: Vec::new(),
@@ -133,7 +133,7 @@ impl<'a> Balancer<'a> {
                 Balance::Shuffled => Some(halo.assignment().shuffled(last.step)),
                 Balance::Measured | Balance::Bodies => {
                     let costs = self.costs(world, halo.transport())?;
-                    halo.assignment().refined(self.grid, &costs)
+                    halo.assignment().refined(world.partition(), &costs)
                 }
             };
             if let Some(assignment) = assignment {
@@ -184,7 +184,7 @@ impl<'a> Balancer<'a> {
             _ => world.take_booked_times().map(|(tile, time)| cost(tile, time.as_nanos() as u64)).collect(),
         };
         let told = transport.all_gather(bytemuck::cast_slice(&own)).map_err(RankError::Transport)?;
-        let mut costs = vec![0; self.grid.tiles()];
+        let mut costs = vec![0; world.partition().tiles()];
         for (rank, told) in told.chunks(1).enumerate() {
             for TileCost { tile, cost } in records(told).map_err(RankError::Transport)? {
                 let place = usize::try_from(tile).ok().and_then(|tile| costs.get_mut(tile));

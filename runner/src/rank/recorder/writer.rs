@@ -4,6 +4,7 @@ use crate::error::RunError;
 use crate::folder::durable::is_gone;
 use crate::folder::recording::{Record, RecordingWriter, RunFacts, StageText};
 use crate::folder::snapshot::{self, SnapshotWriter};
+use crate::plan::tiles::in_letters;
 use crate::plan::{Output, Plan};
 use atoll_core::{SavedTile, World};
 use atoll_transport::Rank;
@@ -30,6 +31,7 @@ pub(super) enum Job {
 #[derive(Default)]
 pub(super) struct Saved {
     step: u64,
+    levels: Option<String>,
     tiles: Vec<SavedTile>,
     blocks: Vec<u8>,
 }
@@ -37,6 +39,7 @@ pub(super) struct Saved {
 impl Saved {
     pub(super) fn fill(&mut self, world: &World) {
         self.step = world.step_count();
+        self.levels = world.partition().levels().map(in_letters);
         self.tiles = world.save(&mut self.blocks);
     }
 }
@@ -84,7 +87,7 @@ impl Writer {
                     self.attempt(|writer| writer.save(&saved));
                     let _ = saves.send(saved);
                 }
-                Job::Sync(files) => self.beside = files,
+                Job::Sync(files) => self.beside.extend(files),
                 // After a failure nobody can tell which snapshots are whole.
                 Job::RemoveBefore(_) if self.failure.get().is_some() => {}
                 Job::RemoveBefore(step) => {
@@ -121,7 +124,8 @@ impl Writer {
     /// Whoever goes on from a snapshot finds everything that was recorded before it, and in segments of its own.
     fn save(&mut self, saved: &Saved) -> Result<(), RunError> {
         self.close()?;
-        let written = self.snapshot.write(&self.snapshots, saved.step, &saved.tiles, &saved.blocks);
+        let written =
+            self.snapshot.write(&self.snapshots, saved.step, saved.levels.as_deref(), &saved.tiles, &saved.blocks);
         let path = written.map_err(|(path, error)| RunError::Output { path, reason: error.to_string() })?;
         debug!(step = saved.step, bytes = saved.blocks.len(), "saved to {}", path.display());
         self.saved = Some(path);

@@ -1,0 +1,239 @@
+//! How tiles follow the bodies: cut where there are many, joined where there are few, by exact counts alone.
+
+use super::forest::{Forest, MOST_LEVELS};
+use super::grid::Grid;
+use super::{Cut, Partition, Region};
+use crate::model::error::SetupError;
+use crate::model::id::TileId;
+use bytemuck::{Pod, Zeroable};
+use glam::DVec2;
+use std::ops::Range;
+
+/// Four tiles are joined when together they have no more bodies than this part of what one tile may have: so that who comes and
+/// goes does not have tiles cut and joined in turns.
+const JOINED: u64 = 2;
+
+/// The parts of a tile are at least so many widths of the halo wide; below, most of their work would be ghosts.
+const LEAST_WIDTHS: f64 = 4.0;
+
+/// When tiles are cut.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Adaptive {
+    /// A tile that owns more bodies is cut in four, if the parts are not too small.
+    pub max_bodies: u64,
+    /// The least width and height of a part, in meters.
+    pub least_side: f64,
+}
+
+/// A tile, or a part that it is to be cut into, and how many bodies are there. The parts of one tile follow each other in the
+/// order in which tiles are counted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Census {
+    /// The tile that it is, or is a part of.
+    pub tile: TileId,
+    /// How often its root was cut.
+    pub level: u32,
+    /// Bodies in there.
+    pub bodies: u64,
+}
+
+/// Tiles of two partitions that take up the same place. One of both ranges has a single tile.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Change {
+    /// Of the old one.
+    pub old: Range<u32>,
+    /// Of the new one.
+    pub new: Range<u32>,
+}
+
+impl Change {
+    /// Whether the tile stays as it was, but for its name.
+    pub fn is_none(&self) -> bool {
+        self.old.len() == 1 && self.new.len() == 1
+    }
+}
+
+/// The four parts of a rectangle: lower left, lower right, upper left, upper right.
+pub(super) fn quarters(&Region { min, max }: &Region) -> [Region; 4] {
+    let middle = 0.5 * (min + max);
+    let (min, max) = ([min.x, middle.x, max.x], [min.y, middle.y, max.y]);
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(column, row)| Region {
+        min: DVec2::new(min[column], max[row]),
+        max: DVec2::new(min[column + 1], max[row + 1]),
+    })
+}
+
+/// Bodies, or samples of some, to be counted.
+pub(crate) trait Counted {
+    fn place(&self) -> DVec2;
+    /// For how many bodies it stands.
+    fn bodies(&self) -> u64;
+}
+
+impl Counted for DVec2 {
+    fn place(&self) -> DVec2 {
+        *self
+    }
+
+    fn bodies(&self) -> u64 {
+        1
+    }
+}
+
+impl Counted for (DVec2, u64) {
+    fn place(&self) -> DVec2 {
+        self.0
+    }
+
+    fn bodies(&self) -> u64 {
+        self.1
+    }
+}
+
+impl Adaptive {
+    /// Tiles of so many bodies, and no smaller than some widths of a halo, in meters.
+    pub fn new(max_bodies: u64, halo_width: f64) -> Self {
+        Self { max_bodies, least_side: LEAST_WIDTHS * halo_width }
+    }
+
+    /// Counts the bodies of a tile, or of the parts that it is to be cut into. What is beyond its rectangle counts in the part that is
+    /// next to it. Changes the order of the bodies.
+    pub(crate) fn count(
+        &self,
+        tile: TileId,
+        level: u8,
+        rectangle: Region,
+        all: &mut [impl Counted],
+        census: &mut Vec<Census>,
+    ) {
+        let bodies = all.iter().map(Counted::bodies).sum();
+        let is_wide = (0.5 * rectangle.size()).cmpge(DVec2::splat(self.least_side)).all();
+        if bodies <= self.max_bodies || !is_wide || level == MOST_LEVELS {
+            census.push(Census { tile, level: u32::from(level), bodies });
+            return;
+        }
+        let parts = quarters(&rectangle);
+        let middle = parts[3].min;
+        let (lower, upper) = separate(all, |body| body.place().y >= middle.y);
+        let ((a, b), (c, d)) =
+            (separate(lower, |body| body.place().x >= middle.x), separate(upper, |body| body.place().x >= middle.x));
+        for (part, bodies) in parts.into_iter().zip([a, b, c, d]) {
+            self.count(tile, level + 1, part, bodies, census);
+        }
+    }
+}
+
+/// Brings those to the end for which something holds, and tells them from the others.
+fn separate<T>(all: &mut [T], is_high: impl Fn(&T) -> bool) -> (&mut [T], &mut [T]) {
+    let mut low = 0;
+    for i in 0..all.len() {
+        if !is_high(&all[i]) {
+            all.swap(low, i);
+            low += 1;
+        }
+    }
+    all.split_at_mut(low)
+}
+
+impl Partition {
+    /// A [`forest`](Self::forest) over columns x rows of squares, in which no tile has more bodies than the rule says. `bodies`
+    /// gives places, and for how many bodies each of them stands.
+    ///
+    /// # Errors
+    /// If that makes no tiles.
+    pub fn adaptive(
+        min: DVec2,
+        max: DVec2,
+        [columns, rows]: [u32; 2],
+        rule: &Adaptive,
+        bodies: impl Iterator<Item = (DVec2, u64)>,
+    ) -> Result<Self, SetupError> {
+        let grid = Grid::new(min, max, columns, rows)?;
+        let mut bodies: Vec<(u32, (DVec2, u64))> = bodies.map(|body| (grid.locate(body.0), body)).collect();
+        bodies.sort_unstable_by_key(|(root, _)| *root);
+        let mut rest: Vec<(DVec2, u64)> = bodies.iter().map(|(_, body)| *body).collect();
+        let (mut rest, mut census) = (&mut rest[..], Vec::new());
+        for root in 0..grid.cells() as u32 {
+            let count = bodies.partition_point(|(of, _)| *of <= root) - bodies.partition_point(|(of, _)| *of < root);
+            let own = rest.split_off_mut(..count).expect("every body is in a root");
+            rule.count(TileId(root), 0, grid.rectangle(root), own, &mut census);
+        }
+        let levels: Vec<u8> = census.iter().map(|part| part.level as u8).collect();
+        Forest::new(grid, &levels).map(|forest| Self(Cut::Forest(forest)))
+    }
+
+    /// What becomes of a forest by a census of all its tiles, ascending: tiles are cut as it says, and four that have few bodies
+    /// are joined. Nothing if all stays as it is.
+    ///
+    /// # Errors
+    /// If that is not a census of this partition.
+    pub fn adapted(&self, rule: &Adaptive, census: &[Census]) -> Result<Option<Self>, SetupError> {
+        let Cut::Forest(forest) = &self.0 else { return Ok(None) };
+        let (mut rest, mut levels) = (census, Vec::with_capacity(census.len()));
+        for _ in 0..forest.roots().cells() {
+            join(&mut rest, 0, rule, &mut levels).ok_or(SetupError::BadForest { tile: TileId(levels.len() as u32) })?;
+        }
+        let levels: Vec<u8> = levels.into_iter().map(|(level, _)| level).collect();
+        if levels == forest.levels() {
+            return Ok(None);
+        }
+        Forest::new(forest.roots().clone(), &levels).map(|forest| Some(Self(Cut::Forest(forest))))
+    }
+
+    /// What of a forest becomes what of another over the same squares, in ascending order, tiles that stay as they are included.
+    /// Nothing if the two do not go together.
+    pub fn changes(&self, new: &Self) -> Option<Vec<Change>> {
+        let (Cut::Forest(a), Cut::Forest(b)) = (&self.0, &new.0) else { return None };
+        if a.roots() != b.roots() {
+            return None;
+        }
+        let mut changes = Vec::with_capacity(a.levels().len().max(b.levels().len()));
+        let (mut old, mut new) = (0, 0);
+        while let (Some(&from), Some(&to)) = (a.levels().get(old), b.levels().get(new)) {
+            // How far the tiles of one reach that fill a tile of the other, which is larger.
+            let filled = |levels: &[u8], first: usize, level: u8| {
+                let mut left = 1_u64 << (2 * (MOST_LEVELS - level));
+                let mut end = first;
+                while left > 0 {
+                    left -= 1 << (2 * (MOST_LEVELS - levels[end]));
+                    end += 1;
+                }
+                end
+            };
+            let (end, new_end) = if from <= to {
+                (old + 1, filled(b.levels(), new, from))
+            } else {
+                (filled(a.levels(), old, to), new + 1)
+            };
+            changes.push(Change { old: old as u32..end as u32, new: new as u32..new_end as u32 });
+            (old, new) = (end, new_end);
+        }
+        Some(changes)
+    }
+}
+
+/// Reads a node of a level and its parts from a census, and writes what is left of them when who has few bodies is joined. Nothing
+/// if there is no such node.
+fn join(census: &mut &[Census], level: u8, rule: &Adaptive, levels: &mut Vec<(u8, u64)>) -> Option<()> {
+    let (next, rest) = census.split_first()?;
+    if next.level == u32::from(level) {
+        levels.push((level, next.bodies));
+        *census = rest;
+        return Some(());
+    }
+    if next.level < u32::from(level) || level == MOST_LEVELS {
+        return None;
+    }
+    let first = levels.len();
+    for _ in 0..4 {
+        join(census, level + 1, rule, levels)?;
+    }
+    let parts = &levels[first..];
+    let bodies: u64 = parts.iter().map(|(_, bodies)| bodies).sum();
+    if parts.len() == 4 && bodies * JOINED <= rule.max_bodies {
+        levels.truncate(first);
+        levels.push((level, bodies));
+    }
+    Some(())
+}

@@ -1,0 +1,219 @@
+//! A partition that changes between two steps, where tiles are cut and joined as bodies come and go.
+
+use super::World;
+use crate::exchange::mail::Inbox;
+use crate::model::error::SetupError;
+use crate::model::id::TileId;
+use crate::tiling::partition::{Adaptive, Census, Partition};
+use crate::tiling::regroup::{Renaming, regroup};
+use std::sync::Arc;
+
+impl World {
+    /// Counts the bodies of each tile, ascending, or of the parts that a rule wants it to be cut into. Those of all ranks together,
+    /// ascending by tile, are what [`Partition::adapted`] asks for. Nothing for tiles that are never cut.
+    pub fn census(&self, rule: &Adaptive) -> Vec<Census> {
+        let Some(levels) = self.setup.partition.levels() else { return Vec::new() };
+        let mut census = Vec::with_capacity(self.tiles.len());
+        for tile in &self.tiles {
+            let (level, bodies) = (levels[tile.id.0 as usize], tile.owned as u64);
+            if bodies <= rule.max_bodies {
+                census.push(Census { tile: tile.id, level: u32::from(level), bodies });
+            } else {
+                let mut places = tile.bodies.position[..tile.owned].to_vec();
+                rule.count(tile.id, level, tile.rectangle, &mut places, &mut census);
+            }
+        }
+        census
+    }
+
+    /// Cuts and joins tiles as another partition has it, which every rank must be given at the same step. No bit of a body changes,
+    /// and contacts go on with the impulses they have. This world goes on to hold what becomes of its tiles. Takes time for each
+    /// tile, and for each body and contact of those that change, or border such.
+    ///
+    /// # Errors
+    /// If the two partitions are not [forests](Partition::forest) over the same squares, or this world holds some of the tiles
+    /// that are to be joined and not the others: it is left as it was.
+    pub fn retile(&mut self, partition: &Partition) -> Result<(), SetupError> {
+        let old = Arc::clone(&self.setup);
+        let torn = |tile: u32| SetupError::TornApart { tile: TileId(tile) };
+        let changes = old.partition.changes(partition).ok_or(torn(0))?;
+        let held = |tile: u32| self.place_of(TileId(tile)).is_some();
+        if let Some(change) =
+            changes.iter().find(|change| change.old.clone().any(|tile| held(tile) != held(change.old.start)))
+        {
+            return Err(torn(change.old.start));
+        }
+        let setup = old.with_partition(partition);
+        let renaming = Renaming::new(&old.partition, partition, &changes);
+        let mut rest = std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works)).peekable();
+        for change in &changes {
+            let mut sources = Vec::with_capacity(change.old.len());
+            while let Some(source) = rest.next_if(|(tile, _)| change.old.contains(&tile.id.0)) {
+                sources.push(source);
+            }
+            if let [(tile, work)] = &mut sources[..]
+                && renaming.rename(tile)
+            {
+                self.works.push(work.take());
+                self.tiles.extend(sources.into_iter().map(|(tile, _)| tile));
+            } else if !sources.is_empty() {
+                let sources: Vec<_> = sources.into_iter().map(|(tile, _)| tile).collect();
+                self.tiles.extend(regroup(&sources, change.new.clone(), &renaming, &setup));
+                self.works.resize_with(self.tiles.len(), || None);
+            }
+        }
+        let names = self.tiles.iter().map(|tile| tile.id);
+        self.inbox = Inbox::new(names, partition.tiles(), setup.dynamic_kinds);
+        self.setup = Arc::new(setup);
+        self.dismissed.clear();
+        self.changed = true;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Loopback;
+    use crate::model::body::{Body, StaticBody};
+    use crate::model::contact::Contact;
+    use crate::model::id::{GlobalId, KindId};
+    use crate::model::params::{Exchange, Params};
+    use crate::step::step;
+    use crate::testing::{circle, rectangle};
+    use crate::tiling::blueprint::Blueprint;
+    use crate::tiling::tile::Tile;
+    use glam::{DVec2, Vec2};
+
+    /// A heap of discs and boxes in the corner of two squares.
+    fn heap(exchange: Exchange, levels: &[u8]) -> Blueprint {
+        let params = Params { gravity: Vec2::new(-3.0, -10.0), exchange, ..Params::default() };
+        let partition = Partition::forest(DVec2::ZERO, DVec2::new(16.0, 8.0), 2, 1, levels).unwrap();
+        let statics = vec![
+            StaticBody::new(GlobalId(0), rectangle(40.0, 2.0), DVec2::new(8.0, -1.0)),
+            StaticBody::new(GlobalId(1), rectangle(2.0, 40.0), DVec2::new(-1.0, 8.0)),
+        ];
+        Blueprint { params, partition, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics }
+    }
+
+    fn bodies_of_heap() -> impl Iterator<Item = Body> {
+        (0..240_u32).map(|k| {
+            let place = DVec2::new(0.3 + 0.53 * f64::from(k % 20), 0.3 + 0.52 * f64::from(k / 20));
+            let body = Body::at_rest(GlobalId(u64::from(k) + 2), KindId(u32::from(k % 3 > 0)), place);
+            Body { velocity: Vec2::new((k % 7) as f32 - 3.0, 0.0), ..body }
+        })
+    }
+
+    fn world(exchange: Exchange, levels: &[u8]) -> World {
+        let mut world = World::whole(&heap(exchange, levels)).unwrap();
+        bodies_of_heap().for_each(|body| assert!(world.add(body).unwrap()));
+        world
+    }
+
+    fn of(world: &World, levels: &[u8]) -> Partition {
+        let (low, high) = (world.partition().min(), world.partition().max());
+        Partition::forest(low, high, 2, 1, levels).unwrap()
+    }
+
+    /// What owners remember of each contact: of one between two tiles that of body A's, and that its other owner has one as well.
+    fn contacts(world: &World) -> Vec<((GlobalId, GlobalId), Contact)> {
+        let mut contacts = Vec::new();
+        for tile in world.tile_states() {
+            for (key, contact) in tile.contacts.iter().filter(|(key, _)| key.is_own()) {
+                let pair = tile.pair_of(key);
+                let owns_a = tile.bodies.id[..tile.owned].contains(&pair.0) || !key.is_border();
+                if owns_a {
+                    contacts.push((pair, *contact));
+                } else {
+                    let others = world.tile_states().iter().filter(|other| other.id != tile.id);
+                    let knows =
+                        |other: &Tile| other.contacts.iter().any(|(key, _)| key.is_own() && other.pair_of(key) == pair);
+                    assert_eq!(others.filter(|other| knows(other)).count(), 1, "{pair:?}");
+                }
+            }
+        }
+        contacts.sort_unstable_by_key(|(pair, _)| *pair);
+        assert!(contacts.windows(2).all(|two| two[0].0 < two[1].0), "each contact has one owner of body A");
+        contacts
+    }
+
+    fn bodies(world: &World) -> Vec<Body> {
+        let mut bodies: Vec<Body> = world.bodies().collect();
+        bodies.sort_unstable_by_key(|body| body.id);
+        bodies
+    }
+
+    const TILINGS: [&[u8]; 5] = [
+        &[0, 0],
+        &[1, 1, 1, 1, 0],
+        &[2, 2, 2, 2, 1, 1, 1, 1, 2, 2, 2, 2, 1, 1],
+        &[2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 0],
+        &[0, 1, 1, 1, 1],
+    ];
+
+    #[test]
+    fn bodies_and_contacts_live_on_through_a_change() {
+        for exchange in [Exchange::Step, Exchange::Substep] {
+            let mut world = world(exchange, TILINGS[2]);
+            for number in 0..60 {
+                step(&mut world, &mut Loopback).unwrap();
+                let before = (bodies(&world), contacts(&world), world.hashes().state);
+                assert!(number < 5 || before.1.len() > 200, "{} contacts", before.1.len());
+                let partition = of(&world, TILINGS[number % TILINGS.len()]);
+                world.retile(&partition).unwrap();
+                assert!((bodies(&world), contacts(&world), world.hashes().state) == before, "after step {number}");
+                // And all of it can be saved, and goes on alike.
+                let mut bytes = Vec::new();
+                let saved = world.save(&mut bytes);
+                let mut again = World::whole(&Blueprint { partition, ..heap(exchange, &[0, 0]) }).unwrap();
+                let mut rest = &bytes[..];
+                for saved in saved {
+                    again.restore(saved.tile, rest.split_off(..saved.length).unwrap()).unwrap();
+                }
+                again.resume_at(world.step_count());
+                if number % 7 == 0 {
+                    step(&mut world, &mut Loopback).unwrap();
+                    step(&mut again, &mut Loopback).unwrap();
+                }
+                assert_eq!(again.hashes(), world.hashes(), "after step {number}");
+            }
+        }
+    }
+
+    #[test]
+    fn tiles_are_cut_and_joined_as_the_census_says() {
+        let rule = Adaptive { max_bodies: 40, least_side: 1.0 };
+        let mut world = world(Exchange::Substep, &[0, 0]);
+        let mut tilings = Vec::new();
+        for _ in 0..90 {
+            if let Some(partition) = world.partition().adapted(&rule, &world.census(&rule)).unwrap() {
+                world.retile(&partition).unwrap();
+            }
+            tilings.push(world.partition().levels().unwrap().to_vec());
+            assert!(world.tile_states().iter().all(|tile| tile.owned <= 40 || tile.rectangle.size().x < 2.0));
+            step(&mut world, &mut Loopback).unwrap();
+        }
+        tilings.dedup();
+        assert!(tilings.len() > 1, "{tilings:?}");
+    }
+
+    #[test]
+    fn what_cannot_follow_changes_nothing() {
+        let blueprint = heap(Exchange::Step, &[1, 1, 1, 1, 0]);
+        let mut world = World::new(&blueprint, &[0, 1, 4].map(TileId)).unwrap();
+        for body in bodies_of_heap() {
+            world.add(body).unwrap();
+        }
+        let before = world.hashes();
+        let joined = of(&world, &[0, 0]);
+        assert_eq!(world.retile(&joined), Err(SetupError::TornApart { tile: TileId(0) }));
+        let other = Partition::uniform(DVec2::ZERO, DVec2::new(16.0, 8.0), 2, 1).unwrap();
+        assert!(world.retile(&other).is_err());
+        assert_eq!(world.hashes(), before);
+        // Where none of the tiles is here, none is torn apart.
+        let cut = of(&world, &[1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1]);
+        world.retile(&cut).unwrap();
+        assert!(world.tiles().eq([0, 1, 7, 8, 9, 10].map(TileId)));
+        assert_eq!(world.hashes(), before);
+    }
+}

@@ -1,0 +1,132 @@
+//! The tiles of a run in which these follow the bodies: `DIR/tilings.jsonl`, a line for those that it begins with and one for
+//! each change.
+//!
+//! ```text
+//! {"after":64,"levels":"aabbbbab"}
+//! ```
+//!
+//! `after` so many steps, before the next, the tiles became these: for each how often it was cut from its square, `a` for a
+//! square that is whole, in the order of [`Partition::forest`].
+
+use crate::plan::tiles::{in_letters, of_letters};
+use atoll_core::Partition;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+#[derive(Serialize, Deserialize)]
+struct Line<'a> {
+    after: u64,
+    levels: Cow<'a, str>,
+}
+
+/// Writes the tilings of a run.
+#[derive(Debug)]
+pub(crate) struct TilingsFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl TilingsFile {
+    /// Begins with the tiles that a run begins with; one that goes on after a step keeps what was written until then.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn start(path: PathBuf, first: &Partition, resumed: Option<u64>) -> io::Result<Self> {
+        let known = resumed.map(|_| fs::read_to_string(&path)).transpose();
+        let known = known.or_else(|error| if error.kind() == ErrorKind::NotFound { Ok(None) } else { Err(error) })?;
+        let mut file = Self { file: File::create(&path)?, path };
+        let is_kept =
+            |number: usize, line: &Line<'_>| number == 0 || resumed.is_some_and(|resumed| line.after < resumed);
+        match known {
+            Some(known) => {
+                let lines = known.lines().map_while(|line| serde_json::from_str::<Line<'_>>(line).ok()).enumerate();
+                for (_, line) in lines.filter(|(number, line)| is_kept(*number, line)) {
+                    file.write(&line)?;
+                }
+            }
+            None => file.append(resumed.unwrap_or(0), first)?,
+        }
+        Ok(file)
+    }
+
+    /// Where it lies, and the file itself, for who makes it durable.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn shared(&self) -> io::Result<(PathBuf, File)> {
+        Ok((self.path.clone(), self.file.try_clone()?))
+    }
+
+    /// Tiles that are those of all steps from here on.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn append(&mut self, after: u64, partition: &Partition) -> io::Result<()> {
+        let Some(levels) = partition.levels() else { return Ok(()) };
+        self.write(&Line { after, levels: in_letters(levels).into() })
+    }
+
+    fn write(&mut self, line: &Line<'_>) -> io::Result<()> {
+        let mut text = serde_json::to_string(line).expect("a number and letters");
+        text.push('\n');
+        // In one piece: who is killed leaves no half of a line behind.
+        self.file.write_all(text.as_bytes())
+    }
+}
+
+/// The tilings that a run wrote down, ascending.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Tilings(Vec<(u64, Arc<Partition>)>);
+
+impl Tilings {
+    /// Those of a file, over columns x rows of squares. None if there is no such file. What comes after a line that cannot be
+    /// read is left out.
+    pub(crate) fn read(path: &Path, [low, high]: [glam::DVec2; 2], [columns, rows]: [u32; 2]) -> Self {
+        let text = fs::read_to_string(path).unwrap_or_default();
+        let tiling = |line: &str| {
+            let Line { after, levels } = serde_json::from_str(line).ok()?;
+            let partition = Partition::forest(low, high, columns, rows, &of_letters(&levels)?).ok()?;
+            Some((after, Arc::new(partition)))
+        };
+        Self(text.lines().map_while(tiling).collect())
+    }
+
+    /// The tiles with which a step was made, counted from one; of step 0 those that the run began with.
+    pub(crate) fn at(&self, step: u64) -> Option<&Arc<Partition>> {
+        let before = self.0.partition_point(|(after, _)| *after < step).max(1);
+        self.0.get(before - 1).map(|(_, partition)| partition)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    #[test]
+    fn what_was_written_is_read_and_cut_off_where_a_run_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tilings.jsonl");
+        let domain = [DVec2::ZERO, DVec2::new(2.0, 1.0)];
+        let of = |levels: &[u8]| Partition::forest(domain[0], domain[1], 2, 1, levels).unwrap();
+        let all = [of(&[0, 0]), of(&[1, 1, 1, 1, 0]), of(&[0, 1, 1, 1, 1]), of(&[1; 8])];
+        let at = |step| Tilings::read(&path, domain, [2, 1]).at(step).map(|partition| (**partition).clone());
+        assert_eq!(at(3), None);
+        let mut file = TilingsFile::start(path.clone(), &all[0], None).unwrap();
+        for (after, partition) in [(0, &all[1]), (64, &all[2]), (128, &all[3])] {
+            file.append(after, partition).unwrap();
+        }
+        let found = |steps: [u64; 6]| steps.map(|step| all.iter().position(|one| Some(one) == at(step).as_ref()));
+        assert_eq!(found([0, 1, 64, 65, 128, 129]), [0, 1, 1, 2, 2, 3].map(Some));
+        // Who goes on after step 64 has the tiles looked at anew before the next one.
+        let mut file = TilingsFile::start(path.clone(), &all[3], Some(64)).unwrap();
+        assert_eq!(found([0, 1, 64, 65, 128, 129]), [0, 1, 1, 1, 1, 1].map(Some));
+        file.append(64, &all[2]).unwrap();
+        fs::write(&path, fs::read_to_string(&path).unwrap() + "{\"after\":9").unwrap();
+        assert_eq!(found([0, 1, 64, 65, 128, 129]), [0, 1, 1, 2, 2, 2].map(Some));
+    }
+}
