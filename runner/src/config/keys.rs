@@ -195,11 +195,11 @@ mod tests {
             ("physics.margin_floor", "0.07"),
             ("physics.margin_cap", "0.7"),
         ];
-        let usual = config("rooms", &[]);
+        let usual = config("rooms", &[("max_bodies", "9")]);
         let (mut changed, before) = (BTreeSet::new(), kept(&usual));
         for key in KEYS.iter().filter(|key| key.name.split_once('.').is_some_and(|(section, _)| section != "scene")) {
             let value = others.iter().find(|(name, _)| *name == key.name).map_or("11", |(_, value)| value);
-            let other = config("rooms", &[(key.name, value)]);
+            let other = config("rooms", &[("max_bodies", "9"), (key.name, value)]);
             assert_ne!(usual, other, "{} changes nothing", key.name);
             let after = kept(&other);
             // Options and pairs take more lines; the first that differs names the field.

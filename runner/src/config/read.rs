@@ -52,7 +52,10 @@ impl Config {
         let mut config = Self::usual(SceneKind::Stack);
         KEYS.iter().try_for_each(|key| key.read(&mut settings, &mut config))?;
         check(&config, &settings, has)?;
-        settings.finish(|key| format!("scenes of this kind have no {key}; leave it out"))?;
+        settings.finish(|key| match key.starts_with("scene.") {
+            true => format!("scenes of this kind have no {key}; leave it out"),
+            false => "tiles stay as they are here; add tiles = \"adaptive\", or leave it out".to_owned(),
+        })?;
         Ok(config)
     }
 }

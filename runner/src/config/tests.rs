@@ -98,6 +98,8 @@ fn every_key_can_be_given() {
         threads = 3
         transport = "channel"
         tiles = [4, 5]
+        max_bodies = 600
+        retile_every = 8
         peer_timeout = 2.5
         instructions = "portable"
         mpi_exchange = "sparse"
@@ -142,6 +144,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
     assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
+    assert_eq!(config.run.adaptive, Some(AdaptiveConfig { max_bodies: 600, retile_every: 8 }));
     assert_eq!(config.run.balance, Balance::Bodies);
     assert_eq!(config.params.instructions, Instructions::Portable);
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
@@ -162,6 +165,11 @@ fn every_key_can_be_given() {
 fn overrides_win_and_the_last_of_them_most() {
     let config = read(ROOMS, &[("scene.bodies", "1e3"), ("bodies", "2000"), ("tiles", "3x2")]).unwrap();
     assert_eq!((config.scene.bodies, config.run.tiles), (2000, Some([3, 2])));
+    let adaptive = |overrides| read(ROOMS, overrides).unwrap().run.adaptive.map(|a| (a.max_bodies, a.retile_every));
+    assert_eq!(adaptive(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((16_000, 5)));
+    assert_eq!(adaptive(&[("tiles", "3x2"), ("max_bodies", "70")]), Some((70, 32)));
+    let error = read(ROOMS, &[("tiles", "3x2"), ("retile_every", "5")]).unwrap_err();
+    assert_eq!(error, "--set run.retile_every=5: tiles stay as they are here; add tiles = \"adaptive\", or leave it out");
     let config = read(ROOMS, &[("tiles", "3x2"), ("run.tiles", "auto"), ("kind", "pile")]).unwrap();
     assert_eq!((config.run.tiles, config.scene.kind.name()), (None, "pile"));
     assert_eq!(read(ROOMS, &[("kind", "\"pile\"")]).unwrap().scene.kind.name(), "pile");
@@ -183,7 +191,7 @@ fn out_of_range_and_of_the_wrong_type() {
         ("run", "steps = 0", "test.toml: run.steps = 0: must be a whole number within 1 to"),
         ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 1024"),
         ("run", "threads = 0", "test.toml: run.threads = 0: must be \"auto\", or a whole number within 1 to 1024"),
-        ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", or columns and rows"),
+        ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", \"adaptive\", or columns and rows"),
         ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
         ("run", "tiles = \"3by2\"", "test.toml: run.tiles = \"3by2\": must be"),
         (

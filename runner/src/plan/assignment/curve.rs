@@ -63,8 +63,8 @@ mod tests {
 
     #[test]
     fn tiles_of_any_sizes_follow_each_other_along_the_curve() {
-        let levels = [1, 2, 2, 2, 2, 1, 2, 2, 3, 3, 3, 3, 2, 0];
-        let forest = Partition::forest(DVec2::ZERO, DVec2::new(2.0, 1.0), 2, 1, &levels).unwrap();
+        let levels = [1, 2, 2, 2, 2, 1, 2, 2, 3, 3, 3, 3, 2];
+        let forest = Partition::forest(DVec2::ZERO, DVec2::ONE, 1, 1, &levels).unwrap();
         let order = hilbert_order(&forest);
         let mut sorted = order.clone();
         sorted.sort_unstable();
