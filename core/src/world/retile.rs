@@ -4,24 +4,30 @@ use super::World;
 use crate::exchange::mail::Inbox;
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
-use crate::tiling::partition::{Adaptive, Census, Partition};
+use crate::tiling::partition::{Adaptive, CONTACT, Census, Partition};
 use crate::tiling::regroup::{Renaming, regroup};
+use glam::DVec2;
 use std::sync::Arc;
 
 impl World {
-    /// Counts the bodies of each tile, ascending, or of the parts that a rule wants it to be cut into. Those of all ranks together,
-    /// ascending by tile, are what [`Partition::adapted`] asks for. Nothing for tiles that are never cut.
+    /// Counts what there is to do in each tile, ascending, or in the parts that a rule wants it to be cut into. Those of all ranks
+    /// together, ascending by tile, are what [`Partition::adapted`] asks for. Nothing for tiles that are never cut.
     pub fn census(&self, rule: &Adaptive) -> Vec<Census> {
         let Some(levels) = self.setup.partition.levels() else { return Vec::new() };
         let mut census = Vec::with_capacity(self.tiles.len());
         for tile in &self.tiles {
-            let (level, bodies) = (levels[tile.id.0 as usize], tile.owned as u64);
-            if bodies <= rule.max_bodies {
-                census.push(Census { tile: tile.id, level: u32::from(level), bodies });
-            } else {
-                let mut places = tile.bodies.position[..tile.owned].to_vec();
-                rule.count(tile.id, level, tile.rectangle, &mut places, &mut census);
+            let (level, own) = (levels[tile.id.0 as usize], tile.contacts.own());
+            let load = tile.owned as u64 + CONTACT * own as u64;
+            if load <= rule.max_bodies {
+                census.push(Census { tile: tile.id, level: u32::from(level), load });
+                continue;
             }
+            let mut bodies: Vec<(DVec2, u64)> =
+                tile.bodies.position[..tile.owned].iter().map(|&place| (place, 1)).collect();
+            for key in &tile.contacts.keys[..own] {
+                bodies[tile.index(key.low())].1 += CONTACT;
+            }
+            rule.count(tile.id, level, tile.rectangle, &mut bodies, &mut census);
         }
         census
     }
@@ -83,7 +89,7 @@ mod tests {
     use crate::testing::{circle, rectangle};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::tile::Tile;
-    use glam::{DVec2, Vec2};
+    use glam::Vec2;
 
     /// A heap of discs and boxes in the corner of two squares.
     fn heap(exchange: Exchange, levels: &[u8]) -> Blueprint {
@@ -182,7 +188,7 @@ mod tests {
 
     #[test]
     fn tiles_are_cut_and_joined_as_the_census_says() {
-        let rule = Adaptive { max_bodies: 40, least_side: 1.0 };
+        let rule = Adaptive { max_bodies: 300, least_side: 1.0 };
         let mut world = world(Exchange::Substep, &[0, 0]);
         let mut tilings = Vec::new();
         for _ in 0..90 {
@@ -190,7 +196,8 @@ mod tests {
                 world.retile(&partition).unwrap();
             }
             tilings.push(world.partition().levels().unwrap().to_vec());
-            assert!(world.tile_states().iter().all(|tile| tile.owned <= 40 || tile.rectangle.size().x < 2.0));
+            let load = |tile: &Tile| tile.owned + CONTACT as usize * tile.contacts.own();
+            assert!(world.tile_states().iter().all(|tile| load(tile) <= 300 || tile.rectangle.size().x < 2.0));
             step(&mut world, &mut Loopback).unwrap();
         }
         tilings.dedup();

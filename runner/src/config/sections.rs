@@ -53,7 +53,8 @@ pub struct RunConfig {
 /// How tiles follow the bodies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct AdaptiveConfig {
-    /// A tile with more bodies is cut in four; four that together have less than half of that are joined.
+    /// A tile with more to do is cut in four, and four that together have less than half of that are joined: in bodies that touch
+    /// nothing, of which a contact counts as six.
     pub max_bodies: u64,
     /// So many steps lie between two times at which that is looked at.
     pub retile_every: u64,
@@ -160,7 +161,7 @@ impl Default for RunConfig {
 
 impl Default for AdaptiveConfig {
     fn default() -> Self {
-        Self { max_bodies: 16000, retile_every: 32 }
+        Self { max_bodies: 32_000, retile_every: 32 }
     }
 }
 

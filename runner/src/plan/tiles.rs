@@ -27,9 +27,9 @@ pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
         let halo_width = halo_width(&scene.kinds(), &config.params);
         match config.run.adaptive {
             None => default_counts(scene.bodies() as f64 / BODIES_PER_TILE, high - low, halo_width),
-            // Cut from these as often as is usual, evenly spread bodies fill tiles by half.
+            // Cut from these as often as is usual, evenly spread bodies with some contacts fill tiles by half.
             Some(adaptive) => {
-                let tiles = scene.bodies() as f64 / (0.5 * adaptive.max_bodies as f64);
+                let tiles = scene.bodies() as f64 / (0.25 * adaptive.max_bodies as f64);
                 default_counts(tiles, high - low, halo_width).map(|count| ((count + CUT_IN / 2) / CUT_IN).max(1))
             }
         }

@@ -1,10 +1,10 @@
 //! What a run takes, tile by tile: its steps made here on one thread, each tile's time and what it tells others kept over time.
 
 use crate::error::RunError;
-use crate::plan::Plan;
+use crate::plan::{Plan, tiles};
 use crate::rank::balance::thread_time;
 use crate::rank::{Observer, part_of_scene};
-use atoll_core::{Halo, Inbox, Loopback, NotHere, Outbox, StepError, World};
+use atoll_core::{Change, Halo, Inbox, Loopback, NotHere, Outbox, Partition, SetupError, StepError, World};
 use atoll_transport::Rank;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -22,14 +22,35 @@ pub(super) type Told = (u32, u32, f64);
 /// A run, as it went on one thread.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// In the order of their steps; all of as many, but perhaps the last.
+    /// In the order of their steps.
     pub moments: Vec<Moment>,
-    /// One for every [`TRAFFIC`] steps.
-    traffic: Vec<Vec<Told>>,
-    /// Bodies of each tile before the first step, and then after as many.
-    bodies: Vec<Vec<u64>>,
+    /// Of [`TRAFFIC`] steps each, or fewer.
+    pub windows: Vec<Window>,
+    /// How the domain is cut, in the order of steps: at first, and whenever that changes.
+    pub tilings: Vec<Tiling>,
     /// Sync points of a step.
     pub syncs: f64,
+}
+
+/// Tiles from a step on.
+#[derive(Clone, Debug)]
+pub(super) struct Tiling {
+    /// The first of its steps.
+    pub step: u64,
+    pub partition: Partition,
+    /// What became what; empty for the first.
+    pub changes: Vec<Change>,
+}
+
+/// Some steps with the same tiles.
+#[derive(Clone, Debug)]
+pub(super) struct Window {
+    /// The first of them.
+    pub step: u64,
+    /// What tiles tell each other in each.
+    pub told: Vec<Told>,
+    /// Bodies of each tile before the first.
+    pub bodies: Vec<u64>,
 }
 
 /// A step, or the mean of some.
@@ -53,14 +74,20 @@ impl Course {
     pub(super) fn run(plan: &Plan, observer: &Observer) -> Result<Option<Self>, RunError> {
         let mut world = part_of_scene(plan, Rank(0)).map_err(RunError::Setup)?;
         world.book_time(thread_time);
-        let (steps, tiles) = (plan.config.run.steps, plan.blueprint.partition.tiles());
-        let stride = (steps * tiles as u64).div_ceil(MOST_TIMES).max(1);
-        let mut course = Self { moments: Vec::new(), traffic: Vec::new(), bodies: vec![bodies(&world)], syncs: 0.0 };
+        let (steps, partition) = (plan.config.run.steps, world.partition().clone());
+        let stride = (steps * partition.tiles() as u64).div_ceil(MOST_TIMES).max(1);
+        let tilings = vec![Tiling { step: 0, partition, changes: Vec::new() }];
+        let mut course = Self { moments: Vec::new(), windows: Vec::new(), tilings, syncs: 0.0 };
         let mut tap = Tap::default();
         let (told, mut before) = (observer.steps(true, 0, steps), thread_time());
         for step in 0..steps {
             if observer.stop.is_requested() {
                 return Ok(None);
+            }
+            let changed = course.retile(plan, step, &mut world).map_err(RunError::Setup)?;
+            if changed || course.windows.last().is_none_or(|window| window.step + TRAFFIC <= step) {
+                course.end_window(&mut tap);
+                course.windows.push(Window { step, told: Vec::new(), bodies: bodies(&world) });
             }
             atoll_core::step(&mut world, &mut tap).map_err(|error| match error {
                 StepError::NonFinite { step, id } => RunError::NonFinite { step, id },
@@ -69,23 +96,46 @@ impl Course {
                 StepError::Halo(NotHere { tile }) => RunError::Protocol { step, tile },
             })?;
             course.add((step, stride), thread_time().saturating_sub(before), &mut world);
-            if (step + 1).is_multiple_of(TRAFFIC) || step + 1 == steps {
-                course.traffic.push(tap.take());
-                course.bodies.push(bodies(&world));
-            }
             // What was done here is none of the step's.
             before = thread_time();
             observer.complete.store(step + 1, Ordering::Relaxed);
             told.made(step + 1);
         }
+        course.end_window(&mut tap);
         course.moments.iter_mut().for_each(Moment::divide);
         course.syncs = tap.syncs as f64 / steps as f64;
         Ok(Some(course))
     }
 
+    /// Lets tiles be cut and joined when it is time to. Says whether any was.
+    fn retile(&mut self, plan: &Plan, step: u64, world: &mut World) -> Result<bool, SetupError> {
+        let Some((rule, adaptive)) = tiles::rule(&plan.config, &plan.blueprint.kinds).zip(plan.config.run.adaptive) else {
+            return Ok(false);
+        };
+        if !step.is_multiple_of(adaptive.retile_every) {
+            return Ok(false);
+        }
+        let Some(partition) = world.partition().adapted(&rule, &world.census(&rule))? else { return Ok(false) };
+        let changes = world.partition().changes(&partition).expect("one follows from the other");
+        world.retile(&partition)?;
+        // What was booked before is another moment's.
+        world.take_booked_times().for_each(drop);
+        self.tilings.push(Tiling { step, partition, changes });
+        Ok(true)
+    }
+
+    /// Keeps what was told in the window that ends.
+    fn end_window(&mut self, tap: &mut Tap) {
+        let told = tap.take();
+        if let Some(window) = self.windows.last_mut() {
+            window.told = told;
+        }
+    }
+
     /// Adds a step that took so long, to a moment of so many.
     fn add(&mut self, (step, stride): (u64, u64), took: Duration, world: &mut World) {
-        if step.is_multiple_of(stride) {
+        let tiling = self.tilings.last().expect("there is one").step;
+        if self.moments.last().is_none_or(|moment| moment.steps == stride || tiling == step) {
             let tiles = vec![0.0; world.tiles().count()];
             self.moments.push(Moment { step, steps: 0, tiles, rest: 0.0 });
         }
@@ -99,19 +149,9 @@ impl Course {
         moment.rest += rest.max(0.0);
     }
 
-    /// How many times the traffic has changed before a step.
+    /// The window of a step, by its place.
     pub(super) fn window(&self, step: u64) -> usize {
-        ((step / TRAFFIC) as usize).min(self.traffic.len() - 1)
-    }
-
-    /// What tiles tell each other in a step of a window.
-    pub(super) fn traffic(&self, window: usize) -> &[Told] {
-        &self.traffic[window]
-    }
-
-    /// Bodies of each tile when a window begins.
-    pub(super) fn bodies(&self, window: usize) -> &[u64] {
-        &self.bodies[window]
+        self.windows.partition_point(|window| window.step <= step) - 1
     }
 }
 
@@ -162,8 +202,10 @@ impl Halo for Tap {
 #[cfg(test)]
 impl Course {
     /// One that was thought up: its moments, each of a step, what tiles tell each other in every one, and their bodies.
-    pub(super) fn of(moments: Vec<Moment>, told: Vec<Told>, bodies: Vec<u64>) -> Self {
-        let windows = moments.len().div_ceil(TRAFFIC as usize);
-        Self { moments, traffic: vec![told; windows], bodies: vec![bodies; windows + 1], syncs: 1.0 }
+    pub(super) fn of(partition: Partition, moments: Vec<Moment>, told: Vec<Told>, bodies: Vec<u64>) -> Self {
+        let tilings = vec![Tiling { step: 0, partition, changes: Vec::new() }];
+        let windows = moments.iter().step_by(TRAFFIC as usize);
+        let windows = windows.map(|first| Window { step: first.step, told: told.clone(), bodies: bodies.clone() });
+        Self { windows: windows.collect(), moments, tilings, syncs: 1.0 }
     }
 }

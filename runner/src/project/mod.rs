@@ -48,8 +48,11 @@ pub struct Projection {
     pub bodies: u64,
     /// Steps.
     pub steps: u64,
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles, or of the squares that they are cut from.
     pub tiles: [u32; 2],
+    /// Bodies that a tile has at most before it is cut, if tiles follow the bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_bodies: Option<u64>,
     /// Of the network, in seconds.
     pub latency_s: f64,
     /// Of a rank, each way, in bytes per second.
@@ -71,17 +74,17 @@ impl Projection {
         let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| failed(error.to_string()))?;
         let Some(course) = pool.install(|| Course::run(plan, observer))? else { return Ok(None) };
         let &Wanted { ref ranks, threads, network } = wanted;
-        let partition = &plan.blueprint.partition;
-        let one = |ranks: usize, rule| predict(&course, partition, Machine { ranks, threads, network }, rule);
+        let one = |ranks: usize, rule| predict(&course, Machine { ranks, threads, network }, rule);
         let rules = |ranks: usize| if ranks == 1 { &RULES[..1] } else { &RULES };
         let predictions = ranks.iter().flat_map(|&ranks| rules(ranks).iter().map(move |&rule| (ranks, rule)));
-        let alone = predict(&course, partition, Machine { ranks: 1, threads: 1, network }, Balance::Off);
+        let alone = predict(&course, Machine { ranks: 1, threads: 1, network }, Balance::Off);
         Ok(Some(Self {
             scene: plan.config.scene.kind.name(),
             config_hash: plan.config.hash(plan.tiles),
             bodies: plan.scene.bodies(),
             steps: plan.config.run.steps,
             tiles: plan.tiles,
+            max_bodies: plan.config.run.adaptive.map(|adaptive| adaptive.max_bodies),
             latency_s: network.latency,
             bandwidth: network.bandwidth,
             ms_per_step_alone: alone.ms_per_step,

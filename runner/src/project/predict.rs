@@ -1,11 +1,11 @@
 //! What so many ranks would take for a run whose course is known.
 
-use super::course::{Course, Moment};
+use super::course::{Course, Moment, Tiling};
 use super::network::{Load, Network};
 use crate::config::Balance;
 use crate::plan::Assignment;
 use crate::rank::balance::{is_uneven, steps_between};
-use atoll_core::{Partition, TileId};
+use atoll_core::{Change, Partition, TileId};
 use serde::Serialize;
 
 /// What handing over a tile costs who gives it up and who takes it over together, in seconds for each of its bodies: measured with
@@ -86,15 +86,23 @@ impl Sums {
 }
 
 /// Goes through a course as if so many ranks made it.
-pub(super) fn predict(course: &Course, partition: &Partition, machine: Machine, balance: Balance) -> Prediction {
+pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Prediction {
     let Machine { ranks, threads, network } = machine;
-    let mut assignment = Assignment::balanced(partition, course.bodies(0), ranks);
+    let (mut tiling, mut next) = (&course.tilings[0].partition, 1);
+    let mut assignment = Assignment::balanced(tiling, &course.windows[0].bodies, ranks);
     let (every, mut since) = (steps_between(ranks) as u64, 0);
-    let mut costs = vec![0.0; partition.tiles()];
+    let mut costs = vec![0.0; tiling.tiles()];
     let (mut loads, mut loads_of) = (Vec::new(), None);
     let (mut all, mut last, mut tiles_moved) = (Sums::default(), Sums::default(), 0);
     let steps = course.moments.last().map_or(0, |moment| moment.step + moment.steps);
     for moment in &course.moments {
+        let mut moving = (0, 0.0);
+        if let Some(new) = course.tilings.get(next).filter(|tiling| tiling.step <= moment.step) {
+            let bodies = &course.windows[course.window(moment.step.max(1) - 1)].bodies;
+            (assignment, moving) = follow(&assignment, new, bodies, &network);
+            costs = dealt(&costs, &new.changes);
+            (tiling, next, loads_of) = (&new.partition, next + 1, None);
+        }
         let window = course.window(moment.step);
         if loads_of != Some(window) {
             loads = messages(course, window, &assignment);
@@ -118,18 +126,20 @@ pub(super) fn predict(course: &Course, partition: &Partition, machine: Machine, 
         since += moment.steps;
         if balance != Balance::Off && since >= every && ranks > 1 {
             let nanos: Vec<u64> = match balance {
-                Balance::Bodies => course.bodies(window).to_vec(),
+                Balance::Bodies => course.windows[window].bodies.clone(),
                 _ => costs.iter().map(|cost| (cost * 1e9) as u64).collect(),
             };
-            if let Some(better) = better(&assignment, partition, &nanos, balance) {
-                let (moved, seconds) = moving(&assignment, &better, course.bodies(window), &network);
-                (tiles_moved, assignment, loads_of) = (tiles_moved + moved, better, None);
-                one.moving = seconds / moment.steps as f64;
-                one.time += one.moving;
+            if let Some(better) = better(&assignment, tiling, &nanos, balance) {
+                let (moved, seconds) = moves(&assignment, &better, &course.windows[window].bodies, &network);
+                moving = (moving.0 + moved, moving.1 + seconds);
+                (assignment, loads_of) = (better, None);
             }
             costs.fill(0.0);
             since = 0;
         }
+        tiles_moved += moving.0;
+        one.moving = moving.1 / moment.steps as f64;
+        one.time += one.moving;
         all.add(moment.steps as f64, one);
         if moment.step >= steps - steps / 4 {
             last.add(moment.steps as f64, one);
@@ -195,7 +205,7 @@ fn makespan(mut jobs: Vec<f64>, hands: usize) -> f64 {
 fn messages(course: &Course, window: usize, assignment: &Assignment) -> Vec<Load> {
     let mut loads = vec![Load::default(); assignment.ranks()];
     let mut pairs = Vec::new();
-    for &(from, to, bytes) in course.traffic(window) {
+    for &(from, to, bytes) in &course.windows[window].told {
         let (from, to) = (assignment.rank_of(TileId(from)), assignment.rank_of(TileId(to)));
         if from != to {
             loads[from].bytes[0] += bytes;
@@ -212,6 +222,23 @@ fn messages(course: &Course, window: usize, assignment: &Assignment) -> Vec<Load
     loads
 }
 
+/// Who holds the tiles that a tiling begins with, and how many tiles move for it, and how long that takes: who holds the first of
+/// those that are joined gets the others.
+fn follow(old: &Assignment, new: &Tiling, bodies: &[u64], network: &Network) -> (Assignment, (u64, f64)) {
+    let joined = old.joined(&new.changes);
+    let moved = if joined == *old { (0, 0.0) } else { moves(old, &joined, bodies, network) };
+    (joined.followed(&new.changes), moved)
+}
+
+/// What tiles cost so far, dealt out to those that they became.
+fn dealt(costs: &[f64], changes: &[Change]) -> Vec<f64> {
+    let dealt = changes.iter().flat_map(|change| {
+        let sum: f64 = change.old.clone().map(|tile| costs[tile as usize]).sum();
+        change.new.clone().map(move |_| sum / change.new.len() as f64)
+    });
+    dealt.collect()
+}
+
 /// The assignment that ranks would change to.
 fn better(assignment: &Assignment, partition: &Partition, costs: &[u64], balance: Balance) -> Option<Assignment> {
     let mut sums = vec![0; assignment.ranks()];
@@ -224,7 +251,7 @@ fn better(assignment: &Assignment, partition: &Partition, costs: &[u64], balance
 }
 
 /// How many tiles move, and how long that takes.
-fn moving(old: &Assignment, new: &Assignment, bodies: &[u64], network: &Network) -> (u64, f64) {
+fn moves(old: &Assignment, new: &Assignment, bodies: &[u64], network: &Network) -> (u64, f64) {
     let (mut moved, mut busy) = (0, vec![0.0_f64; old.ranks()]);
     for (tile, from, to) in old.moves(new) {
         let bodies = bodies[tile.0 as usize] as f64;
@@ -256,17 +283,17 @@ mod tests {
     #[test]
     fn one_rank_takes_what_its_tiles_take_and_even_ones_their_share() {
         let (course, partition) = course([1e-3; 8]);
-        let alone = predict(&course, &partition, machine(1, 1), Balance::Off);
+        let alone = predict(&course, machine(1, 1), Balance::Off);
         assert!((alone.ms_per_step - 8.0).abs() < 1e-5 && (alone.efficiency - 1.0).abs() < 1e-9, "{alone:?}");
         assert_eq!((alone.exchange_ms, alone.waiting_ms), (0.0, 0.0));
-        let two = predict(&course, &partition, machine(2, 1), Balance::Measured);
+        let two = predict(&course, machine(2, 1), Balance::Measured);
         assert!((two.work_ms - 4.0).abs() < 1e-5 && (two.imbalance - 1.0).abs() < 1e-6 && two.tiles_moved == 0);
         // A sync point: two latencies and what a rank does; the rest are its messages.
         let sync = 1e3 * machine(2, 1).network.sync(2);
         assert!(two.exchange_ms > sync && two.exchange_ms < sync + 0.01, "{two:?}");
-        let threads = predict(&course, &partition, machine(1, 4), Balance::Off);
+        let threads = predict(&course, machine(1, 4), Balance::Off);
         assert!((threads.work_ms - 2.0).abs() < 1e-5 && (threads.efficiency - 1.0).abs() < 1e-5, "{threads:?}");
-        let many = predict(&course, &partition, machine(100, 1), Balance::Off);
+        let many = predict(&course, machine(100, 1), Balance::Off);
         assert!(many.idle_ranks == 92 && many.work_ms > 0.99 && many.efficiency < 0.08, "{many:?}");
     }
 
@@ -274,7 +301,7 @@ mod tests {
     fn tiles_that_take_longer_are_dealt_anew_where_that_is_measured() {
         let (course, partition) = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
         let [off, bodies, measured] = [Balance::Off, Balance::Bodies, Balance::Measured]
-            .map(|rule| predict(&course, &partition, machine(2, 1), rule));
+            .map(|rule| predict(&course, machine(2, 1), rule));
         // By bodies all tiles are alike.
         assert!((off.work_ms - 10.0).abs() < 1e-4 && (bodies.work_ms - 10.0).abs() < 1e-4, "{off:?} {bodies:?}");
         assert!(measured.tiles_moved == 3 && (7.0..8.0).contains(&measured.work_ms), "{measured:?}");

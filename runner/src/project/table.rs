@@ -1,15 +1,16 @@
 //! A projection as people read it.
 
 use super::Projection;
+use crate::plan::tiles;
 use std::fmt;
 
 impl fmt::Display for Projection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [columns, rows] = self.tiles;
+        let tiling = tiles::in_words(self.tiles, self.max_bodies);
         let (bodies, steps, alone) = (self.bodies, self.steps, self.ms_per_step_alone);
         writeln!(
             f,
-            "{}: {bodies} bodies, {columns} x {rows} tiles, {steps} steps of {alone:.3} ms on one thread",
+            "{}: {bodies} bodies, {tiling}, {steps} steps of {alone:.3} ms on one thread",
             self.scene
         )?;
         let (latency, bandwidth) = (self.latency_s * 1e6, self.bandwidth * 1e-9);
@@ -48,7 +49,7 @@ impl fmt::Display for Projection {
             )?;
         }
         if let Some(one) = self.predictions.iter().find(|one| one.idle_ranks > 0) {
-            let (ranks, tiles) = (one.ranks, u64::from(columns) * u64::from(rows));
+            let (ranks, tiles) = (one.ranks, one.ranks - one.idle_ranks);
             writeln!(f)?;
             writeln!(f, "from {ranks} ranks on some have nothing to do: there are only {tiles} tiles")?;
         }

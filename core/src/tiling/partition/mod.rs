@@ -6,6 +6,7 @@ mod grid;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use census::CONTACT;
 pub use census::{Adaptive, Census, Change};
 
 use crate::model::error::SetupError;

@@ -170,7 +170,8 @@ proptest! {
         let census = |partition: &Partition, rule: &Adaptive, bodies: &[DVec2]| {
             let mut census = Vec::new();
             for tile in tiles(partition) {
-                let mut own: Vec<DVec2> = bodies.iter().copied().filter(|at| partition.locate(*at) == tile).collect();
+                let own = bodies.iter().filter(|at| partition.locate(**at) == tile);
+                let mut own: Vec<(DVec2, u64)> = own.map(|&at| (at, 1)).collect();
                 let level = partition.levels().unwrap()[tile.0 as usize];
                 rule.count(tile, level, partition.rectangle(tile), &mut own, &mut census);
             }

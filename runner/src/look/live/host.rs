@@ -3,7 +3,7 @@
 
 use super::desk::{Desk, Due, Pick};
 use super::figures::Course;
-use super::protocol::{Gaze, Picture, Say};
+use super::protocol::{Gaze, Picture, Say, Tiles};
 use super::question::{Found, Question, answer, portion};
 use super::sketch::{Paper, compose, rectangle};
 use super::{figures, scenery};
@@ -11,6 +11,7 @@ use crate::folder::recording::RunFacts;
 use crate::look::frame::Setting;
 use crate::look::picture::{ColorBy, Range};
 use crate::plan::Plan;
+use crate::plan::tiles::in_letters;
 use crate::rank::{Held, Host, Next};
 use bytemuck::Pod;
 use glam::DVec2;
@@ -64,8 +65,8 @@ struct State {
     measured: Option<(ColorBy, u64)>,
     /// The body that was looked for last, if it was found.
     found: Option<Known>,
-    /// By tile, as pages know it.
-    ranks_of_tiles: Vec<u32>,
+    /// As pages know them.
+    tiles: Tiles,
     course: Course,
     /// Nobody is asked how it goes before; and what it was like when somebody was.
     next_course: Instant,
@@ -106,7 +107,7 @@ impl Viewer {
             ranges: [Range::default(); 2],
             measured: None,
             found: None,
-            ranks_of_tiles,
+            tiles: Tiles::new(&setting.partition, ranks_of_tiles),
             course: Course::default(),
             next_course: now,
             told: None,
@@ -142,12 +143,13 @@ impl Viewer {
         parts.iter().map(|part| part.took).max().unwrap_or_default() + begun.elapsed()
     }
 
-    /// Tells pages if tiles are held by others than they know.
-    fn tell_of_holders(&self, desk: &Desk, ranks_of_tiles: &[u32]) {
+    /// Tells pages if tiles are others, or held by others, than they know.
+    fn tell_of_tiles(&self, desk: &Desk, held: &Held<'_>) {
+        let (ranks, levels) = (held.assignment.ranks_of_tiles(), held.world.partition().levels());
         let mut state = lock(&self.state);
-        if state.ranks_of_tiles != ranks_of_tiles {
-            state.ranks_of_tiles = ranks_of_tiles.to_vec();
-            desk.greet(Say::Holders { rank_of_tile: ranks_of_tiles.to_vec() });
+        if state.tiles.rank_of_tile != ranks || state.tiles.levels != levels.map(in_letters) {
+            state.tiles = Tiles::new(held.world.partition(), ranks.to_vec());
+            desk.greet(Say::Tiles { worlds: vec![state.tiles.clone()] });
         }
     }
 
@@ -271,7 +273,7 @@ impl Host for Viewer {
 
     fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8> {
         if let Some(desk) = &self.desk {
-            self.tell_of_holders(desk, held.assignment.ranks_of_tiles());
+            self.tell_of_tiles(desk, held);
         }
         match (serde_json::from_slice(question), self.papers.get(held.rank.index())) {
             (Ok(question), Some(paper)) => answer(&question, &self.setting, held, &mut lock(paper)),

@@ -1,7 +1,7 @@
 //! Plays what runs have recorded, one or two of them on one clock.
 
 use super::desk::{Desk, Due, Pace, Pick};
-use super::protocol::{Gaze, Picture, Say};
+use super::protocol::{Gaze, Picture, Say, Tiles};
 use super::question::{Found, distance};
 use super::sketch::{Paper, Portion, Sketch, rectangle, turn_of_angle};
 use super::{figures, scenery};
@@ -40,6 +40,8 @@ pub(crate) struct Player {
     time: f64,
     /// What the frames hold.
     shown: Option<u64>,
+    /// Of each world, as pages know them.
+    tiles: Vec<Tiles>,
     /// The body that pages were told of, and after which step.
     told: Option<(Pick, u64)>,
     found: Option<(usize, Found)>,
@@ -62,7 +64,7 @@ impl Player {
         }
         desk.greet(Say::Hello(scenery::hello(sources, true, common.clone(), last)));
         let time = common[0] as f64;
-        Some(Self { tracks, desk, steps: common, time, shown: None, told: None, found: None, paper: Paper::default() })
+        Some(Self { tracks, desk, steps: common, time, shown: None, tiles: Vec::new(), told: None, found: None, paper: Paper::default() })
     }
 
     /// Shows them.
@@ -158,8 +160,21 @@ impl Player {
                 track.recorded.read(step, &mut track.frame)?;
             }
             self.shown = Some(step);
+            if self.tracks.iter().any(|track| track.frame.tiling.is_some()) {
+                self.tell_of_tiles();
+            }
         }
         Ok(())
+    }
+
+    /// Tells pages of the tiles of this step. Which rank holds which is not recorded.
+    fn tell_of_tiles(&mut self) {
+        let partition = |track: &Track| Tiles::new(track.frame.partition(track.recorded.setting()), Vec::new());
+        let worlds: Vec<Tiles> = self.tracks.iter().map(partition).collect();
+        if self.tiles != worlds {
+            self.tiles.clone_from(&worlds);
+            self.desk.greet(Say::Tiles { worlds });
+        }
     }
 
     fn show(&mut self, due: &[Due]) -> Result<(), RecordingError> {

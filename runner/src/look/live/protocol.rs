@@ -17,6 +17,8 @@
 //! | 12 bytes each | bodies: [`Dot`] |
 
 use super::super::picture::{ColorBy, View};
+use crate::plan::tiles::in_letters;
+use atoll_core::Partition;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -129,10 +131,10 @@ pub(crate) enum Say {
         /// It.
         body: Option<PickedBody>,
     },
-    /// Tiles of the world are held by other ranks than before.
-    Holders {
-        /// For each tile its rank.
-        rank_of_tile: Vec<u32>,
+    /// Tiles of the worlds are others than before, or held by other ranks.
+    Tiles {
+        /// Of each world.
+        worlds: Vec<Tiles>,
     },
     /// The first record in which two worlds differ, or that there is none.
     Difference {
@@ -167,14 +169,30 @@ pub(crate) struct Source {
     pub name: String,
     /// Low x, low y, high x, high y, in m.
     pub domain: [f64; 4],
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles, or of the squares that they are cut from.
     pub tiles: [u32; 2],
-    /// For each tile its rank.
-    pub rank_of_tile: Vec<u32>,
+    /// Those that it has when the page comes.
+    #[serde(flatten)]
+    pub held: Tiles,
     /// Half width, half height and radius of each kind, in m.
     pub shapes: Vec<[f32; 3]>,
     /// What never moves: x, y in m, cosine and sine of how it is turned, half width, half height and radius in m.
     pub statics: Vec<[f64; 7]>,
+}
+
+/// The tiles of a world.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub(crate) struct Tiles {
+    /// How often each was cut from its square, a letter for each, if they are not all equal.
+    pub levels: Option<String>,
+    /// For each tile its rank.
+    pub rank_of_tile: Vec<u32>,
+}
+
+impl Tiles {
+    pub(crate) fn new(partition: &Partition, rank_of_tile: Vec<u32>) -> Self {
+        Self { levels: partition.levels().map(in_letters), rank_of_tile }
+    }
 }
 
 /// What there is to know about a body.

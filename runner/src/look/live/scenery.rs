@@ -1,6 +1,6 @@
 //! What stays as it is while a page looks, and what colors mean, in the words of the page.
 
-use super::protocol::{Hello, PickedBody, Source};
+use super::protocol::{Hello, PickedBody, Source, Tiles};
 use super::question::Found;
 use crate::look::frame::Setting;
 use crate::look::live::figures::digits;
@@ -30,7 +30,7 @@ pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) ->
         name,
         domain: [low.x, low.y, high.x, high.y],
         tiles: setting.partition.roots(),
-        rank_of_tile,
+        held: Tiles::new(&setting.partition, rank_of_tile),
         shapes: setting.kinds.iter().map(|kind| outline(&kind.shape)).collect(),
         statics: setting.statics.iter().map(fixed).collect(),
     }

@@ -44,7 +44,7 @@ socket.onclose = () => say(state.hello ? "The run is over; this is what was seen
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, figures, body, difference, holders })[type]?.(message);
+    ({ hello, figures, body, difference, tiles })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -84,18 +84,18 @@ function start_drawing() {
   state.drawing = new Drawing(canvas);
   state.sources = state.hello.sources.map((source) => {
     const made = state.drawing.source(source.shapes, source.statics, state.hello.static_color);
-    state.drawing.grid(made, source.tiles, source.rank_of_tile, state.hello.rank_colors);
+    state.drawing.grid(made, source, state.hello.rank_colors);
     return made;
   });
 }
 
-/// Tiles have gone to other ranks.
-function holders({ rank_of_tile }) {
-  const [source] = state.hello.sources;
-  source.rank_of_tile = rank_of_tile;
-  if (!state.drawing) return;
-  state.drawing.grid(state.sources[0], source.tiles, rank_of_tile, state.hello.rank_colors);
-  redraw();
+/// Tiles were cut or joined, or have gone to other ranks.
+function tiles({ worlds }) {
+  worlds.forEach((held, i) => {
+    const source = Object.assign(state.hello.sources[i], held);
+    if (state.drawing) state.drawing.grid(state.sources[i], source, state.hello.rank_colors);
+  });
+  if (state.drawing) redraw();
 }
 
 /// Two worlds differ from a record on, or nowhere.

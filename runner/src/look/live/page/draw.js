@@ -149,6 +149,33 @@ function texture(gl, filter) {
 }
 
 /// What a canvas is drawn with. Lost with its context: then make another.
+/// Tiles that were cut from columns x rows of squares, `levels` giving how often each was, a letter for each: the corner and the
+/// side of each in squares, and `find_at`, which tells the tile at a place, or -1.
+function leaves(columns, rows, levels) {
+  const all = [];
+  const grow = (x, y, side, level) => {
+    if (levels.charCodeAt(all.length) - 97 <= level) {
+      all.push({ x, y, side, level });
+      return all.length - 1;
+    }
+    const half = side / 2;
+    return [[x, y], [x + half, y], [x, y + half], [x + half, y + half]].map(([x, y]) => grow(x, y, half, level + 1));
+  };
+  const roots = [];
+  for (let i = 0; i < columns * rows; i++) roots.push(grow(i % columns, Math.floor(i / columns), 1, 0));
+  all.find_at = (x, y) => {
+    if (x < 0 || y < 0 || x >= columns || y >= rows) return -1;
+    let node = roots[Math.floor(y) * columns + Math.floor(x)];
+    for (let [low_x, low_y, side] = [Math.floor(x), Math.floor(y), 0.5]; Array.isArray(node); side /= 2) {
+      const [right, upper] = [x >= low_x + side, y >= low_y + side];
+      [low_x, low_y] = [low_x + side * right, low_y + side * upper];
+      node = node[right + 2 * upper];
+    }
+    return node;
+  };
+  return all;
+}
+
 export class Drawing {
   constructor(canvas) {
     this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
@@ -216,27 +243,55 @@ export class Drawing {
     source.density_rectangle = width * height ? rectangle : null;
   }
 
-  /// Lines between tiles, and around what each rank holds: `ranks` by tile, row by row from the lower left.
-  grid(source, [columns, rows], ranks, colors) {
+  /// Lines between tiles, and around what each rank holds: ranks by tile, in the order of `leaves`, or row by row from the lower left.
+  grid(source, { tiles: [columns, rows], levels, rank_of_tile: ranks }, colors) {
     const { gl } = this;
     const lines = [];
     const add = (x0, y0, x1, y1, [r, g, b], thickness) => lines.push(x0, y0, x1, y1, r / 255, g / 255, b / 255, thickness);
     const gray = [128, 135, 148];
-    for (let i = 0; i <= columns; i++) add(i, 0, i, rows, gray, 1);
-    for (let i = 0; i <= rows; i++) add(0, i, columns, i, gray, 1);
-    const rank = (x, y) => (x < 0 || y < 0 || x >= columns || y >= rows ? -1 : ranks[y * columns + x] ?? -1);
     const several = ranks.some((of) => of !== ranks[0]);
-    for (let y = 0; y <= rows && several; y++) {
-      for (let x = 0; x <= columns; x++) {
-        const here = rank(x, y), left = rank(x - 1, y), below = rank(x, y - 1);
-        const color = (a, b) => colors[Math.max(a, b) % colors.length];
-        if (here !== left && y < rows) add(x, y, x, y + 1, color(here, left), 3);
-        if (here !== below && x < columns) add(x, y, x + 1, y, color(here, below), 3);
+    const color = (a, b) => colors[Math.max(a, b) % colors.length];
+    if (levels) {
+      const all = leaves(columns, rows, levels);
+      add(0, 0, columns, 0, gray, 1);
+      add(0, 0, 0, rows, gray, 1);
+      for (const { x, y, side } of all) {
+        add(x + side, y, x + side, y + side, gray, 1);
+        add(x, y + side, x + side, y + side, gray, 1);
+      }
+      // Between two tiles the smaller one draws the line; of two that are alike, the one that lies right or above.
+      const rank = (tile) => (tile < 0 ? -1 : ranks[tile] ?? -1);
+      for (const [i, { x, y, side, level }] of several ? all.entries() : []) {
+        const end = side * 1.25, middle = side / 2;
+        const sides = [
+          [x - side / 4, y + middle, [x, y, x, y + side], false],
+          [x + middle, y - side / 4, [x, y, x + side, y], false],
+          [x + end, y + middle, [x + side, y, x + side, y + side], true],
+          [x + middle, y + end, [x, y + side, x + side, y + side], true],
+        ];
+        for (const [at_x, at_y, line, is_far] of sides) {
+          const other = all.find_at(at_x, at_y);
+          const draws = other < 0 || all[other].level < level || (all[other].level === level && !is_far);
+          if (draws && rank(other) !== rank(i)) add(...line, color(rank(i), rank(other)), 3);
+        }
+      }
+    } else {
+      for (let i = 0; i <= columns; i++) add(i, 0, i, rows, gray, 1);
+      for (let i = 0; i <= rows; i++) add(0, i, columns, i, gray, 1);
+      const rank = (x, y) => (x < 0 || y < 0 || x >= columns || y >= rows ? -1 : ranks[y * columns + x] ?? -1);
+      for (let y = 0; y <= rows && several; y++) {
+        for (let x = 0; x <= columns; x++) {
+          const here = rank(x, y), left = rank(x - 1, y), below = rank(x, y - 1);
+          if (here !== left && y < rows) add(x, y, x, y + 1, color(here, left), 3);
+          if (here !== below && x < columns) add(x, y, x + 1, y, color(here, below), 3);
+        }
       }
     }
     source.lines ??= { array: gl.createVertexArray(), buffer: gl.createBuffer() };
     source.lines.count = lines.length / 8;
     source.lines.tiles = [columns, rows];
+    // How wide a tile is, on the average.
+    source.lines.side = levels ? Math.sqrt((columns * rows) / levels.length) : 1;
     gl.bindVertexArray(source.lines.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, source.lines.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(lines), gl.STATIC_DRAW);
@@ -293,7 +348,7 @@ export class Drawing {
     }
     if (with_grid && source.lines) {
       const at = use(this.line, domain, source.lines.tiles);
-      const tile = ((domain[2] - domain[0]) / source.lines.tiles[0]) * camera.zoom;
+      const tile = ((domain[2] - domain[0]) / source.lines.tiles[0]) * source.lines.side * camera.zoom;
       gl.uniform1f(at.fade, Math.min(1, Math.max(0, (tile - 4) / 24)) * 0.6);
       gl.bindVertexArray(source.lines.array);
       gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, source.lines.count);
