@@ -1,12 +1,13 @@
 //! The library as somebody uses it who has all tiles in one process: `atoll_core` without a halo of one's own.
 
 use atoll_core::{
-    Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, Partition, SetupError,
-    Solver, StepError, TileId, World, finish, measure, step,
+    Adaptive, Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, Partition,
+    SetupError, Solver, StepError, TileId, World, finish, halo_width, measure, step,
 };
 use atoll_tests::program;
 use atoll_tests::scenes;
 use glam::DVec2;
+use std::time::Instant;
 
 /// Looking at a world changes nothing of what comes, and shows what it would end with.
 #[test]
@@ -65,6 +66,38 @@ fn a_name_is_given_once() {
     // A static's.
     assert_eq!(world.add(at(0, 0.5)), Err(SetupError::BadBody { id: GlobalId(0) }));
     assert_eq!(world.bodies().count(), 3);
+}
+
+/// Tiles that follow the bodies: kilometers of nothing around a dense cluster cost next to nothing. Of several tries the quickest
+/// counts; at full length with as many bodies as are asked about.
+#[test]
+fn nothing_around_a_cluster_costs_little() {
+    let side = if std::env::var_os("ATOLL_FULL_LENGTH").is_some() { 317 } else { 60 };
+    let scene = scenes::room(side, 1);
+    let blueprint = scene.blueprint((1, 1), Exchange::Step);
+    let rule = Adaptive::new(scene.bodies.len() as u64 / 8, halo_width(&blueprint.kinds, &blueprint.params));
+    let run = |reach: f64| {
+        let (middle, half) = (0.5 * (blueprint.partition.min() + blueprint.partition.max()), DVec2::splat(reach));
+        let places = scene.bodies.iter().map(|body| (body.position, 1));
+        let partition = Partition::adaptive(middle - half, middle + half, [1, 1], &rule, places).unwrap();
+        let mut world = World::whole(&Blueprint { partition, ..blueprint.clone() }).unwrap();
+        scene.bodies.iter().for_each(|body| assert!(world.add(*body).unwrap()));
+        let begun = Instant::now();
+        for number in 0..40 {
+            if number % 10 == 0
+                && let Some(partition) = world.partition().adapted(&rule, &world.census(&rule)).unwrap()
+            {
+                world.retile(&partition).unwrap();
+            }
+            step(&mut world, &mut Loopback).unwrap();
+        }
+        assert_eq!(world.bodies().count(), scene.bodies.len());
+        (begun.elapsed(), world.partition().tiles())
+    };
+    let quickest = |reach| (0..3).map(|_| run(reach)).min().expect("some tries");
+    let (alone, apart) = (quickest(0.7 * side as f64 + 2.0), quickest(5e4));
+    println!("{} bodies: {alone:?} alone, {apart:?} in 10^5 m", scene.bodies.len());
+    assert!(apart.0 < 2 * alone.0, "{alone:?} alone, {apart:?} in 10^5 m");
 }
 
 /// What a blueprint says of memory is what a run takes, within a factor of two: few tiles, or many more than bodies.

@@ -161,7 +161,7 @@ impl Default for RunConfig {
 
 impl Default for AdaptiveConfig {
     fn default() -> Self {
-        Self { max_bodies: 32_000, retile_every: 32 }
+        Self { max_bodies: 48_000, retile_every: 32 }
     }
 }
 

@@ -166,10 +166,13 @@ fn overrides_win_and_the_last_of_them_most() {
     let config = read(ROOMS, &[("scene.bodies", "1e3"), ("bodies", "2000"), ("tiles", "3x2")]).unwrap();
     assert_eq!((config.scene.bodies, config.run.tiles), (2000, Some([3, 2])));
     let adaptive = |overrides| read(ROOMS, overrides).unwrap().run.adaptive.map(|a| (a.max_bodies, a.retile_every));
-    assert_eq!(adaptive(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((32_000, 5)));
+    assert_eq!(adaptive(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((48_000, 5)));
     assert_eq!(adaptive(&[("tiles", "3x2"), ("max_bodies", "70")]), Some((70, 32)));
     let error = read(ROOMS, &[("tiles", "3x2"), ("retile_every", "5")]).unwrap_err();
-    assert_eq!(error, "--set run.retile_every=5: tiles stay as they are here; add tiles = \"adaptive\", or leave it out");
+    assert_eq!(
+        error,
+        "--set run.retile_every=5: tiles stay as they are here; add tiles = \"adaptive\", or leave it out"
+    );
     let config = read(ROOMS, &[("tiles", "3x2"), ("run.tiles", "auto"), ("kind", "pile")]).unwrap();
     assert_eq!((config.run.tiles, config.scene.kind.name()), (None, "pile"));
     assert_eq!(read(ROOMS, &[("kind", "\"pile\"")]).unwrap().scene.kind.name(), "pile");

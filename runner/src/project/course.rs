@@ -109,7 +109,8 @@ impl Course {
 
     /// Lets tiles be cut and joined when it is time to. Says whether any was.
     fn retile(&mut self, plan: &Plan, step: u64, world: &mut World) -> Result<bool, SetupError> {
-        let Some((rule, adaptive)) = tiles::rule(&plan.config, &plan.blueprint.kinds).zip(plan.config.run.adaptive) else {
+        let Some((rule, adaptive)) = tiles::rule(&plan.config, &plan.blueprint.kinds).zip(plan.config.run.adaptive)
+        else {
             return Ok(false);
         };
         if !step.is_multiple_of(adaptive.retile_every) {

@@ -269,11 +269,11 @@ mod tests {
     use glam::DVec2;
 
     /// Eight tiles in a row, of which each tells its neighbours a thousand bytes, over 64 steps.
-    fn course(tiles: [f32; 8]) -> (Course, Partition) {
+    fn course(tiles: [f32; 8]) -> Course {
         let moment = |step| Moment { step, steps: 1, tiles: tiles.to_vec(), rest: 0.0 };
         let told = (0..7).flat_map(|tile| [(tile, tile + 1, 1e3), (tile + 1, tile, 1e3)]).collect();
-        let course = Course::of((0..64).map(moment).collect(), told, vec![1000; 8]);
-        (course, Partition::uniform(DVec2::ZERO, DVec2::new(8.0, 1.0), 8, 1).unwrap())
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::new(8.0, 1.0), 8, 1).unwrap();
+        Course::of(partition, (0..64).map(moment).collect(), told, vec![1000; 8])
     }
 
     fn machine(ranks: usize, threads: usize) -> Machine {
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn one_rank_takes_what_its_tiles_take_and_even_ones_their_share() {
-        let (course, partition) = course([1e-3; 8]);
+        let course = course([1e-3; 8]);
         let alone = predict(&course, machine(1, 1), Balance::Off);
         assert!((alone.ms_per_step - 8.0).abs() < 1e-5 && (alone.efficiency - 1.0).abs() < 1e-9, "{alone:?}");
         assert_eq!((alone.exchange_ms, alone.waiting_ms), (0.0, 0.0));
@@ -299,9 +299,9 @@ mod tests {
 
     #[test]
     fn tiles_that_take_longer_are_dealt_anew_where_that_is_measured() {
-        let (course, partition) = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
-        let [off, bodies, measured] = [Balance::Off, Balance::Bodies, Balance::Measured]
-            .map(|rule| predict(&course, machine(2, 1), rule));
+        let course = course([7e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
+        let [off, bodies, measured] =
+            [Balance::Off, Balance::Bodies, Balance::Measured].map(|rule| predict(&course, machine(2, 1), rule));
         // By bodies all tiles are alike.
         assert!((off.work_ms - 10.0).abs() < 1e-4 && (bodies.work_ms - 10.0).abs() < 1e-4, "{off:?} {bodies:?}");
         assert!(measured.tiles_moved == 3 && (7.0..8.0).contains(&measured.work_ms), "{measured:?}");

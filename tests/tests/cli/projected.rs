@@ -36,6 +36,23 @@ fn a_projection_tells_of_every_number_of_ranks() {
 }
 
 #[test]
+fn a_projection_follows_tiles_that_are_cut_and_joined() {
+    let desk = Desk::new(SMALL);
+    let tiles = "--bodies 3000 --tiles 1x1 --set max_bodies=900 --set retile_every=3";
+    let ended = project(&desk, &format!("{tiles} --steps 50 --ranks 1,4 --json p.json --quiet"));
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
+    assert!(ended.stdout.contains("tiles of 900 bodies at most, cut from 1 x 1 squares"), "{ended}");
+    let json: Value = serde_json::from_slice(&fs::read(desk.path().join("p.json")).unwrap()).unwrap();
+    let rows = json["predictions"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap();
+        assert!(number("imbalance") >= 1.0 - 1e-9 && number("imbalance") < 3.0, "{row}");
+        assert!(number("speedup") > 0.0 && number("idle_ranks") == 0.0, "{row}");
+    }
+}
+
+#[test]
 fn what_cannot_be_projected_is_refused() {
     let desk = Desk::new(SMALL);
     for (options, expected) in [

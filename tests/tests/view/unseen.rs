@@ -29,7 +29,7 @@ pub(crate) fn domain(hello: &Value) -> [f64; 4] {
 fn a_run_under_the_eyes_of_a_restless_page_comes_to_the_same_hashes() {
     let folder = tempdir().unwrap();
     let config = "configs/quickstart.toml";
-    let moves = ["--set", "balance=shuffled"];
+    let moves = ["--set", "balance=shuffled", "--set", "max_bodies=200", "--set", "retile_every=2"];
     let alone = run_to_summary(
         Way::Channel.command(2, config).args(small(STEPS)).args(moves),
         &folder.path().join("alone.json"),
@@ -85,6 +85,7 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let mut command = program::command();
     command
         .args(["run", "configs/quickstart.toml", "--ranks", "2", "--set", "balance=shuffled", "--view"])
+        .args(["--set", "max_bodies=200", "--set", "retile_every=1"])
         .args(["--checkpoint-every", "1000", "--out"])
         .arg(&out);
     let served = Served::start(command.args(small(4_000_000_000)));
@@ -94,16 +95,18 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     page.look(domain(&hello), [320, 240], "kind");
     let (step, _) = page.frame().unwrap();
     page.wish(&json!({ "do": "step", "by": 3 }));
-    // Tiles go to other ranks between any two steps, and the page hears who holds them.
-    let holders = loop {
+    // Tiles are cut, and go to other ranks, between any two steps, and the page hears what they are and who holds them.
+    let tiles = loop {
         match page.hear().expect("the run waits") {
-            Heard::Said(said) if said["type"] == "holders" => break said["rank_of_tile"].clone(),
+            Heard::Said(said) if said["type"] == "tiles" => break said["worlds"][0].clone(),
             Heard::Said(_) => {}
             Heard::Frame(number, ..) => page.wish(&json!({ "do": "ack", "frame": number })),
         }
     };
-    assert_eq!(holders.as_array().map(Vec::len), Some(16), "{holders}");
-    assert_ne!(holders, hello["sources"][0]["rank_of_tile"]);
+    let levels = tiles["levels"].as_str().unwrap();
+    assert!(levels.len() > 16 && levels.contains('b'), "{tiles}");
+    assert_eq!(tiles["rank_of_tile"].as_array().map(Vec::len), Some(levels.len()), "{tiles}");
+    assert_ne!(tiles["rank_of_tile"], hello["sources"][0]["rank_of_tile"]);
     while page.frame().unwrap().0 < step + 3 {}
     served.interrupt();
     let ended = served.end();

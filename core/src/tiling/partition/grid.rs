@@ -157,7 +157,7 @@ impl Iterator for Span {
         } else {
             self.column = 0;
             // Behind the last cell there may be no number left.
-            self.next = (cell - self.width).checked_add(self.columns).unwrap_or(u32::MAX);
+            self.next = (cell - self.width).saturating_add(self.columns);
             if cell == self.last {
                 (self.next, self.last) = (1, 0);
             }

@@ -64,7 +64,17 @@ impl Player {
         }
         desk.greet(Say::Hello(scenery::hello(sources, true, common.clone(), last)));
         let time = common[0] as f64;
-        Some(Self { tracks, desk, steps: common, time, shown: None, tiles: Vec::new(), told: None, found: None, paper: Paper::default() })
+        Some(Self {
+            tracks,
+            desk,
+            steps: common,
+            time,
+            shown: None,
+            tiles: Vec::new(),
+            told: None,
+            found: None,
+            paper: Paper::default(),
+        })
     }
 
     /// Shows them.
