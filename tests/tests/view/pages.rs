@@ -10,7 +10,8 @@ use std::sync::LazyLock;
 use tempfile::{TempDir, tempdir};
 
 /// A small world in which bodies are large enough to be pointed at.
-const WORLD: &str = "[scene]\nkind = \"rooms\"\nbodies = 600\n\n[run]\nsteps = 60\nranks = 2\ntiles = [3, 3]\n";
+const WORLD: &str = "[scene]\nkind = \"rooms\"\nbodies = 600\n\n[run]\nsteps = 60\nranks = 2\ntiles = [3, 3]\n\
+    max_bodies = 120\nretile_every = 2\n";
 
 /// It, recorded twice: once with another seed.
 static DESK: LazyLock<TempDir> = LazyLock::new(|| {
@@ -195,6 +196,14 @@ fn a_run_is_paused_stepped_and_its_bodies_followed() {
         last += 1;
         browser.wait_for(&format!("atoll.state.step === {last}"));
     }
+    // A line on two sides of each tile and around all, and more where ranks meet.
+    browser.evaluate("document.getElementById('tiles').click()");
+    let tiles = number(&mut browser, "atoll.state.hello.sources[0].levels.length");
+    assert_eq!(number(&mut browser, "atoll.state.hello.sources[0].rank_of_tile.length"), tiles);
+    let lines = number(&mut browser, "atoll.state.sources[0].lines.count") - 2.0 - 2.0 * tiles;
+    assert!(tiles > 9.0 && lines > 6.0 && lines < tiles, "{tiles} tiles, {lines} lines where ranks meet");
+    browser.screenshot("tiles");
+    browser.evaluate("document.getElementById('tiles').click()");
     // The same bits, recorded.
     let ended = program::run(program::command().current_dir(DESK.path()).args([
         "run",

@@ -29,7 +29,7 @@ pub(crate) fn domain(hello: &Value) -> [f64; 4] {
 fn a_run_under_the_eyes_of_a_restless_page_comes_to_the_same_hashes() {
     let folder = tempdir().unwrap();
     let config = "configs/quickstart.toml";
-    let moves = ["--set", "balance=shuffled", "--set", "max_bodies=200", "--set", "retile_every=2"];
+    let moves = ["--set", "balance=shuffled", "--set", "max_bodies=100", "--set", "retile_every=2"];
     let alone = run_to_summary(
         Way::Channel.command(2, config).args(small(STEPS)).args(moves),
         &folder.path().join("alone.json"),
@@ -85,7 +85,7 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let mut command = program::command();
     command
         .args(["run", "configs/quickstart.toml", "--ranks", "2", "--set", "balance=shuffled", "--view"])
-        .args(["--set", "max_bodies=200", "--set", "retile_every=1"])
+        .args(["--set", "max_bodies=100", "--set", "retile_every=1"])
         .args(["--checkpoint-every", "1000", "--out"])
         .arg(&out);
     let served = Served::start(command.args(small(4_000_000_000)));
