@@ -33,7 +33,7 @@ pub struct ProjectArgs {
     /// Chooses among the random variants of the scene.
     #[arg(long, value_name = "N")]
     pub seed: Option<String>,
-    /// Columns and rows of tiles, such as 17x17, or auto.
+    /// Columns and rows of tiles, such as 17x17; auto, or adaptive: they follow the bodies.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
     /// Any key of the configuration, by its full path or an unambiguous last part; may be repeated.

@@ -16,7 +16,7 @@ pub struct ViewArgs {
     /// What wins over the values of a configuration.
     #[command(flatten)]
     pub values: ValueArgs,
-    /// Columns and rows of tiles, such as 17x17, or auto; of a configuration.
+    /// Columns and rows of tiles, such as 17x17; auto, or adaptive; of a configuration.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
     /// Serve the page at this port [default: any that is free].
