@@ -27,4 +27,4 @@ pub use error::FolderError;
 pub use log_file::LogError;
 pub(crate) use log_file::{LogFile, Rows};
 pub use run_folder::RunFolder;
-pub(crate) use tilings::TilingsFile;
+pub(crate) use tilings::{TilingsFile, in_letters};

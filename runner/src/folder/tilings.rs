@@ -8,14 +8,26 @@
 //! `after` so many steps, before the next, the tiles became these: for each how often it was cut from its square, `a` for a
 //! square that is whole, in the order of [`Partition::forest`].
 
-use crate::plan::tiles::{in_letters, of_letters};
 use atoll_core::Partition;
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// The levels of a forest's tiles as text: a letter for each.
+pub(crate) fn in_letters(levels: &[u8]) -> String {
+    levels.iter().map(|level| char::from(b'a' + level)).collect()
+}
+
+/// The forest over columns x rows of squares whose levels were written as letters, if there is one.
+pub(crate) fn of_letters(text: &str, [low, high]: [DVec2; 2], [columns, rows]: [u32; 2]) -> Option<Partition> {
+    let levels: Option<Vec<u8>> =
+        text.bytes().map(|letter| letter.is_ascii_lowercase().then(|| letter - b'a')).collect();
+    Partition::forest(low, high, columns, rows, &levels?).ok()
+}
 
 #[derive(Serialize, Deserialize)]
 struct Line<'a> {
@@ -85,12 +97,11 @@ pub(crate) struct Tilings(Vec<(u64, Arc<Partition>)>);
 impl Tilings {
     /// Those of a file, over columns x rows of squares. None if there is no such file. What comes after a line that cannot be
     /// read is left out.
-    pub(crate) fn read(path: &Path, [low, high]: [glam::DVec2; 2], [columns, rows]: [u32; 2]) -> Self {
+    pub(crate) fn read(path: &Path, domain: [DVec2; 2], squares: [u32; 2]) -> Self {
         let text = fs::read_to_string(path).unwrap_or_default();
         let tiling = |line: &str| {
             let Line { after, levels } = serde_json::from_str(line).ok()?;
-            let partition = Partition::forest(low, high, columns, rows, &of_letters(&levels)?).ok()?;
-            Some((after, Arc::new(partition)))
+            Some((after, Arc::new(of_letters(&levels, domain, squares)?)))
         };
         Self(text.lines().map_while(tiling).collect())
     }
@@ -105,7 +116,6 @@ impl Tilings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec2;
 
     #[test]
     fn what_was_written_is_read_and_cut_off_where_a_run_goes_on() {

@@ -4,7 +4,6 @@ use super::frame::{Frame, Setting};
 use crate::config::Config;
 use crate::folder::recording::{Recording, RecordingError, Row, Stage};
 use crate::scene::Scene;
-use atoll_core::Partition;
 use std::path::Path;
 
 /// A recording, to be read frame by frame.
@@ -25,10 +24,7 @@ impl Recorded {
         let recording = Recording::open(folder)?;
         let bad = |reason| RecordingError::BadSegment { path: recording.files()[0].clone(), reason };
         let facts = recording.facts();
-        let [low, high] = facts.domain;
-        let equal = || Partition::uniform(low, high, facts.tiles[0], facts.tiles[1]);
-        let first = recording.tiling(0).map(|partition| (**partition).clone());
-        let partition = first.map_or_else(equal, Ok).map_err(|error| bad(error.to_string()))?;
+        let partition = recording.partition(0).map_err(|error| bad(error.to_string()))?;
         let hertz = facts.hertz().ok_or_else(|| bad("atoll.canonical has no physics.hertz".to_owned()))?;
         let (stage, scene) = match recording.stage() {
             Some(stage) => (stage.clone(), None),
@@ -97,6 +93,7 @@ mod tests {
     use super::*;
     use crate::folder::recording::testing::{bodies, facts, record, stage};
     use crate::folder::recording::{RunFacts, rank_folder};
+    use atoll_core::Partition;
     use std::fs;
 
     fn format_1() -> std::path::PathBuf {

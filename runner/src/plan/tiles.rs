@@ -65,16 +65,6 @@ pub(crate) fn in_words([columns, rows]: [u32; 2], max_bodies: Option<u64>) -> St
     }
 }
 
-/// The levels of a forest's tiles as text: a letter for each.
-pub(crate) fn in_letters(levels: &[u8]) -> String {
-    levels.iter().map(|level| char::from(b'a' + level)).collect()
-}
-
-/// The levels that were written as letters.
-pub(crate) fn of_letters(text: &str) -> Option<Vec<u8>> {
-    text.bytes().map(|letter| letter.is_ascii_lowercase().then(|| letter - b'a')).collect()
-}
-
 /// The width of the halo in meters that the default is made with, which no change may bend: without what
 /// [`atoll_core::halo_width`] adds for rounding.
 fn halo_width(kinds: &[Kind], params: &Params) -> f64 {

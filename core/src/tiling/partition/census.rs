@@ -69,40 +69,23 @@ pub(super) fn quarters(&Region { min, max }: &Region) -> [Region; 4] {
     })
 }
 
-/// Bodies, or samples of some, to be counted.
-pub(crate) trait Counted {
-    fn place(&self) -> DVec2;
-    /// What it takes, or those for which it stands.
-    fn load(&self) -> u64;
-}
-
-impl Counted for (DVec2, u64) {
-    fn place(&self) -> DVec2 {
-        self.0
-    }
-
-    fn load(&self) -> u64 {
-        self.1
-    }
-}
-
 impl Adaptive {
     /// Tiles with no more to do, and no smaller than some widths of a halo, in meters.
     pub fn new(max_bodies: u64, halo_width: f64) -> Self {
         Self { max_bodies, least_side: LEAST_WIDTHS * halo_width }
     }
 
-    /// Counts what bodies of a tile, or of the parts that it is to be cut into, take. What is beyond its rectangle counts in the part that is
-    /// next to it. Changes the order of the bodies.
+    /// Counts what there is to do in a tile, or in the parts that it is to be cut into, of bodies with their places and what each
+    /// takes. What is beyond its rectangle counts in the part that is next to it. Changes the order of the bodies.
     pub(crate) fn count(
         &self,
         tile: TileId,
         level: u8,
         rectangle: Region,
-        all: &mut [impl Counted],
+        all: &mut [(DVec2, u64)],
         census: &mut Vec<Census>,
     ) {
-        let load = all.iter().map(Counted::load).sum();
+        let load = all.iter().map(|(_, load)| load).sum();
         let is_wide = (0.5 * rectangle.size()).cmpge(DVec2::splat(self.least_side)).all();
         if load <= self.max_bodies || !is_wide || level == MOST_LEVELS {
             census.push(Census { tile, level: u32::from(level), load });
@@ -110,9 +93,9 @@ impl Adaptive {
         }
         let parts = quarters(&rectangle);
         let middle = parts[3].min;
-        let (lower, upper) = separate(all, |body| body.place().y >= middle.y);
+        let (lower, upper) = separate(all, |(place, _)| place.y >= middle.y);
         let ((a, b), (c, d)) =
-            (separate(lower, |body| body.place().x >= middle.x), separate(upper, |body| body.place().x >= middle.x));
+            (separate(lower, |(place, _)| place.x >= middle.x), separate(upper, |(place, _)| place.x >= middle.x));
         for (part, bodies) in parts.into_iter().zip([a, b, c, d]) {
             self.count(tile, level + 1, part, bodies, census);
         }
@@ -145,13 +128,9 @@ impl Partition {
         bodies: impl Iterator<Item = (DVec2, u64)>,
     ) -> Result<Self, SetupError> {
         let grid = Grid::new(min, max, columns, rows)?;
-        let mut bodies: Vec<(u32, (DVec2, u64))> = bodies.map(|body| (grid.locate(body.0), body)).collect();
-        bodies.sort_unstable_by_key(|(root, _)| *root);
-        let mut rest: Vec<(DVec2, u64)> = bodies.iter().map(|(_, body)| *body).collect();
-        let (mut rest, mut census) = (&mut rest[..], Vec::new());
-        for root in 0..grid.cells() as u32 {
-            let count = bodies.partition_point(|(of, _)| *of <= root) - bodies.partition_point(|(of, _)| *of < root);
-            let own = rest.split_off_mut(..count).expect("every body is in a root");
+        let (mut by_root, mut census) = (vec![Vec::new(); grid.cells()], Vec::new());
+        bodies.for_each(|body| by_root[grid.locate(body.0) as usize].push(body));
+        for (root, own) in (0..).zip(&mut by_root) {
             rule.count(TileId(root), 0, grid.rectangle(root), own, &mut census);
         }
         let levels: Vec<u8> = census.iter().map(|part| part.level as u8).collect();

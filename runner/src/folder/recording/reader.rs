@@ -8,7 +8,7 @@ use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
 use crate::folder::ended::Ended;
 use crate::folder::run_folder::TILINGS;
 use crate::folder::tilings::Tilings;
-use atoll_core::Partition;
+use atoll_core::{Partition, SetupError};
 use std::fs;
 use std::io;
 use std::ops::Range;
@@ -159,6 +159,16 @@ impl Recording {
     /// The tiles with which a step was made, if they follow the bodies.
     pub(crate) fn tiling(&self, step: u64) -> Option<&Arc<Partition>> {
         self.tilings.at(step)
+    }
+
+    /// The tiles with which a step was made.
+    ///
+    /// # Errors
+    /// If there are none, as with a domain that comes from no run.
+    pub(crate) fn partition(&self, step: u64) -> Result<Partition, SetupError> {
+        let RunFacts { domain: [low, high], tiles: [columns, rows], .. } = self.facts;
+        let equal = || Partition::uniform(low, high, columns, rows);
+        self.tiling(step).map_or_else(equal, |partition| Ok((**partition).clone()))
     }
 
     /// The folder it is in.

@@ -2,7 +2,7 @@
 
 use super::{SnapshotError, SnapshotFile, store};
 use crate::config::other_run;
-use crate::plan::tiles::of_letters;
+use crate::folder::tilings::of_letters;
 use atoll_core::{Hashes, Partition, TileId, World};
 use std::path::{Path, PathBuf};
 
@@ -86,9 +86,7 @@ impl Snapshot {
             return Err(damaged());
         }
         let Some(levels) = &facts.levels else { return Ok(first.clone()) };
-        let levels = of_letters(levels).ok_or_else(damaged)?;
-        let [columns, rows] = first.roots();
-        Partition::forest(first.min(), first.max(), columns, rows, &levels).map_err(|_| damaged())
+        of_letters(levels, [first.min(), first.max()], first.roots()).ok_or_else(damaged)
     }
 
     /// Columns and rows of tiles, or of the squares that they are cut from.

@@ -15,7 +15,6 @@ pub use plot::svg;
 use crate::config;
 use crate::folder::Ended;
 use crate::folder::recording::{Recording, RecordingError, Row};
-use atoll_core::Partition;
 use glam::DVec2;
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -242,13 +241,12 @@ impl Difference {
 
 impl State {
     fn new(step: u64, row: &Row, recording: &Recording) -> Self {
-        let facts = recording.facts();
-        let [low, high] = facts.domain;
-        // A domain that makes no grid comes from no run.
-        let equal = || Partition::uniform(low, high, facts.tiles[0], facts.tiles[1]).ok();
-        let partition = recording.tiling(step).map(|partition| (**partition).clone()).or_else(equal);
         let position = DVec2::new(row.x, row.y);
-        let tile = partition.filter(|_| position.is_finite()).map(|partition| partition.locate(position).0);
+        let tile = recording
+            .partition(step)
+            .ok()
+            .filter(|_| position.is_finite())
+            .map(|partition| partition.locate(position).0);
         let &Row { id: _, x, y, angle, vx, vy, omega, kind, padding: _ } = row;
         let kind = recording.stage().map(|_| kind);
         Self { tile, x, y, angle, vx, vy, omega, kind }

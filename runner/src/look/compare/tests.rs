@@ -1,6 +1,7 @@
 use super::*;
 use crate::folder::recording::RunFacts;
 use crate::folder::recording::testing::{bodies, body, facts, record};
+use atoll_core::Partition;
 use atoll_core::{Body, GlobalId, Rot};
 use std::f64::consts::PI;
 use std::fs;

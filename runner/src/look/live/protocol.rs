@@ -17,7 +17,7 @@
 //! | 12 bytes each | bodies: [`Dot`] |
 
 use super::super::picture::{ColorBy, View};
-use crate::plan::tiles::in_letters;
+use crate::folder::in_letters;
 use atoll_core::Partition;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;

@@ -4,7 +4,7 @@ use super::outline::Outline;
 use super::piece::{self, Column, Form, Output};
 use crate::folder::recording::{Row, distinct_kinds};
 use crate::look::frame::Setting;
-use atoll_core::Rot;
+use atoll_core::{Partition, Rot};
 use glam::DVec2;
 use std::fs::File;
 use std::io::{self, Write};
@@ -26,7 +26,13 @@ pub(super) const ATTRIBUTES: &str = "Scalars=\"kind\" Vectors=\"velocity\"";
 ///
 /// # Errors
 /// What the system says.
-pub(super) fn write_bodies(setting: &Setting, rows: &[Row], rank: u32, file: &mut File) -> io::Result<()> {
+pub(super) fn write_bodies(
+    setting: &Setting,
+    partition: &Partition,
+    rows: &[Row],
+    rank: u32,
+    file: &mut File,
+) -> io::Result<()> {
     let center = |row: &Row| DVec2::new(row.x, row.y);
     let outlines = rows.iter().map(|row| Outline {
         center: center(row),
@@ -42,7 +48,7 @@ pub(super) fn write_bodies(setting: &Setting, rows: &[Row], rank: u32, file: &mu
         }),
         Box::new(|out| rows.iter().try_for_each(|row| out.write_all(&row.omega.to_le_bytes()))),
         Box::new(|out| {
-            let mut tiles = rows.iter().map(|row| setting.partition.locate(center(row)).0);
+            let mut tiles = rows.iter().map(|row| partition.locate(center(row)).0);
             tiles.try_for_each(|tile| out.write_all(&tile.to_le_bytes()))
         }),
         Box::new(|out| rows.iter().try_for_each(|_| out.write_all(&rank.to_le_bytes()))),

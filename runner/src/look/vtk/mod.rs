@@ -87,7 +87,7 @@ fn write_frame(setting: &Setting, frame: &Frame, target: &mut Target) -> Result<
         start = end;
         if !rows.is_empty() {
             let piece = format!("{name}/rank-{rank:05}.vtu");
-            target.write(&piece, |file| write_bodies(setting, rows, rank, file))?;
+            target.write(&piece, |file| write_bodies(setting, frame.partition(setting), rows, rank, file))?;
             pieces.push(piece);
         }
     }

@@ -2,9 +2,9 @@
 
 use crate::error::RunError;
 use crate::folder::durable::is_gone;
+use crate::folder::in_letters;
 use crate::folder::recording::{Record, RecordingWriter, RunFacts, StageText};
 use crate::folder::snapshot::{self, SnapshotWriter};
-use crate::plan::tiles::in_letters;
 use crate::plan::{Output, Plan};
 use atoll_core::{SavedTile, World};
 use atoll_transport::Rank;
