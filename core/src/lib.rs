@@ -32,6 +32,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Bodies that come and go
+//!
+//! Between two steps [`World::insert`], [`World::get`], [`World::remove`] take bodies by their names, in a time that does not depend on
+//! how many there are; [`World::command`] strikes and pushes them, or turns gravity; [`World::cast_ray`], [`World::in_rectangle`],
+//! [`World::at_point`] and [`World::touching`] ask what is where. `examples/drive.rs` does all of it.
+//!
 //! # Threads
 //!
 //! [`step`], [`measure`], [`World::save`] and [`World::hashes`] work on the threads of the rayon pool they are called in:
@@ -88,10 +94,11 @@ pub use model::shape::{Kind, Material, Shape};
 pub use state::facts::{Facts, TileFacts};
 pub use state::figures::Figures;
 pub use state::hash::Hashes;
+pub use state::questions::RayHit;
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use state::view::{ContactView, TileView};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::{Blueprint, halo_width};
 pub use tiling::partition::{Adaptive, Census, Change, Partition, Region};
-pub use world::{Clock, World};
+pub use world::{Clock, Command, World};

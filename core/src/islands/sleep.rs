@@ -14,7 +14,7 @@ use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
 /// Who rests since when. Empty where nobody may sleep.
-#[derive(Default, Debug)]
+#[derive(Clone, Default, Debug)]
 pub(crate) struct Sleep {
     /// For each owned body how long it has rested, in seconds.
     still: Vec<f32>,
@@ -47,6 +47,25 @@ impl Sleep {
     pub(crate) fn resize(&mut self, owned: usize) {
         self.still.resize(owned, 0.0);
         self.asleep.resize(owned, false);
+    }
+
+    /// Forgets all bodies but those whose place is to stay.
+    pub(crate) fn retain(&mut self, stays: impl Fn(usize) -> bool) {
+        let mut places = 0..;
+        self.still.retain(|_| places.next().is_some_and(&stays));
+        let mut places = 0..;
+        self.asleep.retain(|_| places.next().is_some_and(&stays));
+    }
+
+    /// Has a body rest anew, if it is known how long it has rested, and with it its island.
+    pub(crate) fn wake(&mut self, index: usize) {
+        if let Some(still) = self.still.get_mut(index) {
+            *still = 0.0;
+        }
+    }
+
+    pub(crate) fn wake_all(&mut self) {
+        self.still.fill(0.0);
     }
 
     /// Follows the bodies to a new order: the one at `order[i]` comes to `i`.

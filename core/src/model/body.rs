@@ -5,6 +5,7 @@ use crate::model::math::Rot;
 use crate::model::shape::Kind;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, Vec2};
+use std::ops::Range;
 
 /// The whole state of one dynamic body. This is also how a body travels: 48 bytes, nothing rounded.
 #[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
@@ -153,18 +154,26 @@ impl Bodies {
         self.kind[index] = body.kind;
     }
 
-    /// Puts one before the body at `index`.
-    pub(crate) fn insert(&mut self, index: usize, body: Body) {
-        self.id.insert(index, body.id);
-        self.position.insert(index, body.position);
-        self.rotation.insert(index, body.rotation);
-        self.velocity.insert(index, body.velocity);
-        self.angular_velocity.insert(index, body.angular_velocity);
-        self.kind.insert(index, body.kind);
+    /// Puts some in the place of those in a range, however many.
+    pub(crate) fn replace(&mut self, range: Range<usize>, bodies: &[Body]) {
+        self.id.splice(range.clone(), bodies.iter().map(|body| body.id));
+        self.position.splice(range.clone(), bodies.iter().map(|body| body.position));
+        self.rotation.splice(range.clone(), bodies.iter().map(|body| body.rotation));
+        self.velocity.splice(range.clone(), bodies.iter().map(|body| body.velocity));
+        self.angular_velocity.splice(range.clone(), bodies.iter().map(|body| body.angular_velocity));
+        self.kind.splice(range, bodies.iter().map(|body| body.kind));
     }
 
     pub(crate) fn truncate(&mut self, length: usize) {
         each_column!(self, column => column.truncate(length));
+    }
+
+    /// Keeps those whose index is to stay.
+    pub(crate) fn retain(&mut self, stays: impl Fn(usize) -> bool) {
+        each_column!(self, column => {
+            let mut indices = 0..;
+            column.retain(|_| indices.next().is_some_and(&stays));
+        });
     }
 
     /// Reorders the first `order.len()` bodies: the one at `order[i]` comes to `i`. `self` must hold no others.

@@ -235,6 +235,13 @@ impl ContactCache {
         self.keys.retain(|&key| stays(key));
     }
 
+    /// Gives every slot a new number; those of one kind stay in their order.
+    pub(crate) fn renumber(&mut self, new_slot: impl Fn(Slot) -> Slot) {
+        for key in &mut self.keys {
+            *key = PairKey::new(new_slot(key.low()), new_slot(key.high()));
+        }
+    }
+
     /// Renames every slot and restores the order.
     pub(crate) fn rename(&mut self, new_slot: impl Fn(Slot) -> Slot) {
         let mut order: Vec<(PairKey, u32)> = self

@@ -28,6 +28,20 @@ pub enum SetupError {
         /// Its name.
         id: GlobalId,
     },
+    /// What a body is to become.
+    #[error("body {id}: there is no kind {}; use a row of the table of kinds", kind.0)]
+    NoKind {
+        /// Its name.
+        id: GlobalId,
+        /// The kind.
+        kind: KindId,
+    },
+    /// What is to be done to a body.
+    #[error("body {id}: velocities, impulses and forces must be finite numbers")]
+    NotFinite {
+        /// Its name.
+        id: GlobalId,
+    },
     /// Two dynamic bodies of one name.
     #[error("body {id}: another body has this name; give each its own")]
     NameTaken {

@@ -4,6 +4,7 @@ pub(crate) mod facts;
 pub(crate) mod figures;
 pub(crate) mod hash;
 mod layout;
+pub(crate) mod questions;
 pub(crate) mod snapshot;
 mod sum;
 pub(crate) mod view;

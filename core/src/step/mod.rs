@@ -58,6 +58,7 @@ pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, Step
 
 fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, StepError<NotCarried>> {
     let _span = tracing::trace_span!("step", step = world.step).entered();
+    world.push();
     world.begin_step();
     let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
     // Whoever asked to meet alone knows of it where another asked to stop.

@@ -43,8 +43,13 @@ pub(crate) fn largest_radius(kinds: &[Kind]) -> f32 {
 /// The width of the halo in meters, a little more than what the ghost rule asks for: bodies this near a tile's region may
 /// matter to it. The largest bounding radius of a dynamic body and the greatest margin.
 pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
+    width_for(largest_radius(kinds), params)
+}
+
+/// The same for the largest bounding radius.
+fn width_for(radius: f32, params: &Params) -> f64 {
     // A thousandth more, so that the rounding of a sum never decides who sees a contact.
-    f64::from(largest_radius(kinds) + params.margin_cap) * 1.001
+    f64::from(radius + params.margin_cap) * 1.001
 }
 
 /// The blueprint, made ready.
@@ -139,6 +144,37 @@ impl Setup {
     /// The same for another partition of the same domain.
     pub(crate) fn with_partition(&self, partition: &Partition) -> Self {
         Self { partition: partition.clone(), ..self.clone() }
+    }
+
+    /// The same with one more dynamic kind, after those there are.
+    pub(crate) fn with_kind(&self, kind: &Kind) -> Result<Self, SetupError> {
+        let row = KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32))?;
+        let mut setup = self.clone();
+        setup.kinds.insert(self.dynamic_kinds, row);
+        setup.dynamic_kinds += 1;
+        setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
+        setup.set_halo_width(self.halo_width.max(width_for(row.bounding_radius, &self.params)));
+        setup.bouncy |= kind.material.restitution > 0.0;
+        setup.totals |= setup.bouncy;
+        Ok(setup)
+    }
+
+    /// Whether there can be dynamic bodies of it.
+    pub(crate) fn check_kind(&self, kind: &Kind) -> Result<(), SetupError> {
+        KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32)).map(drop)
+    }
+
+    fn set_halo_width(&mut self, width: f64) {
+        self.halo_width = width;
+        self.inset = 2.0 * width;
+        self.overlap = overlap::depth(&self.params).map(|part| part * width);
+    }
+
+    /// Whether a dynamic body may be one of this world.
+    pub(crate) fn check_body(&self, body: &Body) -> Result<(), SetupError> {
+        let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
+        let fits = body.is_finite() && turned && self.knows(body);
+        if fits { Ok(()) } else { Err(SetupError::BadBody { id: body.id }) }
     }
 
     /// Whether a static has this name.

@@ -12,6 +12,7 @@ use crate::solver::index::GraphNode;
 use crate::state::hash::Hashes;
 use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
+use crate::tiling::changes::Changes;
 use crate::tiling::partition::Region;
 use std::time::Duration;
 
@@ -27,6 +28,8 @@ pub(crate) struct Tile {
     /// Owned bodies, then ghosts, then statics.
     pub(crate) bodies: Bodies,
     pub(crate) owned: usize,
+    /// Who came and left since the last step, and is not settled.
+    pub(crate) changes: Option<Box<Changes>>,
     /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays.
     pub(crate) newcomers: Vec<u32>,
     /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
@@ -102,6 +105,7 @@ impl Tile {
             rectangle,
             bodies: Bodies::default(),
             owned: 0,
+            changes: None,
             newcomers: Vec::new(),
             gaps: Vec::new(),
             rim: Rim::default(),

@@ -12,6 +12,7 @@ impl World {
     /// # Panics
     /// If a tile is not of this world.
     pub fn give_up(&mut self, tiles: &[TileId]) -> Vec<Vec<u8>> {
+        self.settle();
         let mut leaving = tiles.iter().peekable();
         let mut blocks = Vec::with_capacity(tiles.len());
         let all = std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works));
@@ -34,6 +35,7 @@ impl World {
     /// If it holds one of the tiles already, or a block is not what was saved of its tile, whole and unchanged, or holds a
     /// body that is not fit to be stepped.
     pub fn take_over(&mut self, blocks: &[(TileId, &[u8])]) -> Result<(), RestoreError> {
+        self.settle();
         let mut taken = Vec::with_capacity(blocks.len());
         for &(tile, block) in blocks {
             let known = (tile.0 as usize) < self.setup.partition.tiles() && self.place_of(tile).is_none();
@@ -56,6 +58,7 @@ impl World {
         self.inbox.hold(self.tiles.iter().map(|tile| tile.id));
         self.dismissed.clear();
         self.changed = true;
+        self.forget_places();
     }
 }
 

@@ -1,26 +1,33 @@
 //! A world: the tiles of one rank, and what it takes to step them.
 
+mod bodies;
+mod command;
 mod handover;
+mod locator;
 mod retile;
 mod stages;
 
 use crate::exchange::mail::{Inbox, Outbox};
 use crate::exchange::verdict::Verdict;
-use crate::model::body::Body;
 use crate::model::error::SetupError;
-use crate::model::id::TileId;
+use crate::model::id::{GlobalId, TileId};
 use crate::model::names::Names;
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
+use crate::state::questions::Index;
 use crate::state::view::TileView;
 use crate::step::phase::Timings;
 use crate::step::stage::{Hand, Work};
 use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
+pub use command::Command;
+use command::Force;
+use locator::Locator;
 use rayon::prelude::*;
-use std::sync::{Arc, Mutex};
+use rustc_hash::FxHashSet;
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 /// The tiles one rank holds. The bodies of other ranks' tiles are elsewhere.
@@ -34,8 +41,22 @@ pub struct World {
     dismissed: Vec<u32>,
     /// Whether `busy` must be made anew: bodies came or went between two steps.
     changed: bool,
-    /// Of the bodies that were added here.
+    /// Whether tiles have bodies that came or left since the last step, and did not settle it.
+    is_unsettled: bool,
+    /// Of the bodies that were added here, as long as these are all, and nobody has looked for one.
     names: Names,
+    /// Whether that is so; or else a locator knows them.
+    knows_names: bool,
+    /// The greatest of all bodies and statics that this world was told of.
+    greatest_name: GlobalId,
+    /// Of the bodies that were to be removed since the last step, wherever they were.
+    removed: FxHashSet<GlobalId>,
+    /// Where each body is, once anybody has asked.
+    locator: OnceLock<Locator>,
+    /// What questions are answered by, once there was one since anything has changed.
+    questions: OnceLock<Box<Index>>,
+    /// What pushes at bodies for some steps.
+    forces: Vec<Force>,
     /// One per thread.
     hands: Vec<Mutex<Hand>>,
     /// Per tile what it keeps between the stages of a step with several sync points.
@@ -95,14 +116,20 @@ impl World {
     fn of(setup: Arc<Setup>, tiles: Vec<Tile>) -> Self {
         let inbox = Inbox::new(tiles.iter().map(|tile| tile.id), setup.partition.tiles(), setup.dynamic_kinds);
         Self {
-            setup,
             works: tiles.iter().map(|_| None).collect(),
             outbox: Outbox::default(),
             tiles,
             busy: Vec::new(),
             dismissed: Vec::new(),
             changed: true,
+            is_unsettled: false,
             names: Names::default(),
+            knows_names: true,
+            greatest_name: setup.statics.iter().map(|fixed| fixed.id).max().unwrap_or_default(),
+            removed: FxHashSet::default(),
+            locator: OnceLock::new(),
+            questions: OnceLock::new(),
+            forces: Vec::new(),
             hands: Vec::new(),
             inbox,
             step: 0,
@@ -115,48 +142,19 @@ impl World {
             takes_figures: false,
             figures: None,
             warned_of_leaps: false,
+            setup,
         }
     }
 
     /// The same bodies at the same step, in a world that remembers no contacts: to look at.
     pub(crate) fn copy_bodies(&self) -> Self {
-        let tiles = self.tiles.iter().map(|tile| tile.copy_bodies(&self.setup)).collect();
+        let tiles = self.tiles.iter().map(|tile| tile.settled(&self.setup).copy_bodies(&self.setup)).collect();
         let verdict = Verdict { stop: false, meet: false, far: false, ..self.verdict };
         Self { step: self.step, verdict, ..Self::of(Arc::clone(&self.setup), tiles) }
     }
 
-    /// Adds a body if one of this world's tiles owns it, and says whether. Give every rank every body, in the same
-    /// order, or each its own.
-    ///
-    /// # Errors
-    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name taken: by a static, or
-    /// by a body that was added to this world. That bodies of different ranks have different names is for the caller to
-    /// see to.
-    pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
-        let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
-        if !(body.is_finite() && turned && self.setup.knows(&body)) {
-            return Err(SetupError::BadBody { id: body.id });
-        }
-        let owner = self.setup.partition.locate(body.position);
-        let Some(place) = self.place_of(owner) else { return Ok(false) };
-        if !self.names.insert(body.id) {
-            return Err(SetupError::NameTaken { id: body.id });
-        }
-        let tile = &mut self.tiles[place];
-        // Ghosts and statics of the last step may stand behind the owned bodies.
-        tile.bodies.insert(tile.owned, body);
-        tile.owned += 1;
-        tile.rim.is_known = false;
-        self.changed = true;
-        Ok(true)
-    }
-
-    /// Every owned body.
-    pub fn bodies(&self) -> impl Iterator<Item = Body> + '_ {
-        self.tiles.iter().flat_map(|tile| (0..tile.owned).map(|i| tile.bodies.get(i)))
-    }
-
-    /// What there is to see of each of the [`tiles`](Self::tiles), in their order.
+    /// What there is to see of each of the [`tiles`](Self::tiles), in their order, as the last step left it, or
+    /// [`settle`](Self::settle).
     pub fn views(&self) -> impl Iterator<Item = TileView<'_>> {
         self.tiles.iter().map(TileView::new)
     }
@@ -178,7 +176,8 @@ impl World {
 
     /// Fingerprints of this rank's bodies and contacts; [`Hashes::merge`] those of all ranks.
     pub fn hashes(&self) -> Hashes {
-        self.tiles.par_iter().map(Tile::hashes).reduce(Hashes::default, Hashes::merge)
+        let hashes = |tile: &Tile| tile.settled(&self.setup).hashes();
+        self.tiles.par_iter().map(hashes).reduce(Hashes::default, Hashes::merge)
     }
 
     /// Asks all ranks to stop: every rank's next step reports `stopped`.
@@ -212,14 +211,14 @@ impl World {
     pub fn figures_of_bodies(&self) -> Figures {
         let of_tile = |tile: &Tile| {
             let mut figures = Box::<Figures>::default();
-            figures.add_bodies(tile, &self.setup, Team::ALONE);
+            figures.add_bodies(&tile.settled(&self.setup), &self.setup, Team::ALONE);
             figures
         };
         let both = |mut all: Box<Figures>, other: Box<Figures>| {
             all.merge(&other);
             all
         };
-        *self.tiles.par_iter().filter(|tile| !tile.is_idle()).map(of_tile).reduce(Box::default, both)
+        *self.tiles.par_iter().filter(|tile| tile.count() > 0).map(of_tile).reduce(Box::default, both)
     }
 
     /// Has the time that is worked on each tile booked from here on. Times never enter a result.
@@ -270,7 +269,10 @@ impl World {
 
     /// Puts a tile in the place of another of the same name.
     pub(crate) fn replace_tile(&mut self, place: usize, tile: Tile) {
+        let greatest = tile.bodies.id[..tile.owned].iter().copied().max();
+        self.greatest_name = self.greatest_name.max(greatest.unwrap_or_default());
         self.tiles[place] = tile;
         self.changed = true;
+        self.forget_places();
     }
 }

@@ -16,6 +16,7 @@ impl World {
         let Some(levels) = self.setup.partition.levels() else { return Vec::new() };
         let mut census = Vec::with_capacity(self.tiles.len());
         for tile in &self.tiles {
+            let tile = tile.settled(&self.setup);
             let (level, own) = (levels[tile.id.0 as usize], tile.contacts.own());
             let load = tile.owned as u64 + CONTACT * own as u64;
             if load <= rule.max_bodies {
@@ -49,6 +50,8 @@ impl World {
         {
             return Err(torn(change.old.start));
         }
+        self.settle();
+        self.forget_places();
         let setup = old.with_partition(partition);
         let renaming = Renaming::new(&old.partition, partition, &changes);
         let mut rest = std::mem::take(&mut self.tiles).into_iter().zip(std::mem::take(&mut self.works)).peekable();

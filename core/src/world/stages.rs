@@ -25,6 +25,7 @@ fn apart(tiles: usize) -> bool {
 impl World {
     /// Starts a step: no sync point passed, nothing counted.
     pub(crate) fn begin_step(&mut self) {
+        self.settle();
         self.sync = 0;
         let threads = rayon::current_num_threads();
         if self.hands.len() < threads {
@@ -65,6 +66,7 @@ impl World {
         (self.verdict.meet, self.verdict.far) = (false, false);
         self.measures = false;
         self.step += 1;
+        self.follow_bodies();
     }
 
     /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.

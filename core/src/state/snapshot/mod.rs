@@ -153,8 +153,8 @@ impl World {
     /// one that failed has left its tiles halfway. A state that is no longer finite, as only the next step would tell,
     /// can be saved and not restored.
     pub fn save(&self, bytes: &mut Vec<u8>) -> Vec<SavedTile> {
-        let tiles = self.tile_states();
-        let total = tiles.iter().map(length).sum::<usize>();
+        let tiles: Vec<_> = self.tile_states().iter().map(|tile| tile.settled(&self.setup)).collect();
+        let total = tiles.iter().map(|tile| length(tile)).sum::<usize>();
         if bytes.capacity() < total {
             // Given back before there is more; with some to spare, as contacts grow from one snapshot to the next. New memory
             // comes zeroed from the system: the threads are the first to touch it.

@@ -1,0 +1,139 @@
+use super::outline::Outline;
+use super::*;
+use crate::Loopback;
+use crate::model::body::StaticBody;
+use crate::model::id::KindId;
+use crate::model::math::Rot;
+use crate::model::params::Params;
+use crate::step::step;
+use crate::testing::{circle, rectangle};
+use crate::tiling::blueprint::Blueprint;
+use crate::tiling::partition::Partition;
+use crate::{Command, TileId};
+use glam::Vec2;
+
+fn blueprint(columns: u32, rows: u32, far: DVec2) -> Blueprint {
+    let partition = Partition::uniform(far, far + DVec2::new(40.0, 20.0), columns, rows).unwrap();
+    let wall = |id, x: f64| {
+        let upright = StaticBody::new(GlobalId(id), rectangle(0.3, 30.0), far + DVec2::new(x, 10.0));
+        StaticBody { rotation: Rot::from_angle(0.1 * id as f32), ..upright }
+    };
+    let kinds = vec![circle(0.25), rectangle(0.5, 0.3), rectangle(0.1, 3.0), circle(2.0)];
+    Blueprint { params: Params::default(), partition, kinds, statics: vec![wall(0, 1.0), wall(1, 30.0)] }
+}
+
+/// Numbers from 0 to 1 that look random.
+struct Any(u64);
+
+impl Any {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / (1 << 24) as f64
+    }
+
+    fn place(&mut self) -> DVec2 {
+        DVec2::new(44.0 * self.next() - 2.0, 24.0 * self.next() - 2.0)
+    }
+}
+
+fn fill(world: &mut World, any: &mut Any, far: DVec2) {
+    for id in 0..900 {
+        let kind = KindId(if id % 97 == 0 { 3 } else { id % 3 });
+        let (place, angle) = (any.place(), 6.3 * any.next() as f32);
+        let body = Body::at_rest(GlobalId(10 + u64::from(id)), kind, far + place);
+        let velocity = Vec2::new(any.next() as f32 - 0.5, any.next() as f32 - 0.5);
+        world.add(Body { rotation: Rot::from_angle(angle), velocity, ..body }).unwrap();
+    }
+}
+
+/// All that there is to be met, one by one.
+fn outlines(world: &World) -> Vec<Outline> {
+    let all = world.bodies().chain(world.setup.statics.iter().copied());
+    all.map(|body| Outline::new(&body, world.setup.kind(body.kind).shape)).collect()
+}
+
+#[test]
+fn answers_are_those_of_looking_at_each_body() {
+    for far in [DVec2::ZERO, DVec2::new(-3e8, 7e8)] {
+        let mut any = Any(7);
+        let mut world = World::whole(&blueprint(4, 3, far)).unwrap();
+        fill(&mut world, &mut any, far);
+        let (mut hits, mut found) = (0, 0);
+        for round in 0..5 {
+            let all = outlines(&world);
+            for number in 0..3400 {
+                let (from, mut to) = (far + any.place(), far + any.place());
+                match number % 4 {
+                    0 => to.x = from.x,
+                    1 => to.y = from.y,
+                    2 => to = from + (to - from) * 0.05,
+                    _ => {}
+                }
+                let expected = all.iter().filter_map(|outline| outline.cast_ray(from, to)).reduce(RayHit::nearer);
+                assert_eq!(world.cast_ray(from, to), expected, "{from} {to}");
+                hits += usize::from(expected.is_some());
+                let (low, high) = (from.min(to), from.min(to) + (from.max(to) - from.min(to)) * 0.1);
+                let names = |is_meant: &dyn Fn(&Outline) -> bool| {
+                    let mut names: Vec<_> = all.iter().filter(|outline| is_meant(outline)).map(|o| o.id).collect();
+                    names.sort_unstable();
+                    names
+                };
+                let expected = names(&|outline| outline.meets_rectangle(low, high));
+                assert_eq!(world.in_rectangle(low, high), expected);
+                found += expected.len();
+                assert_eq!(world.at_point(from), names(&|outline| outline.holds(from)));
+            }
+            // What changed is seen, at once.
+            match round {
+                0 => drop(step(&mut world, &mut Loopback).unwrap()),
+                1 => drop((10..300).map(|id| world.remove(GlobalId(id))).collect::<Vec<_>>()),
+                2 => {
+                    let place = far + DVec2::new(20.0, 10.0);
+                    world.add(Body::at_rest(GlobalId(5000), KindId(3), place)).unwrap();
+                    assert!(world.at_point(place).contains(&GlobalId(5000)));
+                }
+                _ => drop(world.command(&Command::SetKind { id: GlobalId(700), kind: KindId(3) }).unwrap()),
+            }
+        }
+        assert!(hits > 8000 && found > 17_000, "{hits} hits, {found} found");
+    }
+}
+
+#[test]
+fn parts_of_a_world_answer_together_as_the_whole() {
+    let blueprint = blueprint(4, 1, DVec2::ZERO);
+    let mut whole = World::whole(&blueprint).unwrap();
+    fill(&mut whole, &mut Any(3), DVec2::ZERO);
+    let halves = [[0, 2], [1, 3]].map(|tiles| {
+        let mut half = World::new(&blueprint, &tiles.map(TileId)).unwrap();
+        fill(&mut half, &mut Any(3), DVec2::ZERO);
+        half
+    });
+    let mut any = Any(9);
+    for _ in 0..2000 {
+        let (from, to) = (any.place(), any.place());
+        let joined = halves.iter().filter_map(|half| half.cast_ray(from, to)).reduce(RayHit::nearer);
+        assert_eq!(joined, whole.cast_ray(from, to));
+        let mut joined: Vec<_> = halves.iter().flat_map(|half| half.in_rectangle(from - 0.5, from + 0.5)).collect();
+        joined.sort_unstable();
+        joined.dedup();
+        assert_eq!(joined, whole.in_rectangle(from - 0.5, from + 0.5));
+    }
+}
+
+#[test]
+fn a_ray_that_begins_inside_hits_at_once_and_one_that_ends_before_does_not() {
+    let mut world = World::whole(&blueprint(1, 1, DVec2::ZERO)).unwrap();
+    assert_eq!(world.cast_ray(DVec2::new(5.0, 5.0), DVec2::new(6.0, 5.0)), None);
+    world.add(Body::at_rest(GlobalId(7), KindId(3), DVec2::new(10.0, 5.0))).unwrap();
+    let hit = world.cast_ray(DVec2::new(5.0, 5.0), DVec2::new(15.0, 5.0)).unwrap();
+    assert_eq!((hit.id, hit.point, hit.normal), (GlobalId(7), DVec2::new(8.0, 5.0), DVec2::NEG_X));
+    assert!((hit.fraction - 0.3).abs() < 1e-15);
+    assert_eq!(world.cast_ray(DVec2::new(5.0, 5.0), DVec2::new(7.99, 5.0)), None);
+    // Past it, along its border, and no way at all.
+    assert_eq!(world.cast_ray(DVec2::new(13.0, 5.0), DVec2::new(20.0, 5.0)), None);
+    let inside = world.cast_ray(DVec2::new(10.5, 5.0), DVec2::new(10.5, 5.0)).unwrap();
+    assert_eq!((inside.id, inside.fraction, inside.normal), (GlobalId(7), 0.0, DVec2::ZERO));
+    assert_eq!(world.cast_ray(DVec2::new(12.5, 5.0), DVec2::new(12.5, 5.0)), None);
+    assert!(World::whole(&blueprint(1, 1, DVec2::ZERO)).unwrap().in_rectangle(DVec2::ZERO, DVec2::ONE).len() < 3);
+}

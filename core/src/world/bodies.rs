@@ -1,0 +1,208 @@
+//! The bodies of a world, one by one and by name: they come, are looked at, and go.
+
+use super::World;
+use super::locator::{At, Locator, Place};
+use crate::model::body::Body;
+use crate::model::error::SetupError;
+use crate::model::id::{GlobalId, KindId};
+use crate::model::names::Names;
+use crate::model::shape::{Kind, KindRow};
+use crate::state::questions::Index;
+use crate::tiling::tile::Tile;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+impl World {
+    /// Adds a body if one of this world's tiles owns it, and says whether. Give every rank every body, in the same
+    /// order, or each its own. Takes the same time however many bodies there are.
+    ///
+    /// # Errors
+    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name taken: by a static, or
+    /// by a body that was added to this world or is there. That bodies of different ranks have different names is for the
+    /// caller to see to.
+    pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
+        self.setup.check_body(&body)?;
+        self.greatest_name = self.greatest_name.max(body.id);
+        if self.removed.contains(&body.id) {
+            self.forget_ghosts(body.id);
+        }
+        let owner = self.setup.partition.locate(body.position);
+        let Some(place) = self.place_of(owner) else { return Ok(false) };
+        if !self.knows_names {
+            self.locate_all();
+        }
+        let free = match self.locator.get_mut() {
+            Some(locator) => locator.look_up(body.id, &self.tiles).is_none(),
+            None => self.names.insert(body.id),
+        };
+        if !free {
+            return Err(SetupError::NameTaken { id: body.id });
+        }
+        let at = At::Added(self.tiles[place].add(body));
+        if let Some(locator) = self.locator.get_mut() {
+            locator.insert(body.id, Place { tile: place as u32, at });
+        }
+        self.note_change();
+        Ok(true)
+    }
+
+    /// As [`add`](Self::add), under a name that no body has had here, whatever its `id` says; gives that name. With several
+    /// ranks, each must have been given every body.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add); no name is used up then.
+    pub fn insert(&mut self, body: Body) -> Result<GlobalId, SetupError> {
+        let id = GlobalId(self.greatest_name.0.checked_add(1).ok_or(SetupError::NameTaken { id: self.greatest_name })?);
+        self.add(Body { id, ..body })?;
+        Ok(id)
+    }
+
+    /// The body of that name, if it is one of this world's. The first time this is asked, all are looked at; from then on it takes
+    /// the same time however many there are.
+    pub fn get(&self, id: GlobalId) -> Option<Body> {
+        let Place { tile, at } = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
+        let tile = &self.tiles[tile as usize];
+        Some(match at {
+            At::Owned(index) => tile.bodies.get(index as usize),
+            At::Added(place) => tile.added_at(place),
+        })
+    }
+
+    /// Removes the body of that name, and says whether it was one of this world's. Tell every rank. Takes as long as
+    /// [`get`](Self::get).
+    pub fn remove(&mut self, id: GlobalId) -> bool {
+        self.removed.insert(id);
+        self.locate_all();
+        let may_have_left = self.tiles.len() < self.setup.partition.tiles();
+        let found = self.locator.get_mut().and_then(|locator| locator.remove(id, may_have_left, &self.tiles));
+        let Some(Place { tile, at }) = found else { return false };
+        let tile = &mut self.tiles[tile as usize];
+        match at {
+            At::Owned(_) => tile.remove(id),
+            At::Added(place) => tile.remove_added(place),
+        }
+        self.note_change();
+        true
+    }
+
+    /// Every owned body.
+    pub fn bodies(&self) -> impl Iterator<Item = Body> + '_ {
+        self.tiles.iter().flat_map(Tile::present)
+    }
+
+    /// How many there are.
+    pub fn body_count(&self) -> usize {
+        self.tiles.iter().map(Tile::count).sum()
+    }
+
+    /// Whether a static has this name.
+    pub fn is_static(&self, id: GlobalId) -> bool {
+        self.setup.is_static(id)
+    }
+
+    /// Adds a row to the table of kinds, and gives its number. Tell every rank, between the same two steps. A larger body than any
+    /// there was makes the halo wider.
+    ///
+    /// # Errors
+    /// If a size is not positive, or a number out of range.
+    pub fn add_kind(&mut self, kind: &Kind) -> Result<KindId, SetupError> {
+        let row = KindId(self.setup.dynamic_kinds as u32);
+        let setup = self.setup.with_kind(kind)?;
+        self.settle();
+        self.tiles.par_iter_mut().for_each(|tile| tile.follow_kinds(&setup));
+        self.setup = Arc::new(setup);
+        self.inbox.kinds = self.setup.dynamic_kinds as u32;
+        self.works.iter_mut().for_each(|work| *work = None);
+        Ok(row)
+    }
+
+    /// The table of kinds as it is now.
+    pub fn kinds(&self) -> impl ExactSizeIterator<Item = Kind> + '_ {
+        let kind = |row: &KindRow| Kind { shape: row.shape, material: row.material };
+        self.setup.kinds[..self.setup.dynamic_kinds].iter().map(kind)
+    }
+
+    /// Settles which place those bodies have that came since the last step, and that others left. A step begins with this; whoever
+    /// wants to see the tiles before, by [`views`](Self::views), asks for it.
+    pub fn settle(&mut self) {
+        if !std::mem::take(&mut self.is_unsettled) {
+            return;
+        }
+        let came = |(number, tile): (usize, &mut Tile)| {
+            let came: Vec<GlobalId> = tile.added().map(|(_, body)| body.id).collect();
+            tile.settle();
+            (number as u32, came)
+        };
+        let unsettled = self.tiles.par_iter_mut().enumerate().filter(|(_, tile)| tile.changes.is_some());
+        let came: Vec<(u32, Vec<GlobalId>)> = unsettled.map(came).collect();
+        if let Some(locator) = self.locator.get_mut() {
+            for (tile, came) in came {
+                // They are the last ones.
+                let first = (self.tiles[tile as usize].owned - came.len()) as u32;
+                came.into_iter().zip(first..).for_each(|(id, index)| {
+                    locator.insert(id, Place { tile, at: At::Owned(index) });
+                });
+            }
+        }
+        self.changed = true;
+    }
+
+    /// The tile that owns a body, if it is one of this world's and was there in the last step.
+    pub(crate) fn tile_of(&self, id: GlobalId) -> Option<&Tile> {
+        let place = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
+        matches!(place.at, At::Owned(_)).then(|| &self.tiles[place.tile as usize])
+    }
+
+    /// What questions are answered by, made if anything has changed.
+    pub(crate) fn questions(&self, index: impl FnOnce() -> Index) -> &Index {
+        self.questions.get_or_init(|| Box::new(index()))
+    }
+
+    /// Where a body is, for who is about to change it.
+    pub(super) fn look_up(&mut self, id: GlobalId) -> Option<Place> {
+        self.locate_all();
+        self.locator.get_mut()?.look_up(id, &self.tiles)
+    }
+
+    /// Makes the locator, if there is none; it knows which names are taken.
+    fn locate_all(&mut self) {
+        if self.locator.get().is_none() {
+            self.locator = Locator::new(&self.tiles).into();
+        }
+        (self.names, self.knows_names) = (Names::default(), false);
+    }
+
+    /// Contacts with a body of that name mean nothing from here on, in whichever tile.
+    pub(super) fn forget_ghosts(&mut self, id: GlobalId) {
+        self.tiles.iter_mut().for_each(|tile| tile.forget_ghost(id));
+    }
+
+    /// Something is there to be settled, or is otherwise than the last step left it.
+    pub(super) fn note_change(&mut self) {
+        self.is_unsettled = true;
+        self.questions.take();
+    }
+
+    /// After a step: bodies that went from tile to tile are found in their new ones.
+    pub(super) fn follow_bodies(&mut self) {
+        self.removed.clear();
+        self.questions.take();
+        let bodies = || self.tiles.iter().map(Tile::count).sum();
+        let Some(locator) = self.locator.get_mut() else { return };
+        if locator.is_stale(bodies()) {
+            self.locator.take();
+            return;
+        }
+        for &number in &self.busy {
+            let tile = &self.tiles[number as usize];
+            locator.follow(number, tile, tile.newcomers.iter().copied());
+        }
+    }
+
+    /// After tiles came or went: nobody is where he was.
+    pub(super) fn forget_places(&mut self) {
+        self.locator.take();
+        self.knows_names = false;
+        self.questions.take();
+    }
+}

@@ -1,0 +1,197 @@
+//! What may be done to a world between two steps, as values that can be sent, written down and repeated.
+
+use super::World;
+use super::locator::{At, Place};
+use crate::model::body::Body;
+use crate::model::contact::SlotKind;
+use crate::model::error::SetupError;
+use crate::model::id::{GlobalId, KindId};
+use crate::model::math::cross;
+use crate::model::params::Params;
+use crate::model::shape::{Kind, KindRow};
+use crate::tiling::tile::Tile;
+use glam::{DVec2, Vec2};
+use std::sync::Arc;
+
+/// Something to be done to a world before its next step.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Command {
+    /// A body comes.
+    Add(Body),
+    /// The body of that name goes.
+    Remove(GlobalId),
+    /// A body moves otherwise from here on.
+    SetVelocity {
+        /// Whose.
+        id: GlobalId,
+        /// Of its center, in m/s.
+        velocity: Vec2,
+        /// In rad/s, counter-clockwise.
+        angular_velocity: f32,
+    },
+    /// A body is struck.
+    Impulse {
+        /// Which.
+        id: GlobalId,
+        /// In N s.
+        impulse: Vec2,
+        /// Where, in the world, in m; none: at its center.
+        at: Option<DVec2>,
+        /// Beside that, about its center, in N m s, counter-clockwise.
+        angular: f32,
+    },
+    /// A body is pushed through some steps: with each of them its velocity changes by force times time over mass at once.
+    Force {
+        /// Which.
+        id: GlobalId,
+        /// In N.
+        force: Vec2,
+        /// About its center, in N m, counter-clockwise.
+        torque: f32,
+        /// How many steps.
+        steps: u64,
+    },
+    /// A body becomes one of another kind. Its contacts begin anew.
+    SetKind {
+        /// Which body.
+        id: GlobalId,
+        /// Row of the table.
+        kind: KindId,
+    },
+    /// The table of kinds has one more row.
+    AddKind(Kind),
+    /// Gravity is this from here on, in m/s^2.
+    SetGravity(Vec2),
+    /// A body, and what touches it, sleeps no longer.
+    Wake(GlobalId),
+}
+
+/// What pushes at a body for some steps.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Force {
+    id: GlobalId,
+    force: Vec2,
+    torque: f32,
+    /// Steps to come.
+    left: u64,
+}
+
+impl World {
+    /// Does something to the world, now: the next step begins with it done. Says whether it concerned a body of this world, or all.
+    /// With several ranks give each the same commands in the same order, between the same two steps; then the result does not
+    /// depend on how many they are.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check); and if a body is added whose name is taken. The world is left as it was.
+    pub fn command(&mut self, command: &Command) -> Result<bool, SetupError> {
+        self.check(command)?;
+        match *command {
+            Command::Add(body) => self.add(body),
+            Command::Remove(id) => Ok(self.remove(id)),
+            Command::SetVelocity { id, velocity, angular_velocity } => {
+                Ok(self.change(id, |body, _| (body.velocity, body.angular_velocity) = (velocity, angular_velocity)))
+            }
+            Command::Impulse { id, impulse, at, angular } => Ok(self.strike(id, impulse, at, angular)),
+            Command::Force { id, force, torque, steps } => {
+                if steps > 0 {
+                    self.forces.push(Force { id, force, torque, left: steps });
+                }
+                Ok(self.look_up(id).is_some())
+            }
+            Command::SetKind { id, kind } => {
+                self.settle();
+                self.forget_ghosts(id);
+                let changed = self.change(id, |body, _| body.kind = kind);
+                if let Some(Place { tile, at: At::Owned(index) }) = self.look_up(id) {
+                    let is_it = |slot| matches!(slot, SlotKind::Owned(i) if i == index as usize);
+                    self.tiles[tile as usize].forget_contacts(|slot| is_it(slot.kind()));
+                }
+                Ok(changed)
+            }
+            Command::AddKind(kind) => self.add_kind(&kind).map(|_| true),
+            Command::SetGravity(gravity) => {
+                Arc::make_mut(&mut self.setup).params.gravity = gravity;
+                self.tiles.iter_mut().for_each(|tile| tile.sleep.wake_all());
+                Ok(true)
+            }
+            Command::Wake(id) => Ok(self.change(id, |_, _| ())),
+        }
+    }
+
+    /// Whether a command can be done at all; the same on every rank, as it asks for no body that there must be.
+    ///
+    /// # Errors
+    /// If a number in it is not finite, it names a kind that there is not, or a body or kind that it adds is none.
+    pub fn check(&self, command: &Command) -> Result<(), SetupError> {
+        let finite = |id: GlobalId, are: bool| if are { Ok(()) } else { Err(SetupError::NotFinite { id }) };
+        match *command {
+            Command::Add(body) => self.setup.check_body(&body),
+            Command::SetVelocity { id, velocity, angular_velocity } => {
+                finite(id, velocity.is_finite() && angular_velocity.is_finite())
+            }
+            Command::Impulse { id, impulse, at, angular } => {
+                finite(id, impulse.is_finite() && at.is_none_or(DVec2::is_finite) && angular.is_finite())
+            }
+            Command::Force { id, force, torque, .. } => finite(id, force.is_finite() && torque.is_finite()),
+            Command::SetKind { id, kind } => {
+                let is_there = (kind.0 as usize) < self.setup.dynamic_kinds;
+                if is_there { Ok(()) } else { Err(SetupError::NoKind { id, kind }) }
+            }
+            Command::AddKind(kind) => self.setup.check_kind(&kind),
+            Command::SetGravity(gravity) => Params { gravity, ..self.setup.params.clone() }.check(),
+            Command::Remove(_) | Command::Wake(_) => Ok(()),
+        }
+    }
+
+    /// Gravity as it is now, in m/s^2.
+    pub fn gravity(&self) -> Vec2 {
+        self.setup.params.gravity
+    }
+
+    /// Changes a body, which wakes; says whether it is here.
+    fn change(&mut self, id: GlobalId, change: impl FnOnce(&mut Body, &KindRow)) -> bool {
+        let Some(Place { tile, at }) = self.look_up(id) else { return false };
+        let setup = Arc::clone(&self.setup);
+        let tile: &mut Tile = &mut self.tiles[tile as usize];
+        match at {
+            At::Owned(index) => {
+                let index = index as usize;
+                let mut body = tile.bodies.get(index);
+                let kind = setup.kind(body.kind);
+                change(&mut body, kind);
+                tile.bodies.set(index, body);
+                tile.sleep.wake(index);
+                tile.rim.is_known = false;
+            }
+            At::Added(place) => {
+                let kind = setup.kind(tile.added_at(place).kind);
+                tile.change_added(place, |body| change(body, kind));
+            }
+        }
+        self.questions.take();
+        true
+    }
+
+    fn strike(&mut self, id: GlobalId, impulse: Vec2, at: Option<DVec2>, angular: f32) -> bool {
+        self.change(id, |body, kind| {
+            let arm = at.map_or(Vec2::ZERO, |at| (at - body.position).as_vec2());
+            body.velocity += impulse * kind.inv_mass;
+            body.angular_velocity += (angular + cross(arm, impulse)) / kind.inertia;
+        })
+    }
+
+    /// Before a step: lets forces push.
+    pub(crate) fn push(&mut self) {
+        let mut forces = std::mem::take(&mut self.forces);
+        let dt = self.setup.params.dt;
+        for Force { id, force, torque, left } in &mut forces {
+            self.strike(*id, *force * dt, None, *torque * dt);
+            *left -= 1;
+        }
+        forces.retain(|force| force.left > 0);
+        self.forces = forces;
+    }
+}
+
+#[cfg(test)]
+mod tests;

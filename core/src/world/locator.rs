@@ -1,0 +1,135 @@
+//! Where a body is, by its name: a hash table that is made when somebody first asks, and kept from then on.
+
+use crate::model::id::GlobalId;
+use crate::tiling::tile::Tile;
+use rustc_hash::FxHashMap;
+
+/// A body's tile, by its place among the world's, and where in there it was last seen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Place {
+    pub(super) tile: u32,
+    pub(super) at: At,
+}
+
+/// Where in a tile.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum At {
+    /// Among the owned bodies.
+    Owned(u32),
+    /// Among those that came since the last step.
+    Added(u32),
+}
+
+/// For each body of a world its tile for certain; where in there it is only as long as the tile keeps its order, which is looked at
+/// again. Of bodies that left for another world it may still tell where they were.
+#[derive(Debug)]
+pub(super) struct Locator {
+    places: FxHashMap<GlobalId, Place>,
+    /// Per tile, how many bodies were not where they had been last seen, since all of its were written down.
+    missed: Vec<u32>,
+}
+
+/// Whoever is so few places nearer to the first is found as fast again.
+const NEAR: u32 = 256;
+
+/// Where a name is among others: most likely a little before where it was, as others have left.
+fn search(ids: &[GlobalId], was: usize, id: GlobalId) -> Option<usize> {
+    let (before, after) = ids.split_at(was.min(ids.len()));
+    let found = before.iter().rposition(|&name| name == id);
+    found.or_else(|| Some(before.len() + after.iter().position(|&name| name == id)?))
+}
+
+/// After so many the whole tile is written down anew: that takes as long as searching through it so often.
+const MISSES: u32 = 400;
+
+impl Locator {
+    /// Of all bodies of some tiles. Takes time for each.
+    pub(super) fn new(tiles: &[Tile]) -> Self {
+        let count = tiles.iter().map(Tile::count).sum();
+        let mut locator = Self {
+            places: FxHashMap::with_capacity_and_hasher(count, rustc_hash::FxBuildHasher),
+            missed: vec![0; tiles.len()],
+        };
+        for (number, tile) in (0..).zip(tiles) {
+            locator.write_down(number, tile);
+            for (place, body) in tile.added() {
+                locator.places.insert(body.id, Place { tile: number, at: At::Added(place) });
+            }
+        }
+        locator
+    }
+
+    fn write_down(&mut self, number: u32, tile: &Tile) {
+        for (index, &id) in (0..).zip(&tile.bodies.id[..tile.owned]) {
+            if tile.is_present(id) {
+                self.places.insert(id, Place { tile: number, at: At::Owned(index) });
+            }
+        }
+    }
+
+    /// Where a body is, if it is one of these tiles'.
+    pub(super) fn find(&self, id: GlobalId, tiles: &[Tile]) -> Option<Place> {
+        Self::confirm(id, *self.places.get(&id)?, tiles)
+    }
+
+    /// Where a body is that was last seen there.
+    fn confirm(id: GlobalId, known: Place, tiles: &[Tile]) -> Option<Place> {
+        let tile = &tiles[known.tile as usize];
+        match known.at {
+            At::Added(_) => Some(known),
+            At::Owned(index) => {
+                let (index, ids) = (index as usize, &tile.bodies.id[..tile.owned]);
+                let index = if ids.get(index) == Some(&id) { index } else { search(ids, index, id)? };
+                tile.is_present(id).then_some(Place { at: At::Owned(index as u32), ..known })
+            }
+        }
+    }
+
+    /// As [`find`](Self::find), and remembers it.
+    pub(super) fn look_up(&mut self, id: GlobalId, tiles: &[Tile]) -> Option<Place> {
+        let known = *self.places.get(&id)?;
+        let found = Self::confirm(id, known, tiles);
+        match found {
+            Some(place) if place == known => {}
+            Some(place) => {
+                self.places.insert(id, place);
+                if let (At::Owned(was), At::Owned(is)) = (known.at, place.at)
+                    && was.wrapping_sub(is) < NEAR
+                {
+                    return found;
+                }
+                let missed = &mut self.missed[place.tile as usize];
+                *missed += 1;
+                if *missed > MISSES {
+                    *missed = 0;
+                    self.write_down(place.tile, &tiles[place.tile as usize]);
+                }
+            }
+            None => drop(self.places.remove(&id)),
+        }
+        found
+    }
+
+    pub(super) fn insert(&mut self, id: GlobalId, place: Place) {
+        self.places.insert(id, place);
+    }
+
+    /// Forgets a body, and says where it was. If it may have left for another world, that is looked at; else it is there.
+    pub(super) fn remove(&mut self, id: GlobalId, may_have_left: bool, tiles: &[Tile]) -> Option<Place> {
+        let known = self.places.remove(&id)?;
+        if may_have_left { Self::confirm(id, known, tiles) } else { Some(known) }
+    }
+
+    /// After a step, or after changes were settled: the bodies of a tile that are new there, or in another place.
+    pub(super) fn follow(&mut self, number: u32, tile: &Tile, newcomers: impl Iterator<Item = u32>) {
+        for index in newcomers {
+            let id = tile.bodies.id[index as usize];
+            self.places.insert(id, Place { tile: number, at: At::Owned(index) });
+        }
+    }
+
+    /// Whether it remembers many more bodies than there are.
+    pub(super) fn is_stale(&self, bodies: usize) -> bool {
+        self.places.len() > 2 * bodies + 4096
+    }
+}
