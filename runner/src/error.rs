@@ -1,9 +1,11 @@
 //! Why a run ended early, and with which exit code.
 
+pub use crate::command::ScriptError;
 pub use crate::config::ConfigError;
 pub use crate::folder::recording::RecordingError;
 pub use crate::folder::snapshot::SnapshotError;
 pub use crate::folder::{EndedError, FolderError, LogError};
+pub use crate::scene::SceneError;
 
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
@@ -48,6 +50,9 @@ pub enum RunError {
     /// The world it describes.
     #[error("this configuration makes no world: {0}")]
     Setup(#[from] SetupError),
+    /// A file of a scene, as it is when bodies are read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// More than this machine can hold.
     #[error(
         "too large for {within}: {bodies} bodies on {tiles} tiles with {ranks} ranks need about {} of memory, and {} are free: use fewer",
@@ -112,6 +117,9 @@ pub enum RunError {
         /// Why, and what would help.
         reason: String,
     },
+    /// A file of commands.
+    #[error(transparent)]
+    Script(#[from] ScriptError),
     /// A folder for the run's output that cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -308,11 +316,13 @@ impl RunError {
             | Self::StoppedLogging { .. } => Exit::Output,
             Self::Config(_)
             | Self::Setup(_)
+            | Self::Scene(_)
             | Self::Unsuitable { .. }
             | Self::LogFilter { .. }
             | Self::BadOutput { .. }
             | Self::TakenOutput { .. }
             | Self::BadFilm { .. }
+            | Self::Script(_)
             | Self::Folder(_)
             | Self::Snapshot(_)
             | Self::Recording(_)

@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 mod cli;
+mod command;
 pub mod config;
 pub mod error;
 mod folder;
@@ -30,9 +31,11 @@ mod launch;
 mod look;
 mod plan;
 mod project;
+mod quiet;
 mod rank;
 pub mod scene;
 mod summary;
+mod wording;
 
 pub use cli::main;
 pub use config::{Config, ConfigError, Override};
@@ -93,6 +96,7 @@ pub mod recording {
 #[doc(hidden)]
 pub mod internals {
     pub use crate::cli::args::{Cli, Command, one_line};
+    pub use crate::command::rehearse;
     pub use crate::folder::RunFolder;
     pub use crate::folder::recording::{Record, RecordingWriter, StageText, rank_folder};
     pub use crate::launch::run as run_plan;
@@ -100,4 +104,15 @@ pub mod internals {
     pub use crate::plan::Plan;
     pub use crate::project::{Network, Prediction, Projection, Wanted};
     pub use crate::rank::{Held, Host, Next, PanicAt, Watcher, part_of_scene};
+    pub use crate::scene::import::check as check_import;
+
+    /// Bodies as the Parquet file of a scene.
+    ///
+    /// # Errors
+    /// What the library says.
+    pub fn parquet_of_bodies(bodies: &[atoll_core::Body]) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        crate::scene::file::write::parquet(&mut bytes, bodies)?;
+        Ok(bytes)
+    }
 }

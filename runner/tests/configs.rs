@@ -1,7 +1,7 @@
 //! The configurations that come with the program can all be run.
 
-use atoll::Config;
-use atoll::config::OutputConfig;
+use atoll::config::{AdaptiveConfig, OutputConfig};
+use atoll::{Config, Override};
 use std::path::{Path, PathBuf};
 
 fn files() -> Vec<PathBuf> {
@@ -28,6 +28,21 @@ fn each_runs_a_step_at_a_small_size() {
 }
 
 #[test]
+fn the_worlds_in_files_run_too() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/worlds");
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut run = 0;
+    for path in entries.filter(|path| path.extension().is_some_and(|ending| ending == "toml")) {
+        let overrides = [Override::set("steps", "60"), Override::set("tiles", "2x2"), Override::set("ranks", "2")];
+        let config = Config::load(&path, &overrides).unwrap_or_else(|error| panic!("{error}"));
+        let summary = atoll::run(&config).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!((summary.bodies, summary.bodies_lost, summary.escaped), (48, 0, 0), "{}", path.display());
+        run += 1;
+    }
+    assert!(run > 0);
+}
+
+#[test]
 fn what_the_full_example_comments_out_are_the_defaults() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/normal.toml");
     let text = std::fs::read_to_string(path).unwrap();
@@ -44,5 +59,8 @@ fn what_the_full_example_comments_out_are_the_defaults() {
     assert_eq!(implicit.output, OutputConfig::default());
     assert_eq!(explicit.output.log_every, implicit.output.log_every);
     implicit.output = explicit.output;
+    // Tiles follow the bodies only where somebody says how.
+    assert_eq!((explicit.run.adaptive, implicit.run.adaptive), (Some(AdaptiveConfig::default()), None));
+    implicit.run.adaptive = explicit.run.adaptive;
     assert_eq!(explicit, implicit);
 }

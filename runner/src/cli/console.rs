@@ -1,10 +1,10 @@
 //! What goes to stderr: complaints, how far a run has come, and log lines as `RUST_LOG` asks for.
 
 use super::progress::{Progress, Show};
-use crate::config::OneLine;
 use crate::error::RunError;
 use crate::rank::Listener;
 use crate::rank::trace::Spans;
+use crate::wording::OneLine;
 use std::env::{self, VarError};
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};

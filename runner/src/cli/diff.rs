@@ -15,7 +15,7 @@ use std::io::{self, IsTerminal};
 /// Whatever keeps it from an answer, or the answer from being written.
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, RunError> {
     let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
-    Kept { runs: vec![&args.a, &args.b], configuration: None }.check(options)?;
+    Kept { runs: vec![&args.a, &args.b], ..Kept::default() }.check(options)?;
     let [json, plot] = WholeFile::check_all(options)?;
 
     for run in [&args.a, &args.b] {

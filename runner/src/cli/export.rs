@@ -16,7 +16,7 @@ use std::io::{self, IsTerminal};
 pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     let recorded = Recorded::open(&args.run)?;
     let shown = records(&recorded, args.every)?;
-    Kept { runs: vec![&args.run], configuration: None }.check([("--vtk", Some(args.vtk.as_path()))])?;
+    Kept { runs: vec![&args.run], ..Kept::default() }.check([("--vtk", Some(args.vtk.as_path()))])?;
     // On a terminal only: a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;

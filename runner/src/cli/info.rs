@@ -3,12 +3,14 @@
 use super::args::InfoArgs;
 use super::console::complain;
 use super::output;
-use crate::config::{Config, OneLine};
+use crate::config::Config;
 use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::folder::{Ended, LogError, Rows, RunFolder};
 use crate::plan::tiles;
+use crate::scene::SceneKind;
+use crate::wording::OneLine;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -49,7 +51,8 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, Ru
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let tiling = tiles::in_words(tiles, config.run.adaptive.map(|adaptive| adaptive.max_bodies));
-    let mut text = format!("{kind}: {bodies} bodies, seed {seed}, {tiling}\n");
+    let seed = if matches!(config.scene.kind, SceneKind::File(_)) { String::new() } else { format!(", seed {seed}") };
+    let mut text = format!("{kind}: {bodies} bodies{seed}, {tiling}\n");
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);

@@ -3,6 +3,7 @@
 pub(crate) mod args;
 mod console;
 mod diff;
+mod drive;
 mod export;
 mod info;
 mod interrupt;
@@ -12,6 +13,7 @@ mod project;
 mod render;
 mod report;
 mod run;
+mod scene;
 mod view;
 
 use crate::error::{Exit, RunError};
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
         Command::Report(args) => report::run(args),
         Command::Project(args) => project::run(args),
         Command::Export(args) => export::run(args),
+        Command::Scene(args) => scene::run(args),
     });
     let exit = result.unwrap_or_else(|error| {
         if !matches!(error, RunError::ToldElsewhere { .. }) {

@@ -28,6 +28,8 @@ pub(super) struct Kept<'a> {
     pub runs: Vec<&'a Path>,
     /// The file that says what to run.
     pub configuration: Option<&'a Path>,
+    /// The files of its scene, if it has some.
+    pub scene: Vec<PathBuf>,
 }
 
 impl Kept<'_> {
@@ -57,6 +59,10 @@ impl Kept<'_> {
         let configuration = self.configuration.and_then(|file| file.canonicalize().ok());
         if configuration.is_some_and(|file| places.contains(&file)) {
             return Some("the configuration of this run".to_owned());
+        }
+        let scene: Vec<PathBuf> = self.scene.iter().filter_map(|file| file.canonicalize().ok()).collect();
+        if places.iter().any(|place| scene.contains(place)) {
+            return Some("a file of the scene of this run".to_owned());
         }
         let runs: Vec<PathBuf> = self.runs.iter().filter_map(|run| run.canonicalize().ok()).collect();
         let is_run = |folder: &RunFolder| runs.iter().any(|run| run == folder.path()) || folder.holds_run();

@@ -18,9 +18,9 @@ use std::sync::Arc;
 /// If the configuration makes no world, the physics ends in a state that is not finite, or a file cannot be written.
 pub(super) fn run(args: &ProjectArgs) -> Result<Exit, RunError> {
     let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
-    Kept { runs: Vec::new(), configuration: Some(&args.config) }.check(options)?;
-    let [json, plot] = WholeFile::check_all(options)?;
     let mut config = Config::load(&args.config, &args.overrides()?)?;
+    Kept { runs: Vec::new(), configuration: Some(&args.config), scene: config.scene_files() }.check(options)?;
+    let [json, plot] = WholeFile::check_all(options)?;
     (config.run.ranks, config.run.threads, config.run.transport) = (1, Some(1), Some(TransportKind::Local));
     let plan = Plan::new(&config)?;
     plan.notes().iter().for_each(|note| complain(note));

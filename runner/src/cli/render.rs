@@ -28,8 +28,9 @@ const AROUND: f64 = 20.0;
 /// # Errors
 /// Whatever kept it from being made. Nothing is left behind then.
 pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
-    Kept { runs: vec![&args.source], configuration: Some(args.source.as_path()).filter(|source| source.is_file()) }
-        .check([("--out", Some(args.out.as_path()))])?;
+    let configuration = Some(args.source.as_path()).filter(|source| source.is_file());
+    let kept = Kept { runs: vec![&args.source], configuration, ..Kept::default() };
+    kept.check([("--out", Some(args.out.as_path()))])?;
     let kind = FilmKind::of(&args.out)?;
     check_out(args, kind)?;
     let mut source = if args.source.is_dir() { open(args)? } else { plan(args)? };
@@ -137,6 +138,8 @@ fn open(args: &RenderArgs) -> Result<Source, RunError> {
 /// What a configuration is about to do.
 fn plan(args: &RenderArgs) -> Result<Source, RunError> {
     let mut config = Config::load(&args.source, &args.values.overrides()?)?;
+    let kept = Kept { scene: config.scene_files(), ..Kept::default() };
+    kept.check([("--out", Some(args.out.as_path()))])?;
     // Whatever it wants to be written.
     config.output = OutputConfig::default();
     Live::check(&config)?;
@@ -208,7 +211,7 @@ impl Source {
                 recorded.recording().read(0, &mut rows)?;
                 rows.iter().any(|row| row.id == id.0)
             }
-            Self::Live(live) => live.has(id),
+            Self::Live(live) => live.has(id)?,
         };
         if known { Ok(()) } else { refused("there is no body of that name; give the id of another") }
     }

@@ -14,7 +14,7 @@ use std::io::{self, IsTerminal};
 /// If a folder holds no run, what is there cannot be read, or the page cannot be written.
 pub(super) fn run(args: &ReportArgs) -> Result<Exit, RunError> {
     let options = [("--out", Some(args.out.as_path()))];
-    Kept { runs: args.runs.iter().map(|run| run.as_path()).collect(), configuration: None }.check(options)?;
+    Kept { runs: args.runs.iter().map(|run| run.as_path()).collect(), ..Kept::default() }.check(options)?;
     let [page] = WholeFile::check_all(options)?;
     // On a terminal only: comparing takes seconds, and a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };

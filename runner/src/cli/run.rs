@@ -2,20 +2,22 @@
 
 use super::args::RunArgs;
 use super::console::{Console, complain};
+use super::drive::{self, Driver};
 use super::interrupt::stop_on_signals;
 use super::output::{self, Kept, WholeFile};
 use super::progress::Show;
 use super::view::Window;
+use crate::command::Script;
 use crate::config::Config;
 #[cfg(any(feature = "iceoryx2", feature = "mpi"))]
 use crate::config::TransportKind;
 use crate::error::{Exit, RunError};
 use crate::folder::{Claim, RunFolder};
 use crate::launch;
-use crate::plan::Plan;
+use crate::plan::{Commands, Plan};
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
-use crate::rank::{Observer, check_logs};
+use crate::rank::{Host, Observer, check_logs};
 use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -30,7 +32,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     if let Some(rank) = launch::iceoryx2::RankProcess::of_this() {
         let goes_on = rank.goes_on();
         let plan = load(args, goes_on).and_then(|config| plan(args, &config, goes_on || is_begun(args)));
-        let opened = Window::open(args, rank.speaks());
+        let opened = Caller::open(args, rank.speaks());
         let (plan, window) = match plan.and_then(|plan| opened.map(|window| (plan, window))) {
             Ok((plan, window)) => (Ok(plan), window),
             Err(error) => (Err(error), None),
@@ -46,7 +48,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         return over_mpi(args, config);
     }
     let config = config?;
-    check_kept(args)?;
+    check_kept(args, &config)?;
     // First of all: what is in a folder may change while another run writes there.
     let held = hold(args)?;
     let outputs = Outputs::check(args)?;
@@ -75,7 +77,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         let run = |plan: &Plan, goes_on| launch::iceoryx2::run(plan, &wishes, goes_on);
         return conclude(&supervise(args, &config, first, run, || wishes.stop.is_requested())?, &outputs);
     }
-    let window = Window::open(args, true)?;
+    let window = Caller::open(args, true)?;
     let _claim = claim(&first, held)?;
     let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
     let run = |plan: &Plan, goes_on| {
@@ -141,7 +143,53 @@ fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
-    .map(|plan| Plan { log: args.log.clone(), ..plan })
+    .and_then(|plan| Ok(Plan { log: args.log.clone(), commands: commands(args, goes_on)?, ..plan }))
+}
+
+/// What the run is told to do, and was.
+fn commands(args: &RunArgs, goes_on: bool) -> Result<Commands, RunError> {
+    let drives = args.commands.as_deref().is_some_and(is_standard);
+    if drives && args.view {
+        let reason = "a page has a hand of its own; give a file of commands, or leave out --view".to_owned();
+        return Err(RunError::Unsuitable { option: "--commands -".to_owned(), reason });
+    }
+    let given = args.commands.as_deref().filter(|path| !is_standard(path)).map(Script::load).transpose()?;
+    let recorded = folder(args).filter(|_| goes_on).map(|folder| folder.commands()).filter(|path| path.is_file());
+    let recorded = recorded.map(|path| Script::load_recorded(&path)).transpose()?;
+    let standard = args.answers.as_deref().filter(|path| is_standard(path)).and_then(|_| drive::standard(1));
+    let answers = standard.or_else(|| args.answers.clone());
+    Ok(Commands { given, recorded, drives, answers, skips: args.skip_refused })
+}
+
+/// Who has ranks meet while it runs, if anybody has. Only one process `speaks`.
+enum Caller {
+    Page(Window),
+    Program(Arc<Driver>),
+}
+
+impl Caller {
+    fn open(args: &RunArgs, speaks: bool) -> Result<Option<Self>, RunError> {
+        if args.commands.as_deref().is_some_and(is_standard) {
+            if args.restarts > 0 {
+                let reason = "who drives the run by --commands - cannot be heard twice; start again with --resume";
+                let (option, reason) = (format!("--restarts {}", args.restarts), reason.to_owned());
+                return Err(RunError::Unsuitable { option, reason });
+            }
+            return Ok(Some(Self::Program(if speaks { Driver::listen()? } else { Arc::default() })));
+        }
+        Ok(Window::open(args, speaks)?.map(Self::Page))
+    }
+
+    fn host(&self, plan: &Plan) -> Arc<dyn Host> {
+        match self {
+            Self::Page(window) => window.host(plan),
+            Self::Program(driver) => Arc::clone(driver) as Arc<dyn Host>,
+        }
+    }
+}
+
+fn is_standard(path: &Path) -> bool {
+    path == Path::new("-")
 }
 
 /// A plan whose run can go on with what is recorded, and with its log.
@@ -165,15 +213,17 @@ fn tell(plan: &Plan) {
 }
 
 /// What is written to files of their own, with the options that say where.
-fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 4] {
+fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 5] {
+    let answers = ("--answers", args.answers.as_deref().filter(|path| !is_standard(path)));
     let files = [("--json", &args.json), ("--timings", &args.timings), ("--trace", &args.trace), ("--log", &args.log)];
-    files.map(|(option, path)| (option, path.as_deref()))
+    let [json, timings, trace, log] = files.map(|(option, path)| (option, path.as_deref()));
+    [json, timings, trace, log, answers]
 }
 
 /// Refuses to write them over what this run reads or keeps, or what another has left.
-fn check_kept(args: &RunArgs) -> Result<(), RunError> {
+fn check_kept(args: &RunArgs, config: &Config) -> Result<(), RunError> {
     let runs = args.out.iter().chain(&args.resume).map(PathBuf::as_path).collect();
-    Kept { runs, configuration: args.config.as_deref() }.check(files(args))
+    Kept { runs, configuration: args.config.as_deref(), scene: config.scene_files() }.check(files(args))
 }
 
 /// Keeps other runs from the folder of this one, if it has one that is there.
@@ -215,8 +265,10 @@ fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
 fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, RunError> {
     let mut job = launch::mpi::Job::join(complain)?;
     let speaks = job.speaks();
-    let held =
-        job.all_well(if speaks && config.is_ok() { check_kept(args).and_then(|()| hold(args)) } else { Ok(None) })?;
+    let held = job.all_well(match &config {
+        Ok(config) if speaks => check_kept(args, config).and_then(|()| hold(args)),
+        _ => Ok(None),
+    })?;
     // Only who holds the folder can tell.
     let begun = job.told(speaks && held.is_some() && is_begun(args));
     let prepare = |config: &Config, outputs: &Outputs, begun| {
@@ -232,7 +284,7 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
         let config = job.adapt(config)?;
         // Only the rank that speaks writes these.
         let outputs = if speaks { Outputs::check(args)? } else { Outputs::default() };
-        Ok((prepare(&config, &outputs, begun)?, outputs, Window::open(args, speaks)?))
+        Ok((prepare(&config, &outputs, begun)?, outputs, Caller::open(args, speaks)?))
     });
     let (mut plan, outputs, window) = job.agree(prepared, |(plan, ..)| plan)?;
     let held = job.all_well(if speaks { hold_new(args, &plan, held) } else { Ok(None) })?;
@@ -262,7 +314,7 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     // In a folder the summary comes last, and says that all is there.
     let folder = write(&outputs.folder_timings, timings.as_bytes()).and(write(&outputs.folder, &json));
     let (json, timings) = (write(&outputs.json, &json), write(&outputs.timings, timings.as_bytes()));
-    let shown = output::show(summary);
+    let shown = if outputs.is_silent { Ok(()) } else { output::show(summary) };
     let trace = outputs.trace.as_ref().map_or(Ok(()), |file| write_trace(summary, file));
     folder.and(json).and(timings).and(trace).and(shown)?;
     if summary.escaped > 0 {
@@ -300,6 +352,8 @@ struct Outputs {
     /// The summary and the timings in the folder of the run.
     folder: Option<WholeFile>,
     folder_timings: Option<WholeFile>,
+    /// Standard output is somebody else's.
+    is_silent: bool,
 }
 
 impl Outputs {
@@ -324,9 +378,10 @@ impl Outputs {
             return Err(error.into());
         }
         let unchecked = |file: fn(&RunFolder) -> PathBuf| folder(args).map(|run| WholeFile::unchecked(&file(&run)));
-        // The log is written by the run itself.
-        let [json, timings, trace, _] = WholeFile::check_all(files(args))?;
+        // The log and answers are written by the run itself.
+        let [json, timings, trace, ..] = WholeFile::check_all(files(args))?;
         let (folder, folder_timings) = (unchecked(RunFolder::summary), unchecked(RunFolder::timings));
-        Ok(Self { json, timings, trace, folder, folder_timings })
+        let is_silent = args.answers.as_deref().is_some_and(is_standard);
+        Ok(Self { json, timings, trace, folder, folder_timings, is_silent })
     }
 }

@@ -30,7 +30,10 @@ pub(super) fn as_run(command: Command) -> Command {
 pub(super) fn run(args: &ViewArgs) -> Result<Exit, RunError> {
     let unsuitable =
         |option: &str, reason: &str| RunError::Unsuitable { option: option.to_owned(), reason: reason.to_owned() };
-    if let Some(option) = args.values.first().or(args.tiles.as_ref().map(|_| "--tiles")) {
+    let others =
+        [("--tiles", args.tiles.is_some()), ("--out", args.out.is_some()), ("--commands", args.commands.is_some())];
+    let other = others.into_iter().find(|(_, is_given)| *is_given).map(|(option, _)| option);
+    if let Some(option) = args.values.first().or(other) {
         return Err(unsuitable(option, "what is recorded stays as it is; name a configuration to run it anew"));
     }
     if let Some(file) = args.sources.iter().find(|source| !source.is_dir()) {

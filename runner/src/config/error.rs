@@ -1,25 +1,9 @@
 //! What can be wrong with a configuration: always one line that names the place, the value, and what is allowed.
 
-use std::fmt::{self, Write as _};
+use crate::scene::SceneError;
+use crate::wording::{OneLine, did_you_mean};
+use std::fmt;
 use thiserror::Error;
-
-/// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
-/// control characters becomes a space.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct OneLine<'a>(pub &'a str);
-
-impl fmt::Display for OneLine<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let broken = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-        for (i, part) in self.0.split(broken).filter(|part| !part.is_empty()).enumerate() {
-            if i > 0 {
-                f.write_char(' ')?;
-            }
-            f.write_str(part)?;
-        }
-        Ok(())
-    }
-}
 
 /// Where a value came from.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -149,8 +133,7 @@ pub enum ConfigError {
         /// Why it means nothing, and what to do.
         reason: String,
     },
-}
-
-fn did_you_mean(suggestion: &Option<String>) -> String {
-    suggestion.as_ref().map(|word| format!("; did you mean {word}?")).unwrap_or_default()
+    /// The file of a scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
 }

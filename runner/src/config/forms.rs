@@ -2,9 +2,9 @@
 
 use super::error::{ConfigError, Origin};
 use super::sections::{AdaptiveConfig, Config, MOST_THREADS, MOST_TILES, TransportKind};
-use super::settings::{Settings, TilesChoice, one_of};
+use super::settings::{Settings, TilesChoice};
 use super::words::{self, Words, word_for};
-use crate::scene::SceneKind;
+use crate::wording::shortest;
 use glam::Vec2;
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -171,22 +171,6 @@ impl Form for Hertz {
     }
 }
 
-/// The kind of scene, from which everything else that is usual follows: it stands first.
-pub(super) struct SceneWord;
-
-impl Form for SceneWord {
-    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
-        let kinds = SceneKind::USUAL.map(|kind| (kind.name(), kind));
-        let chosen = settings.choice(key, &kinds)?;
-        *config = Config::usual(chosen.ok_or_else(|| settings.missing(key, one_of(&kinds)))?);
-        Ok(())
-    }
-
-    fn write(&self, config: &mut Config) -> Option<Value> {
-        Some(config.scene.kind.name().into())
-    }
-}
-
 /// How many ranks, and whether that was asked for on the command line.
 pub(super) struct Ranks;
 
@@ -254,23 +238,20 @@ impl Form for MaxBodies {
     }
 }
 
-fn keep<T>(given: Option<T>, field: &mut T) {
+pub(super) fn keep<T>(given: Option<T>, field: &mut T) {
     if let Some(value) = given {
         *field = value;
     }
 }
 
 /// A number of things as TOML has it. No key takes more than TOML can say.
-fn whole(number: u64) -> Value {
+pub(super) fn whole(number: u64) -> Value {
     Value::Integer(number.try_into().unwrap_or(i64::MAX))
 }
 
 /// The shortest decimal that is read as this number.
 fn float(number: f32) -> Value {
-    let shortest: f64 = number.to_string().parse().expect("a number is written as one");
-    // A file's numbers are rounded twice, to 64 bits and then to 32. Of all numbers, 7.038531e-26 alone ends elsewhere.
-    let same = (shortest as f32).to_bits() == number.to_bits();
-    Value::Float(if same { shortest } else { number.into() })
+    Value::Float(shortest(number))
 }
 
 /// The steps per second that a step of this length came from. Of several, the one that is shortest to write.

@@ -8,9 +8,10 @@
 
 use super::error::ConfigError;
 use super::forms::{
-    Flag, Float, Form, Hertz, MaxBodies, Number, OptionalWhole, OptionalWord, Pair, Ranks, SceneWord, Seconds, Threads,
-    Tiles, Whole, Word,
+    Flag, Float, Form, Hertz, MaxBodies, Number, OptionalWhole, OptionalWord, Pair, Ranks, Seconds, Threads, Tiles,
+    Whole, Word,
 };
+use super::scene_forms::{SceneBodies, SceneDigest, ScenePath, SceneWord};
 use super::sections::Config;
 use super::settings::Settings;
 use super::words;
@@ -53,7 +54,7 @@ const fn key(name: &'static str, concern: Concern, value: &'static dyn Form) -> 
 }
 
 /// More bodies than this are taken for a slip of the finger.
-const MOST_BODIES: u64 = 10_000_000_000;
+pub(super) const MOST_BODIES: u64 = 10_000_000_000;
 
 /// Steps are counted in 32 bits where they are recorded.
 const MOST_STEPS: u64 = u32::MAX as u64;
@@ -61,8 +62,10 @@ const MOST_STEPS: u64 = u32::MAX as u64;
 /// Every key there is, in the order of the documentation.
 pub(super) static KEYS: &[Key] = &[
     key("scene.kind", What, &SceneWord),
-    key("scene.bodies", What, &Whole(|c| Some(&mut c.scene.bodies), |c| c.scene.kind.least_bodies()..=MOST_BODIES)),
-    key("scene.seed", What, &Whole(|c| Some(&mut c.scene.seed), |_| 0..=i64::MAX as u64)),
+    key("scene.path", How, &ScenePath),
+    key("scene.digest", What, &SceneDigest),
+    key("scene.bodies", What, &SceneBodies),
+    key("scene.seed", What, &Whole(seed, |_| 0..=i64::MAX as u64)),
     key("scene.power", What, &Number(power, 0.1..=10.0)),
     key("scene.jitter", What, &Number(jitter, 0.0..=0.25)),
     key("scene.base", What, &Whole(base, |_| 2..=100)),
@@ -117,6 +120,10 @@ pub(super) static KEYS: &[Key] = &[
 
 fn retile_every(config: &mut Config) -> Option<&mut u64> {
     config.run.adaptive.as_mut().map(|adaptive| &mut adaptive.retile_every)
+}
+
+fn seed(config: &mut Config) -> Option<&mut u64> {
+    if let SceneKind::File(_) = config.scene.kind { None } else { Some(&mut config.scene.seed) }
 }
 
 fn power(config: &mut Config) -> Option<&mut f64> {

@@ -9,6 +9,7 @@ mod forms;
 mod keys;
 mod read;
 mod resolved;
+mod scene_forms;
 mod sections;
 mod settings;
 mod spelling;
@@ -17,7 +18,6 @@ mod tests;
 mod words;
 
 pub(crate) use difference::{Difference, differences, other_run};
-pub(crate) use error::OneLine;
 pub use error::{ConfigError, Given, Origin};
 pub(crate) use resolved::{identity, is_resolved};
 pub use sections::{AdaptiveConfig, Balance, Config, MpiExchange, OutputConfig, RunConfig, TransportKind};

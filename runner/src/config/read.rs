@@ -4,26 +4,39 @@ use super::error::{ConfigError, Given, Origin};
 use super::keys::{self, KEYS};
 use super::sections::{Config, TransportKind};
 use super::settings::{Override, Settings};
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
 use atoll_core::SetupError;
 use std::path::Path;
+use toml::{Table, Value};
 
 impl Config {
     /// Reads a configuration file.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ConfigError> {
         let (file, text) = read_file(path)?;
-        Self::read(&file, &text, overrides, TransportKind::is_built_in)
+        if scene::file::is_scene(&text) {
+            return Self::load_scene(path, overrides);
+        }
+        Self::read(&file, &text, overrides, Readers::new(false))
+    }
+
+    /// What is usual for a scene in files, read from the file of that scene itself.
+    fn load_scene(path: &Path, overrides: &[Override]) -> Result<Self, ConfigError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let scene = [("kind", Value::from(SceneKind::FILE)), ("path", Value::from(name.as_ref()))];
+        let scene: Table = scene.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+        let text = Table::from_iter([("scene".to_owned(), Value::Table(scene))]).to_string();
+        Self::read(&path.display().to_string(), &text, overrides, Readers::new(false))
     }
 
     /// Reads the configuration of a run that was begun somewhere, perhaps on a transport that this program lacks.
     pub fn load_begun(path: &Path) -> Result<Self, ConfigError> {
         let (file, text) = read_file(path)?;
-        Self::read(&file, &text, &[], |_| true)
+        Self::read(&file, &text, &[], Readers::new(true))
     }
 
     /// As [`load_begun`](Self::load_begun), from text. `name` stands for it in errors.
     pub(crate) fn from_begun_str(name: &str, text: &str) -> Result<Self, ConfigError> {
-        Self::read(name, text, &[], |_| true)
+        Self::read(name, text, &[], Readers::new(true))
     }
 
     /// Reads a configuration from text. `name` stands for it in errors; `overrides` are keys and values as after
@@ -37,17 +50,18 @@ impl Config {
     /// ```
     pub fn from_toml_str(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Self, ConfigError> {
         let overrides: Vec<Override> = overrides.iter().map(|(key, value)| Override::set(key, value)).collect();
-        Self::read(name, text, &overrides, TransportKind::is_built_in)
+        Self::read(name, text, &overrides, Readers::new(false))
     }
 
-    /// All keys, in the order of their table. `has` says which transports will do.
+    /// All keys, in the order of their table.
     pub(super) fn read(
         name: &str,
         text: &str,
         overrides: &[Override],
-        has: fn(TransportKind) -> bool,
+        Readers { has, is_begun }: Readers,
     ) -> Result<Self, ConfigError> {
         let mut settings = Settings::new(name, text, overrides, keys::names())?;
+        settings.is_begun = is_begun;
         // Whatever stands here, the scene, which is the first key, replaces it by what is usual for it.
         let mut config = Self::usual(SceneKind::Stack);
         KEYS.iter().try_for_each(|key| key.read(&mut settings, &mut config))?;
@@ -57,6 +71,20 @@ impl Config {
             false => "tiles stay as they are here; add tiles = \"adaptive\", or leave it out".to_owned(),
         })?;
         Ok(config)
+    }
+}
+
+/// Who reads a configuration.
+pub(super) struct Readers {
+    /// Which transports will do.
+    has: fn(TransportKind) -> bool,
+    /// Whether the run was begun before, and is only to be known.
+    is_begun: bool,
+}
+
+impl Readers {
+    pub(super) fn new(is_begun: bool) -> Self {
+        Self { has: if is_begun { |_| true } else { TransportKind::is_built_in }, is_begun }
     }
 }
 
@@ -82,6 +110,11 @@ fn check(config: &Config, settings: &Settings, has: fn(TransportKind) -> bool) -
             return Err(ConfigError::Inapplicable { given: given(), reason });
         }
     }
+    check_params(config, settings)
+}
+
+/// Refuses what the physics cannot compute with.
+pub(super) fn check_params(config: &Config, settings: &Settings) -> Result<(), ConfigError> {
     config.params.check().map_err(|error| refused_param(settings, error))
 }
 

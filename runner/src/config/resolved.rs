@@ -3,6 +3,7 @@
 
 use super::keys::{Concern, KEYS};
 use super::sections::Config;
+use atoll_core::Params;
 use std::fmt::Write as _;
 use toml::Value;
 
@@ -45,6 +46,16 @@ impl Config {
         let what = KEYS.iter().filter(|key| key.concern == Concern::What);
         let entries = what.filter_map(|key| Some((key.name, key.write(&mut config)?)));
         entries.map(|(key, value)| format!("{key} = {value}\n")).collect()
+    }
+
+    /// What [`physics`] says that is not usual where nobody says anything: what a scene in a file must say for the same.
+    ///
+    /// [`physics`]: Self::params
+    pub(crate) fn unusual_physics(&self) -> Vec<(&'static str, Value)> {
+        let (mut config, mut usual) = (self.clone(), Self { params: Params::default(), ..self.clone() });
+        let keys = KEYS.iter().filter_map(|key| Some((key, key.name.strip_prefix("physics.")?)));
+        let values = keys.filter_map(|(key, name)| Some((name, key.write(&mut config)?, key.write(&mut usual)?)));
+        values.filter(|(_, value, usual)| value != usual).map(|(name, value, _)| (name, value)).collect()
     }
 
     /// What all parts of one run have in common, a `key = value` line each: [`canonical`](Self::canonical), and how often it
@@ -195,7 +206,8 @@ mod tests {
             assert!(keys.is_sorted_by(|a, b| a < b), "{kind}: {keys:?}");
             seen.extend(keys);
         }
-        assert_eq!(seen.len(), KEYS.len(), "a key is never given");
+        // Those of scenes in files have a test of their own.
+        assert_eq!(seen.len(), KEYS.len() - 2, "a key is never given");
     }
 
     #[test]
@@ -205,8 +217,8 @@ mod tests {
         let expected = "scene.kind = \"stack\"\nscene.bodies = 10\nscene.seed = 1\nrun.steps = 600\nrun.tiles = [3, 2]\n\
                         physics.hertz = 60.0\n";
         assert!(text.starts_with(expected), "{text}");
-        // Five are of other scenes, and two of tiles that are not all equal.
+        // Six are of other scenes, and two of tiles that are not all equal.
         let what = KEYS.iter().filter(|key| key.concern == Concern::What).count();
-        assert_eq!(text.lines().count(), what - 7, "{text}");
+        assert_eq!(text.lines().count(), what - 8, "{text}");
     }
 }

@@ -3,6 +3,7 @@
 use super::forms;
 use crate::scene::{SceneKind, SceneSpec};
 use atoll_core::Params;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// More tiles along an axis cannot be named in 32 bits for both.
@@ -175,7 +176,16 @@ impl Config {
     /// What is usual for a scene.
     pub(super) fn usual(kind: SceneKind) -> Self {
         let (run, output) = (RunConfig::default(), OutputConfig::default());
-        Self { scene: SceneSpec::usual(kind), run, params: kind.usual_params(), output }
+        let params = kind.usual_params();
+        Self { scene: SceneSpec::usual(kind), run, params, output }
+    }
+
+    /// The files that its scene is read from, if they are open.
+    pub(crate) fn scene_files(&self) -> Vec<PathBuf> {
+        let SceneKind::File(spec) = &self.scene.kind else { return Vec::new() };
+        let file = spec.file().ok();
+        let bodies = file.as_ref().and_then(|file| file.bodies_path()).map(Path::to_owned);
+        file.iter().map(|file| file.path().to_owned()).chain(bodies).collect()
     }
 
     /// Steps in a second.

@@ -2,9 +2,11 @@
 
 use super::error::{ConfigError, Given, Origin};
 use super::spelling;
+use crate::wording::nearest;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// What may be said of tiles.
@@ -59,6 +61,8 @@ pub(super) struct Settings {
     /// The keys there are.
     keys: Vec<&'static str>,
     all: BTreeMap<&'static str, Setting>,
+    /// Whether the run was begun before: then files that it was begun with may be gone.
+    pub(super) is_begun: bool,
 }
 
 impl Settings {
@@ -70,7 +74,7 @@ impl Settings {
         keys: impl Iterator<Item = &'static str>,
     ) -> Result<Self, ConfigError> {
         let table: Table = text.parse().map_err(|error| syntax_error(file, text, &error))?;
-        let mut settings = Self { file: file.to_owned(), keys: keys.collect(), all: BTreeMap::new() };
+        let mut settings = Self { file: file.to_owned(), keys: keys.collect(), all: BTreeMap::new(), is_begun: false };
         for (section, content) in table {
             settings.add_section(&section, content)?;
         }
@@ -80,6 +84,18 @@ impl Settings {
             let value = one.value.parse().unwrap_or_else(|_| Value::String(one.value.clone()));
             settings.insert(key, value, one.value.clone(), one.origin.clone());
         }
+        Ok(settings)
+    }
+
+    /// One section of another file, which is read already.
+    pub(super) fn of_section(
+        file: &str,
+        section: &str,
+        content: Table,
+        keys: impl Iterator<Item = &'static str>,
+    ) -> Result<Self, ConfigError> {
+        let mut settings = Self { file: file.to_owned(), keys: keys.collect(), all: BTreeMap::new(), is_begun: false };
+        settings.add_section(section, Value::Table(content))?;
         Ok(settings)
     }
 
@@ -93,7 +109,7 @@ impl Settings {
         let Value::Table(content) = content else { return Err(unknown(section.to_owned(), &content)) };
         let sections = || keys.iter().map(|key| key.split_once('.').map_or(*key, |(section, _)| section));
         if !sections().any(|known| known == section) {
-            let suggestion = spelling::nearest(sections(), section).map(|word| format!("[{word}]"));
+            let suggestion = nearest(sections(), section).map(|word| format!("[{word}]"));
             return Err(ConfigError::UnknownSection {
                 file: self.file.clone(),
                 section: section.to_owned(),
@@ -213,6 +229,20 @@ impl Settings {
         self.get(key, must, tiles)
     }
 
+    /// Any text.
+    pub(super) fn text(&mut self, key: &'static str, must: &str) -> Result<Option<String>, ConfigError> {
+        self.get(key, must, |value| value.as_str().map(str::to_owned))
+    }
+
+    /// A path: from the folder of the configuration where that gives it, from the working folder where the command line does.
+    pub(super) fn path(&mut self, key: &'static str) -> Result<Option<PathBuf>, ConfigError> {
+        let path =
+            self.get(key, "a path", |value| value.as_str().filter(|path| !path.is_empty()).map(PathBuf::from))?;
+        let from_file = matches!(self.given(key), Some(Given { origin: Origin::File(_), .. }));
+        let folder = Path::new(&self.file).parent().filter(|_| from_file).unwrap_or(Path::new(""));
+        Ok(path.map(|path| folder.join(path)))
+    }
+
     /// Yes or no.
     pub(super) fn flag(&mut self, key: &'static str) -> Result<Option<bool>, ConfigError> {
         self.get(key, "true or false", Value::as_bool)
@@ -225,7 +255,7 @@ impl Settings {
         if let Some((_, value)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(Some(*value));
         }
-        let suggestion = spelling::nearest(words.iter().map(|(word, _)| *word), &text);
+        let suggestion = nearest(words.iter().map(|(word, _)| *word), &text);
         Err(ConfigError::BadValue { given: self.all[key].given.clone(), must, suggestion })
     }
 }

@@ -1,9 +1,7 @@
 //! What a key or a word may have meant that is none.
 
 use super::error::{ConfigError, Given, Origin};
-
-/// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
-const SIMILAR: f64 = 0.6;
+use crate::wording::nearest_by;
 
 /// The key that `text` names: a full path, or the last part of exactly one.
 pub(super) fn resolve(
@@ -34,16 +32,6 @@ pub(super) fn nearest_key(keys: &[&str], text: &str) -> Option<String> {
         part + 0.01 * strsim::normalized_damerau_levenshtein(key, text)
     };
     nearest_by(keys.iter().copied(), likeness)
-}
-
-/// The word most like `text`.
-pub(super) fn nearest<'a>(words: impl Iterator<Item = &'a str>, text: &str) -> Option<String> {
-    nearest_by(words, |word| strsim::normalized_damerau_levenshtein(word, text))
-}
-
-fn nearest_by<'a>(words: impl Iterator<Item = &'a str>, likeness: impl Fn(&str) -> f64) -> Option<String> {
-    let best = words.map(|word| (likeness(word), word)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 >= SIMILAR).then(|| best.1.to_owned())
 }
 
 fn last_part(key: &str) -> &str {

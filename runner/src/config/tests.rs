@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// What a scene may be called.
-const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash" or "slope""#;
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "slope" or "file""#;
 const ROOMS: &str = "[scene]\nkind = \"rooms\"\n";
 
 fn read(text: &str, overrides: &[(&str, &str)]) -> Result<Config, String> {
@@ -157,8 +157,8 @@ fn every_key_can_be_given() {
     assert_eq!(config.output, OutputConfig { record_every: Some(10), checkpoint_every: Some(100), log_every: 5 });
 
     let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
-    // The scene's four stand on one line; jitter, base, angle and friction belong to other kinds.
-    assert_eq!(keys + 4 + 4, keys::KEYS.len(), "a key is missing from this test");
+    // The scene's four stand on one line; path, digest, jitter, base, angle and friction belong to other kinds.
+    assert_eq!(keys + 4 + 6, keys::KEYS.len(), "a key is missing from this test");
 }
 
 #[test]
@@ -301,7 +301,7 @@ fn a_file_that_is_not_there_is_named() {
 #[test]
 fn options_are_named_as_they_were_written() {
     let overrides = [Override::option("--bodies", "scene.bodies", "-5")];
-    let error = Config::read("test.toml", ROOMS, &overrides, |_| true).unwrap_err().to_string();
+    let error = Config::read("test.toml", ROOMS, &overrides, super::read::Readers::new(true)).unwrap_err().to_string();
     assert!(error.starts_with("--bodies -5: must be a whole number within 100"), "{error}");
     assert_eq!(
         Override::parse("solver").unwrap_err().to_string().split(';').next(),

@@ -1,6 +1,6 @@
 //! What the summary in a run's folder says about how it ended.
 
-use crate::config::OneLine;
+use crate::wording::OneLine;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::ErrorKind;

@@ -2,7 +2,7 @@
 //! with one write, so whoever is killed leaves whole rows, or but the last torn.
 
 use super::durable::sync_folder_of;
-use crate::config::OneLine;
+use crate::wording::OneLine;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

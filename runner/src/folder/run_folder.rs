@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 const LOCK: &str = "lock";
 
 /// The name of what tells of tiles that follow the bodies.
+const COMMANDS: &str = "commands.jsonl";
 pub(super) const TILINGS: &str = "tilings.jsonl";
 
 /// A folder that is, or is to be, that of a run.
@@ -58,6 +59,11 @@ impl RunFolder {
         self.path.join(TILINGS)
     }
 
+    /// What was done while it ran, and is planned to be.
+    pub fn commands(&self) -> PathBuf {
+        self.path.join(COMMANDS)
+    }
+
     /// The snapshots.
     pub fn snapshots(&self) -> PathBuf {
         self.path.join("snapshots")
@@ -101,7 +107,7 @@ impl RunFolder {
     /// Whether a run keeps a file or a folder of that name in its folder: nobody else may write there.
     pub fn owns(&self, name: &OsStr) -> bool {
         let written = [self.configuration(), self.summary(), self.timings()];
-        let fixed = [self.log(), self.tilings(), self.snapshots(), self.lock()];
+        let fixed = [self.log(), self.tilings(), self.commands(), self.snapshots(), self.lock()];
         written.iter().chain(&fixed).any(|path| path.file_name() == Some(name))
             || name.to_str().is_some_and(recording::is_rank_folder)
             || self.is_unfinished(name)

@@ -3,7 +3,8 @@
 use super::frame::{Frame, Setting};
 use crate::config::Config;
 use crate::folder::recording::{Recording, RecordingError, Row, Stage};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneKind};
+use atoll_core::GlobalId;
 use std::path::Path;
 
 /// A recording, to be read frame by frame.
@@ -70,18 +71,20 @@ impl Recorded {
 fn scene_of(recording: &Recording) -> Result<Scene, RecordingError> {
     let config = Config::from_begun_str("atoll.config", &recording.facts().config);
     let spec = config.map_err(|error| no_scene(recording, error.to_string()))?.scene;
+    if let SceneKind::File(_) = spec.kind {
+        return Err(no_scene(recording, "and its scene is in a file".to_owned()));
+    }
     // The scene takes memory by how many it says, and files only by how many they hold.
     let (told, held) = (spec.bodies, recording.rows(0));
     if told != held {
         return Err(no_scene(recording, format!("its scene has {told} bodies, and its first record {held}")));
     }
-    Ok(Scene::new(&spec))
+    Scene::open(&spec).map_err(|error| no_scene(recording, error.to_string()))
 }
 
 /// Of what kind a scene's body is.
 fn kind_in(scene: &Scene, row: &Row) -> Option<u32> {
-    let index = row.id.checked_sub(scene.first_id().0).filter(|index| *index < scene.bodies())?;
-    Some(scene.body(index).kind.0)
+    scene.find(GlobalId(row.id)).ok().flatten().map(|body| body.kind.0)
 }
 
 fn no_scene(recording: &Recording, reason: String) -> RecordingError {
@@ -119,7 +122,7 @@ mod tests {
     fn recordings_of_format_1_get_the_shapes_of_their_scene() {
         let recorded = Recorded::open(&format_1()).unwrap();
         let config = Config::load_begun(&format_1().join("run.toml")).unwrap();
-        let scene = Scene::new(&config.scene);
+        let scene = Scene::open(&config.scene).unwrap();
         assert_eq!(
             (&recorded.setting().kinds[..], &recorded.setting().statics[..]),
             (&scene.kinds()[..], scene.statics())
@@ -129,7 +132,7 @@ mod tests {
         recorded.read(10, &mut frame).unwrap();
         assert_eq!((frame.step, frame.ranks.len(), frame.bodies.len()), (10, 2, 12));
         for row in &frame.bodies {
-            assert_eq!(row.kind, scene.iter().find(|body| body.id.0 == row.id).unwrap().kind.0);
+            assert_eq!(row.kind, scene.find(GlobalId(row.id)).unwrap().unwrap().kind.0);
         }
         assert!(frame.bodies.iter().any(|row| row.kind == 0) && frame.bodies.iter().any(|row| row.kind == 1));
     }

@@ -2,7 +2,8 @@
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
-use atoll_core::Blueprint;
+use crate::scene::SceneKind;
+use atoll_core::{Blueprint, Body};
 use std::{fs, thread};
 
 /// A thread's stack.
@@ -28,7 +29,9 @@ pub(super) fn check(
     // What is written is copied first: records twice.
     let copies = if output.is_some_and(|output| output.record_every.is_some()) { 100 } else { 0 };
     let saved = if output.is_some() { 200 } else { 0 };
-    let world = blueprint.memory(bodies).saturating_add(bodies.saturating_mul(copies + saved));
+    // What is read from files is sorted first.
+    let read = if matches!(config.scene.kind, SceneKind::File(_)) { size_of::<Body>() as u64 } else { 0 };
+    let world = blueprint.memory(bodies).saturating_add(bodies.saturating_mul(copies + saved + read));
     // Every rank has its share, four bytes for each tile in a map, and a channel to every other.
     let of = |held: u64| (world / ranks).saturating_mul(held).saturating_add(held * (4 * tiles + 500 * ranks));
     let check = |within: &'static str, needed: u64, available: Option<u64>| match available {

@@ -2,12 +2,14 @@
 
 mod advice;
 mod assignment;
+mod commands;
 mod holding;
 mod memory;
 mod threads;
 pub(crate) mod tiles;
 
 pub(crate) use assignment::Assignment;
+pub(crate) use commands::Commands;
 pub(crate) use holding::Holding;
 
 use crate::config::{Config, OutputConfig, TransportKind};
@@ -15,8 +17,8 @@ use crate::error::RunError;
 use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
-use crate::scene::Scene;
-use atoll_core::{Blueprint, Body};
+use crate::scene::{Scene, SceneError};
+use atoll_core::Blueprint;
 use std::path::PathBuf;
 
 /// A configuration, checked and resolved.
@@ -40,6 +42,8 @@ pub struct Plan {
     pub output: Option<Output>,
     /// Where figures over time are written to, beside the folder.
     pub log: Option<PathBuf>,
+    /// What it is told to do while it runs.
+    pub(crate) commands: Commands,
     /// Where it can go on from; nothing if it begins.
     pub found: Found,
 }
@@ -67,10 +71,10 @@ impl Output {
     }
 }
 
-fn scene_and_tiles(config: &Config) -> (Scene, [u32; 2]) {
-    let scene = Scene::new(&config.scene);
+fn scene_and_tiles(config: &Config) -> Result<(Scene, [u32; 2]), SceneError> {
+    let scene = Scene::open(&config.scene)?;
     let tiles = tiles::tile_counts(config, &scene);
-    (scene, tiles)
+    Ok((scene, tiles))
 }
 
 impl Plan {
@@ -91,7 +95,7 @@ impl Plan {
     }
 
     fn begin(config: &Config, folder: Option<RunFolder>) -> Result<Self, RunError> {
-        let (scene, tiles) = scene_and_tiles(config);
+        let (scene, tiles) = scene_and_tiles(config)?;
         Self::from_found(config, scene, tiles, Found::default(), folder.map(|folder| (folder, true)))
     }
 
@@ -101,7 +105,7 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new), and if what the folder holds is another run, or cannot be gone on with.
     pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
-        let (scene, tiles) = scene_and_tiles(config);
+        let (scene, tiles) = scene_and_tiles(config)?;
         folder.check_same_run(config, tiles)?;
         // One that cannot be read counts as missing, unless nothing else tells how far the run came.
         let (steps, ended) = (config.run.steps, Ended::read(folder.path()));
@@ -175,14 +179,19 @@ impl Plan {
         memory::check(&blueprint, scene.bodies(), config, threads, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;
-        let weights = found.snapshots.first().map(Snapshot::weights).unwrap_or_else(|| {
-            let mut weights = vec![0; blueprint.partition.tiles()];
-            if ranks > 1 {
-                let tile = |body: &Body| blueprint.partition.locate(body.position).0 as usize;
-                scene.sample().for_each(|(bodies, body)| weights[tile(&body)] += bodies);
+        let weights = match found.snapshots.first() {
+            Some(snapshot) => snapshot.weights(),
+            None => {
+                let mut weights = vec![0; blueprint.partition.tiles()];
+                if ranks > 1 {
+                    for sample in scene.sample() {
+                        let (bodies, place) = sample?;
+                        weights[blueprint.partition.locate(place).0 as usize] += bodies;
+                    }
+                }
+                weights
             }
-            weights
-        });
+        };
         let assignment = Assignment::balanced(&blueprint.partition, &weights, ranks);
         let output = folder.map(|(folder, begins)| Output {
             folder,
@@ -191,7 +200,19 @@ impl Plan {
             begins,
         });
         let config = config.clone();
-        Ok(Self { config, scene, blueprint, tiles, assignment, threads, transport, output, log: None, found })
+        Ok(Self {
+            config,
+            scene,
+            blueprint,
+            tiles,
+            assignment,
+            threads,
+            transport,
+            output,
+            log: None,
+            commands: Commands::default(),
+            found,
+        })
     }
 }
 

@@ -2,8 +2,9 @@
 //! computes the same world.
 
 use crate::config::{Config, MOST_TILES};
+use crate::error::RunError;
 use crate::scene::Scene;
-use atoll_core::{Adaptive, Kind, Params, Partition, SetupError};
+use atoll_core::{Adaptive, Kind, Params, Partition};
 use glam::DVec2;
 
 /// Bodies in a tile of the default grid, on the average. So many stay in a core's L2 cache for a whole step; half as many
@@ -51,10 +52,22 @@ pub(crate) fn first_partition(
     config: &Config,
     scene: &Scene,
     [columns, rows]: [u32; 2],
-) -> Result<Partition, SetupError> {
+) -> Result<Partition, RunError> {
     let (low, high) = scene.domain();
-    let Some(rule) = rule(config, &scene.kinds()) else { return Partition::uniform(low, high, columns, rows) };
-    Partition::adaptive(low, high, [columns, rows], &rule, scene.sample().map(|(bodies, body)| (body.position, bodies)))
+    let Some(rule) = rule(config, &scene.kinds()) else { return Ok(Partition::uniform(low, high, columns, rows)?) };
+    let mut failed = None;
+    let places = scene.sample().map_while(|sample| match sample {
+        Ok((bodies, place)) => Some((place, bodies)),
+        Err(error) => {
+            failed = Some(error);
+            None
+        }
+    });
+    let partition = Partition::adaptive(low, high, [columns, rows], &rule, places);
+    match failed {
+        Some(error) => Err(error.into()),
+        None => Ok(partition?),
+    }
 }
 
 /// How the domain is cut.
@@ -104,7 +117,7 @@ mod tests {
         let text = "[scene]\nkind = \"rooms\"\nbodies = 50000\n";
         let counts = |overrides: &[(&str, &str)]| {
             let config = Config::from_toml_str("test", text, overrides).unwrap();
-            tile_counts(&config, &Scene::new(&config.scene))
+            tile_counts(&config, &Scene::open(&config.scene).unwrap())
         };
         assert_eq!(counts(&[]), counts(&[("ranks", "7"), ("threads", "3")]));
         assert_eq!(counts(&[("tiles", "8x3")]), [8, 3]);

@@ -72,7 +72,7 @@ impl Course {
     /// # Errors
     /// If no world can be made of it, or its state is no longer finite.
     pub(super) fn run(plan: &Plan, observer: &Observer) -> Result<Option<Self>, RunError> {
-        let mut world = part_of_scene(plan, Rank(0)).map_err(RunError::Setup)?;
+        let mut world = part_of_scene(plan, Rank(0))?;
         world.book_time(thread_time);
         let (steps, partition) = (plan.config.run.steps, world.partition().clone());
         let stride = (steps * partition.tiles() as u64).div_ceil(MOST_TIMES).max(1);

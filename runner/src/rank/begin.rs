@@ -1,12 +1,13 @@
 //! How a rank begins: with its part of the scene, or of a snapshot.
 
 use super::trouble::{Refusal, all_well};
-use super::{Observer, RankError};
+use super::{Observer, RankError, names};
+use crate::command::State;
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
 use crate::plan::{Assignment, Holding, Plan};
-use atoll_core::{Blueprint, SetupError, World};
-use atoll_transport::{Rank, Transport};
+use atoll_core::{Blueprint, Body, World};
+use atoll_transport::{Collective, Rank, Transport};
 use tracing::info;
 
 /// A world about to be stepped.
@@ -16,6 +17,8 @@ pub(super) struct Beginning {
     pub(super) assignment: Assignment,
     /// The step after which it was saved, if it was.
     pub(super) resumed: Option<u64>,
+    /// What commands had added up to by then, if there were any.
+    pub(super) commands: Option<State>,
 }
 
 /// This rank's part of the newest snapshot of which every rank can read its part, or else of the scene.
@@ -33,7 +36,8 @@ pub(super) fn build(
         all_well(transport, restored.as_ref().err().filter(|error| !is_damage(error)))?;
         let error = match (all_well(transport, restored.as_ref().err()), restored) {
             (Ok(()), Ok((world, assignment))) => {
-                return Ok(Beginning { world, assignment, resumed: Some(snapshot.step()) });
+                let commands = snapshot.commands().cloned();
+                return Ok(Beginning { world, assignment, resumed: Some(snapshot.step()), commands });
             }
             (Ok(()), Err(error)) | (Err(Refusal::Known(error)), _) => error,
             (Err(refusal), _) => return Err(refusal.into()),
@@ -45,8 +49,30 @@ pub(super) fn build(
             observer.note(&format!("{error}; going on after step {next} instead"));
         }
     }
-    let world = scene(plan, rank).map_err(RankError::Setup)?;
-    Ok(Beginning { world, assignment: plan.assignment.clone(), resumed: None })
+    let world = if plan.scene.file().is_some() { from_files(plan, rank, transport)? } else { made(plan, rank)? };
+    Ok(Beginning { world, assignment: plan.assignment.clone(), resumed: None, commands: None })
+}
+
+/// This rank's part of a scene that is made, with which nothing can be wrong on one rank alone.
+fn made(plan: &Plan, rank: Rank) -> Result<World, RankError> {
+    scene(plan, rank).map_err(|error| match error {
+        RunError::Setup(error) => RankError::Setup(error),
+        error => RankError::Agreed { text: error.to_string(), exit: error.exit() },
+    })
+}
+
+/// This rank's part of a scene in files, once all ranks have read theirs, and all of its bodies with names of their own are
+/// somewhere.
+fn from_files(plan: &Plan, rank: Rank, transport: &mut impl Transport) -> Result<World, RankError> {
+    let read = scene(plan, rank);
+    all_well(transport, read.as_ref().err())?;
+    let world = read.map_err(|error| RankError::Agreed { text: error.to_string(), exit: error.exit() })?;
+    let found = transport.all_sum_u64(world.bodies().count() as u64).map_err(RankError::Transport)?;
+    all_well(transport, plan.scene.lost(found).map(RunError::Scene).as_ref())?;
+    let doubled = names::doubled(transport, &world).map_err(RankError::Transport)?;
+    let doubled = doubled.and_then(|id| plan.scene.doubled(id)).map(RunError::Scene);
+    all_well(transport, doubled.as_ref())?;
+    Ok(world)
 }
 
 /// This rank's tiles of a snapshot, and who holds which. That they cannot be read is for all ranks to hear.
@@ -77,14 +103,29 @@ fn restore(
 /// This rank's part of the scene.
 ///
 /// # Errors
-/// If it makes no world.
-pub fn scene(plan: &Plan, rank: Rank) -> Result<World, SetupError> {
+/// If it makes no world, or its files cannot be read.
+pub fn scene(plan: &Plan, rank: Rank) -> Result<World, RunError> {
     let tiles = plan.assignment.tiles_of(rank.index());
     let mut world = World::new(&plan.blueprint, &tiles)?;
     let mut bodies = 0_u64;
     let held = Holding::new(&plan.blueprint.partition, &tiles);
-    for body in plan.scene.near(|low, high| held.meets(low, high)) {
-        bodies += u64::from(world.add(body)?);
+    let near = plan.scene.near(|low, high| held.meets(low, high));
+    if plan.scene.file().is_none() {
+        for body in near {
+            bodies += u64::from(world.add(body?)?);
+        }
+    } else {
+        // Whatever order they stand in, it is to make no difference.
+        let mut found = near.collect::<Result<Vec<Body>, _>>()?;
+        found.sort_unstable_by_key(|body| body.id);
+        let doubled =
+            found.windows(2).find(|pair| pair[0].id == pair[1].id).and_then(|pair| plan.scene.doubled(pair[0].id));
+        if let Some(error) = doubled {
+            return Err(error.into());
+        }
+        for body in found {
+            bodies += u64::from(world.add(body)?);
+        }
     }
     info!(tiles = tiles.len(), bodies, "built");
     Ok(world)

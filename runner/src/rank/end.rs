@@ -4,6 +4,7 @@ use super::log::Log;
 use super::recorder::Recorder;
 use super::trouble::all_well;
 use super::{Observer, RankError};
+use crate::command::State;
 use crate::error::RunError;
 use crate::folder::durable::is_gone;
 use crate::folder::{RunFolder, snapshot};
@@ -45,7 +46,7 @@ pub(super) fn start<'a>(
 /// leaves a snapshot to go on from.
 pub(super) fn finish(
     mut recorder: Recorder<'_>,
-    world: &World,
+    (world, commands): (&World, Option<&State>),
     stopped: bool,
     plan: &Plan,
     observer: &Observer,
@@ -55,7 +56,7 @@ pub(super) fn finish(
     let patience = plan.config.run.peer_timeout / 4;
     together(transport, observer, folder, || recorder.has_room(patience))?;
     if stopped || every.checkpoint_every.is_some() {
-        recorder.snapshot(world);
+        recorder.snapshot(world, commands);
     }
     let kept = recorder.snapshot_before();
     together(transport, observer, folder, || recorder.close(patience))?;

@@ -22,6 +22,8 @@ pub struct RankFacts {
     pub interrupted: u64,
     /// Bodies outside of the rectangle they must not leave.
     pub escaped: u64,
+    /// Bodies that there are to be, of all ranks.
+    pub expected: u64,
     /// Ghosts in the last step.
     pub ghosts: u64,
     /// Bodies received from other tiles, in the whole run.
@@ -138,6 +140,7 @@ impl RankFacts {
             output_nanos: most(|rank| rank.output_nanos),
             balance_nanos: most(|rank| rank.balance_nanos),
             // These all ranks know alike.
+            expected: most(|rank| rank.expected),
             tile_count: most(|rank| rank.tile_count),
             tiles_moved: most(|rank| rank.tiles_moved),
             imbalance: most(|rank| rank.imbalance),

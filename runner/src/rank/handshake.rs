@@ -60,6 +60,7 @@ fn hello(plan: &Plan) -> Hello {
         ("mpi_exchange", format!("{:?}", run.mpi_exchange).to_lowercase()),
         ("output", format!("{:?}", plan.output.as_ref().map(|output| (output.folder.path(), output.every)))),
         ("log", format!("{:?}", plan.log)),
+        ("commands", plan.commands.hello()),
         ("snapshots of steps", format!("{:?}", plan.found.snapshots.iter().map(Snapshot::step).collect::<Vec<_>>())),
     ];
     lines.map(|(name, value)| (name.to_owned(), value)).into()

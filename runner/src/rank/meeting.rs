@@ -3,9 +3,10 @@
 //! Rank 0 lets the ranks know by the word that every step carries anyway ([`World::request_meeting`]), so that nothing is sent
 //! while nobody has a question.
 
+use super::commands::Commander;
 use super::halo::RankHalo;
 use super::{Observer, RankError};
-use crate::plan::Assignment;
+use crate::plan::{Assignment, Plan};
 use atoll_core::{StepReport, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport, TransportError};
 use std::fmt::Debug;
@@ -18,6 +19,8 @@ pub enum Next {
     Ask(Vec<u8>),
     /// It has no question yet; the others are to wait.
     Wait,
+    /// It has this done by all ranks, lines of commands as a file has them, each after its number and a tab.
+    Do(Vec<u8>),
     /// It lets time go on.
     GoOn,
 }
@@ -56,6 +59,8 @@ pub trait Host: Debug + Send + Sync {
 const ASK: u8 = 1;
 /// See [`ASK`].
 const WAIT: u8 = 2;
+/// See [`ASK`].
+const DO: u8 = 3;
 /// What other ranks say: nothing, or that they are to stop.
 const STOP: u8 = 1;
 
@@ -63,6 +68,8 @@ const STOP: u8 = 1;
 #[derive(Debug)]
 pub(super) struct Meetings<'a> {
     observer: &'a Observer,
+    /// Whether whoever is waited for hears of it.
+    tells_of_waiting: bool,
     /// The longest that rank 0 is silent.
     patience: Duration,
     /// How long time stood still because somebody wished so.
@@ -74,10 +81,11 @@ pub(super) struct Meetings<'a> {
 }
 
 impl<'a> Meetings<'a> {
-    /// None yet. Whoever is silent for `peer_timeout` is given up.
-    pub(super) fn new(observer: &'a Observer, peer_timeout: Duration) -> Self {
-        let patience = (peer_timeout / 4).min(Duration::from_millis(250));
-        Self { observer, patience, stood: Duration::ZERO, spent: Duration::ZERO, sent: Stats::default() }
+    /// None yet. Whoever is silent for the plan's `peer_timeout` is given up.
+    pub(super) fn new(observer: &'a Observer, plan: &Plan) -> Self {
+        let patience = (plan.config.run.peer_timeout / 4).min(Duration::from_millis(250));
+        let (stood, spent, sent) = Default::default();
+        Self { observer, tells_of_waiting: plan.commands.drives, patience, stood, spent, sent }
     }
 
     fn host(&self) -> Option<&'a dyn Host> {
@@ -94,71 +102,96 @@ impl<'a> Meetings<'a> {
     /// Meets before the first step, or after the last, if that is wanted.
     ///
     /// # Errors
-    /// If a rank is lost.
+    /// If a rank is lost, or what is to be done cannot be.
     pub(super) fn linger<T: Transport>(
         &mut self,
-        world: &World,
+        world: &mut World,
         last: &StepReport,
         halo: &mut RankHalo<Counting<T>>,
+        commander: &mut Commander,
     ) -> Result<(), RankError> {
-        if self.host().is_some_and(Host::lingers) { self.hold(world, last, halo) } else { Ok(()) }
+        if self.host().is_some_and(Host::lingers) { self.hold(world, last, halo, commander) } else { Ok(()) }
     }
 
     /// Meets, until rank 0 lets time go on, or somebody asks the run to stop.
     ///
     /// # Errors
-    /// If a rank is lost.
+    /// If a rank is lost, or what is to be done cannot be.
     pub(super) fn hold<T: Transport>(
         &mut self,
-        world: &World,
+        world: &mut World,
         last: &StepReport,
         halo: &mut RankHalo<Counting<T>>,
+        commander: &mut Commander,
     ) -> Result<(), RankError> {
         let Some(host) = self.host() else { return Ok(()) };
         let (waited, rank) = (halo.waited(), halo.transport().rank());
         let (assignment, transport) = halo.parts();
-        let held = Held { rank, world, assignment, last, waited };
         let before = transport.stats();
-        while self.go_round(host, &held, transport).map_err(RankError::Transport)? {}
+        loop {
+            let held = Held { rank, world, assignment, last, waited };
+            match self.go_round(host, &held, transport).map_err(RankError::Transport)? {
+                Round::Over => break,
+                Round::Answered => {}
+                Round::Waits if self.tells_of_waiting => commander.wait(world.step_count()),
+                Round::Waits => {}
+                Round::Told(words) => commander.hear(&words, world, transport, self.observer)?,
+            }
+        }
         self.sent += transport.stats().since(&before);
         Ok(())
     }
 
-    /// One word of rank 0 and what follows from it. Says whether the meeting goes on.
+    /// One word of rank 0 and what follows from it.
     fn go_round(
         &mut self,
         host: &dyn Host,
         held: &Held<'_>,
         transport: &mut impl Transport,
-    ) -> Result<bool, TransportError> {
+    ) -> Result<Round, TransportError> {
         let start = Instant::now();
         let mut word = if self.observer.stop.is_requested() { vec![STOP] } else { Vec::new() };
         if held.rank == Rank(0) && word.is_empty() {
             word = match host.next(held.world.step_count(), self.patience) {
                 Next::Ask(question) => [&[0, ASK][..], &question].concat(),
                 Next::Wait => vec![0, WAIT],
+                Next::Do(words) => [&[0, DO][..], &words].concat(),
                 Next::GoOn => vec![0],
             };
         }
-        let words = transport.all_gather(&word)?;
+        let mut words = transport.all_gather(&word)?;
         self.stood += start.elapsed();
         if words.iter().any(|word| word.first() == Some(&STOP)) {
-            return Ok(false);
+            return Ok(Round::Over);
         }
-        match words[0].get(1) {
+        let word = words.swap_remove(0);
+        Ok(match word.get(1) {
             Some(&ASK) => {
                 let start = Instant::now();
-                let answer = host.answer(&words[0][2..], held);
+                let answer = host.answer(&word[2..], held);
                 if let Some(answers) = transport.gather(Rank(0), &answer)? {
                     host.hear(answers);
                 }
                 self.spent += start.elapsed();
-                Ok(true)
+                Round::Answered
             }
-            Some(_) => Ok(true),
-            None => Ok(false),
-        }
+            Some(&DO) => Round::Told(word[2..].to_vec()),
+            Some(_) => Round::Waits,
+            None => Round::Over,
+        })
     }
+}
+
+/// What came of a word of rank 0.
+enum Round {
+    /// The meeting is over.
+    Over,
+    /// A question was answered.
+    Answered,
+    /// It had nothing to say.
+    Waits,
+    /// It has something done.
+    Told(Vec<u8>),
 }
 
 #[cfg(test)]

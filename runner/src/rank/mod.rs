@@ -2,6 +2,7 @@
 
 pub(crate) mod balance;
 mod begin;
+mod commands;
 mod end;
 mod facts;
 mod halo;
@@ -10,6 +11,7 @@ mod halo;
 pub(crate) mod handshake;
 mod log;
 mod meeting;
+mod names;
 mod observer;
 mod recorder;
 pub(crate) mod trace;
@@ -31,6 +33,7 @@ use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use balance::{Balancer, Retiler};
 use begin::Beginning;
 use bytemuck::Pod;
+use commands::Commander;
 use log::Log;
 use meeting::Meetings;
 use rayon::ThreadPoolBuilder;
@@ -139,12 +142,13 @@ fn run<T: Transport>(
     // Before the halo: where this rank fails, the others hear of it before the last of what it writes is written.
     let mut recorder;
     let mut halo = RankHalo::new(Counting::new(transport), plan.assignment.clone());
-    let Beginning { mut world, assignment, resumed } = begin::build(plan, rank, observer, halo.transport())?;
+    let Beginning { mut world, assignment, resumed, commands } = begin::build(plan, rank, observer, halo.transport())?;
     halo.assign(assignment);
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
     let logs = log::find(plan, resumed, halo.transport())?;
     recorder = end::start(plan, rank, resumed, halo.transport())?;
+    let mut commander = Commander::start(plan, rank, (resumed, commands), &world, halo.transport())?;
     let start_log = |logs| Log::start(plan, logs, resumed, (&world, &mut halo), (recorder.as_ref(), observer));
     let mut log = logs.map(start_log).transpose()?;
     *complete = world.step_count();
@@ -159,15 +163,18 @@ fn run<T: Transport>(
     let threads = plan.threads * plan.config.run.ranks;
     let mut tracer = Tracer::new(observer.trace.as_ref(), world.step_count(), threads);
     if let Some(recorder) = recorder.as_mut().filter(|_| resumed.is_none()) {
-        recorder.write_due(&world, false);
+        recorder.write_due(&world, commander.state(), false);
     }
     let mut balancer = Balancer::start(plan, &mut world);
     let mut retiler = Retiler::start(plan, resumed, &world, rank, recorder.as_ref());
+    commander.take_turn(&mut world, &mut halo, observer)?;
     observer.show(rank, &world);
-    let mut meetings = Meetings::new(observer, plan.config.run.peer_timeout);
-    meetings.linger(&world, &last, &mut halo)?;
+    let mut meetings = Meetings::new(observer, plan);
+    meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
     while world.step_count() < steps && !last.stopped {
-        let unwritten = log_failure.is_some() || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
+        let unwritten = log_failure.is_some()
+            || commander.failure().is_some()
+            || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
         if observer.stop.is_requested() || unwritten {
             world.request_stop();
         }
@@ -202,12 +209,16 @@ fn run<T: Transport>(
             }
         }
         if let Some(recorder) = &mut recorder {
-            recorder.write_due(&world, last.stopped);
+            recorder.write_due(&world, commander.state(), last.stopped);
+        }
+        commander.after_step(&world, &mut halo)?;
+        if !last.stopped {
+            commander.take_turn(&mut world, &mut halo, observer)?;
         }
         observer.show(rank, &world);
         told.made(*complete);
         if last.meeting {
-            meetings.hold(&world, &last, &mut halo)?;
+            meetings.hold(&mut world, &last, &mut halo, &mut commander)?;
         }
         if let Some(balancer) = &mut balancer {
             let is_last = last.stopped || *complete == steps;
@@ -219,9 +230,12 @@ fn run<T: Transport>(
     // Whoever asks while the last step is made gets all of them.
     let interrupted = last.stopped && *complete < steps;
     let mut output_time = match recorder {
-        Some(recorder) => end::finish(recorder, &world, interrupted, plan, observer, halo.transport())?,
+        Some(recorder) => {
+            end::finish(recorder, (&world, commander.state()), interrupted, plan, observer, halo.transport())?
+        }
         None => end::finish_log(log.as_ref(), log_failure, *complete, plan, halo.transport())?,
     };
+    commander.close(halo.transport(), observer)?;
     drop(told);
     let finished = Instant::now();
 
@@ -229,6 +243,9 @@ fn run<T: Transport>(
     output_time += meetings.spent;
     let mut waited = halo.waited();
     let mut facts = RankFacts::new(&world, &last, &plan.scene);
+    facts.expected = plan.scene.bodies().wrapping_add_signed(commander.added());
+    output_time += commander.time;
+    sent = sent.since(&commander.sent);
     if let Some(log) = &log {
         output_time += log.time();
         waited += log.waited();
@@ -253,7 +270,7 @@ fn run<T: Transport>(
     facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
     if !last.stopped {
-        meetings.linger(&world, &last, &mut halo)?;
+        meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
     }
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {

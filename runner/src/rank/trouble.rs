@@ -1,7 +1,7 @@
 //! Trouble of one rank, of which all hear together.
 
-use crate::config::OneLine;
 use crate::error::{Exit, RunError};
+use crate::wording::OneLine;
 use atoll_transport::{Collective, Transport, TransportError};
 
 /// Why ranks do not run together.

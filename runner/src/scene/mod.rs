@@ -3,8 +3,11 @@
 //! A scene is a function of its [`SceneSpec`]. Random numbers come from [`SplitMix64`]; each body takes
 //! a fixed number of draws, in the order of the ids, so any body can be made without making the ones before it, and
 //! nothing depends on tiles, ranks or threads. To add a scene, implement `Layout` in a file of its own and name it in
-//! [`SceneKind`] and [`Scene::new`].
+//! [`SceneKind`] and [`Scene::open`]. Or its bodies are read from files that a user wrote: `file/`.
 
+mod error;
+pub(crate) mod file;
+pub(crate) mod import;
 mod kind;
 mod lattice;
 mod pile;
@@ -18,12 +21,16 @@ mod sparse;
 mod stack;
 mod statics;
 
-pub use kind::{SceneKind, SceneSpec};
+pub use error::{Place, SceneError};
+pub use file::SceneFile;
+pub use kind::{FileSpec, SceneKind, SceneSpec};
 pub use random::SplitMix64;
 
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
+use file::BodyIter;
 use glam::DVec2;
 use std::iter;
+use std::sync::Arc;
 
 /// What makes one scene different from another.
 trait Layout: Send + Sync + std::fmt::Debug {
@@ -58,16 +65,26 @@ const SAMPLES: u64 = 1 << 19;
 /// The start of a run.
 #[derive(Debug)]
 pub struct Scene {
-    layout: Box<dyn Layout>,
-    statics: Vec<StaticBody>,
-    seed: u64,
+    source: Source,
+}
+
+/// Where bodies come from.
+#[derive(Debug)]
+enum Source {
+    /// They are made.
+    Made { layout: Box<dyn Layout>, statics: Vec<StaticBody>, seed: u64 },
+    /// They are read.
+    Read(Arc<SceneFile>),
 }
 
 impl Scene {
     /// The scene that is asked for.
-    pub fn new(spec: &SceneSpec) -> Self {
-        let SceneSpec { kind, bodies, seed } = *spec;
-        let layout: Box<dyn Layout> = match kind {
+    ///
+    /// # Errors
+    /// If it is in files that cannot be read.
+    pub fn open(spec: &SceneSpec) -> Result<Self, SceneError> {
+        let SceneSpec { ref kind, bodies, seed } = *spec;
+        let layout: Box<dyn Layout> = match *kind {
             SceneKind::Rooms { power } => Box::new(rooms::Rooms::new(bodies, power)),
             SceneKind::Pile { jitter } => Box::new(pile::Pile::new(bodies, jitter)),
             SceneKind::Pyramids { base } => Box::new(pyramids::Pyramids::new(bodies, base)),
@@ -76,60 +93,86 @@ impl Scene {
             SceneKind::Stack => Box::new(stack::Stack::new(bodies)),
             SceneKind::Smash => Box::new(smash::Smash::new(bodies)),
             SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(bodies, angle, friction)),
+            SceneKind::File(ref spec) => return Ok(Self { source: Source::Read(spec.file()?) }),
         };
-        Self { statics: layout.statics(), layout, seed }
+        Ok(Self { source: Source::Made { statics: layout.statics(), layout, seed } })
+    }
+
+    /// The files that it is read from, if it is.
+    pub fn file(&self) -> Option<&SceneFile> {
+        match &self.source {
+            Source::Made { .. } => None,
+            Source::Read(file) => Some(file),
+        }
     }
 
     /// How many dynamic bodies there are.
     pub fn bodies(&self) -> u64 {
-        self.layout.bodies()
+        match &self.source {
+            Source::Made { layout, .. } => layout.bodies(),
+            Source::Read(file) => file.count(),
+        }
     }
 
     /// The table of shapes and materials that bodies refer to.
     pub fn kinds(&self) -> Vec<Kind> {
-        self.layout.kinds()
+        match &self.source {
+            Source::Made { layout, .. } => layout.kinds(),
+            Source::Read(file) => file.kinds().to_vec(),
+        }
     }
 
-    /// What never moves. These have the lowest ids.
+    /// What never moves. Of scenes that are made, these have the lowest ids.
     pub fn statics(&self) -> &[StaticBody] {
-        &self.statics
+        match &self.source {
+            Source::Made { statics, .. } => statics,
+            Source::Read(file) => file.statics(),
+        }
     }
 
     /// Low and high corner of the domain, in meters.
     pub fn domain(&self) -> (DVec2, DVec2) {
-        self.layout.domain()
+        match &self.source {
+            Source::Made { layout, .. } => layout.domain(),
+            Source::Read(file) => file.domain(),
+        }
     }
 
-    /// The id of the body with index 0; the others follow.
-    pub fn first_id(&self) -> GlobalId {
-        GlobalId(self.statics.len() as u64)
+    /// All bodies as they start: in the order of their ids where they are made, in that of the file where they are read.
+    pub fn iter(&self) -> impl Iterator<Item = Result<Body, SceneError>> + '_ {
+        match &self.source {
+            Source::Made { layout, statics, seed } => {
+                let make = made(layout.as_ref(), statics.len(), *seed);
+                Box::new((0..layout.bodies()).map(move |index| Ok(make(index)))) as BodyIter<'_>
+            }
+            Source::Read(file) => file.iter(),
+        }
     }
 
-    /// The body with this index, below [`bodies`](Self::bodies), as it starts.
-    pub fn body(&self, index: u64) -> Body {
-        self.layout.body(index, GlobalId(self.first_id().0 + index), self.seed)
-    }
-
-    /// All bodies as they start, in the order of their ids.
-    pub fn iter(&self) -> impl Iterator<Item = Body> + '_ {
-        (0..self.bodies()).map(|index| self.body(index))
-    }
-
-    /// The bodies that start in any rectangle for which `meets` says yes, and perhaps some more, in ascending order; `meets` is asked
-    /// of rectangles that hold many. Takes time for the bodies found, and for the boundaries of where they are.
-    pub fn near(&self, meets: impl Fn(DVec2, DVec2) -> bool) -> impl Iterator<Item = Body> {
-        let mut parts = vec![(0, self.bodies())];
+    /// The bodies that start in any rectangle for which `meets` says yes, and perhaps some more, in the order of
+    /// [`iter`](Self::iter); `meets` is asked of rectangles that hold many. Takes time for the bodies found, and for the boundaries
+    /// of where they are; in files, for each group of rows, and for all that are not in groups which say where they are.
+    pub fn near<'a>(
+        &'a self,
+        meets: impl Fn(DVec2, DVec2) -> bool + 'a,
+    ) -> impl Iterator<Item = Result<Body, SceneError>> + 'a {
+        let (layout, statics, seed) = match &self.source {
+            Source::Made { layout, statics, seed } => (layout.as_ref(), statics.len(), *seed),
+            Source::Read(file) => return file.near(meets),
+        };
+        let make = made(layout, statics, seed);
+        let mut parts = vec![(0, layout.bodies())];
         let mut few = 0..0;
-        iter::from_fn(move || {
+        let near = iter::from_fn(move || {
             loop {
                 if let Some(index) = few.next() {
-                    return Some(self.body(index));
+                    return Some(Ok(make(index)));
                 }
                 let (first, end) = parts.pop()?;
                 if first == end {
                     continue;
                 }
-                let (low, high) = self.layout.extent(first, end - 1);
+                let (low, high) = layout.extent(first, end - 1);
                 if !meets(low - ROUNDING, high + ROUNDING) {
                     continue;
                 }
@@ -140,36 +183,80 @@ impl Scene {
                     parts.extend([(middle, end), (first, middle)]);
                 }
             }
-        })
+        });
+        Box::new(near) as BodyIter<'a>
     }
 
-    /// All bodies, each with a one; of many bodies a sample, each with the number of those that it stands for.
-    pub fn sample(&self) -> impl Iterator<Item = (u64, Body)> {
-        let (bodies, samples) = (self.bodies(), self.bodies().min(SAMPLES));
+    /// Where all bodies are, each with a one; of many that are made a sample, each with the number of those that it stands for.
+    /// Files are read through, as the order of their rows is to make no difference.
+    pub fn sample(&self) -> impl Iterator<Item = Result<(u64, DVec2), SceneError>> {
+        let (layout, statics, seed) = match &self.source {
+            Source::Made { layout, statics, seed } => (layout.as_ref(), statics.len(), *seed),
+            Source::Read(file) => {
+                let places = file.places().map(|place| Ok((1_u64, place?)));
+                return Box::new(places) as Box<dyn Iterator<Item = _>>;
+            }
+        };
+        let make = made(layout, statics, seed);
+        let (bodies, samples) = (layout.bodies(), layout.bodies().min(SAMPLES));
         let begin = move |sample: u64| (u128::from(bodies) * u128::from(sample) / u128::from(samples)) as u64;
-        (0..samples).map(move |sample| {
+        Box::new((0..samples).map(move |sample| {
             let (first, end) = (begin(sample), begin(sample + 1));
             // Anywhere among them, so that none of them keeps time with the rows of a lattice.
             let index = first + SplitMix64::after(0, sample).bits() % (end - first);
-            (end - first, self.body(index))
-        })
+            Ok((end - first, make(index).position))
+        }))
     }
 
-    /// Low and high corner of the rectangle that the center of the body with this index must not leave: its room, or
-    /// the whole domain.
-    pub fn home(&self, index: u64) -> (DVec2, DVec2) {
-        self.layout.home(index)
-    }
-
-    /// Whether a body is outside its [`home`](Self::home), or not one of this scene at all.
-    pub fn has_escaped(&self, body: &Body) -> bool {
-        let index = body.id.0.wrapping_sub(self.first_id().0);
-        if index >= self.bodies() {
-            return true;
+    /// Low and high corner of the rectangle that the center of a body of this scene must not leave: its room, or the whole
+    /// domain. None if it is not one of this scene; of files, that is not asked.
+    pub fn home(&self, id: GlobalId) -> Option<(DVec2, DVec2)> {
+        match &self.source {
+            Source::Made { layout, .. } => self.index(id).map(|index| layout.home(index)),
+            Source::Read(file) => Some(file.domain()),
         }
-        let (low, high) = self.home(index);
+    }
+
+    /// Whether a body is outside its [`home`](Self::home).
+    pub fn has_escaped(&self, body: &Body) -> bool {
+        // What was added while it ran has no room of its own.
+        let (low, high) = self.home(body.id).unwrap_or(self.domain());
         !(body.position.cmpge(low).all() && body.position.cmple(high).all())
     }
+
+    /// The body of that name, as it starts. Files are looked through.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub fn find(&self, id: GlobalId) -> Result<Option<Body>, SceneError> {
+        match &self.source {
+            Source::Made { layout, statics, seed } => {
+                Ok(self.index(id).map(made(layout.as_ref(), statics.len(), *seed)))
+            }
+            Source::Read(file) => file.iter().find(|body| body.as_ref().map_or(true, |body| body.id == id)).transpose(),
+        }
+    }
+
+    /// That several bodies have this name, if files can be blamed for it.
+    pub(crate) fn doubled(&self, id: GlobalId) -> Option<SceneError> {
+        self.file().map(|file| file.doubled(id))
+    }
+
+    /// That only so many bodies were found, if files can be blamed for it.
+    pub(crate) fn lost(&self, found: u64) -> Option<SceneError> {
+        self.file().filter(|file| file.count() != found).map(|file| file.lost(found))
+    }
+
+    /// The index of a body that is made.
+    fn index(&self, id: GlobalId) -> Option<u64> {
+        let Source::Made { layout, statics, .. } = &self.source else { return None };
+        id.0.checked_sub(statics.len() as u64).filter(|index| *index < layout.bodies())
+    }
+}
+
+/// What makes the body of an index. Ids follow those of the statics.
+fn made(layout: &dyn Layout, statics: usize, seed: u64) -> impl Fn(u64) -> Body + '_ {
+    move |index| layout.body(index, GlobalId(statics as u64 + index), seed)
 }
 
 /// The table of the reported mixture: a box and a circle.

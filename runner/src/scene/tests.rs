@@ -16,17 +16,35 @@ const KINDS: [(SceneKind, u64); 9] = [
     (SceneKind::Slope { angle: 35.0, friction: 0.5 }, 2),
 ];
 
-fn scene(kind: SceneKind) -> Scene {
-    Scene::new(&SceneSpec { kind, bodies: 500, seed: 3 })
+fn scene(kind: &SceneKind) -> Scene {
+    with_bodies(kind, 500)
+}
+
+fn with_bodies(kind: &SceneKind, bodies: u64) -> Scene {
+    Scene::open(&SceneSpec { kind: kind.clone(), bodies, seed: 3 }).unwrap()
+}
+
+impl Scene {
+    fn first_id(&self) -> GlobalId {
+        GlobalId(self.statics().len() as u64)
+    }
+
+    fn body(&self, index: u64) -> Body {
+        self.find(GlobalId(self.first_id().0 + index)).unwrap().unwrap()
+    }
+
+    fn all(&self) -> impl Iterator<Item = Body> + '_ {
+        self.iter().map(Result::unwrap)
+    }
 }
 
 #[test]
 fn ids_follow_the_statics_and_any_body_can_be_made_alone() {
-    for (kind, statics) in KINDS {
-        let scene = scene(kind);
+    for (kind, statics) in &KINDS {
+        let (statics, scene) = (*statics, scene(kind));
         assert_eq!((scene.first_id(), scene.bodies()), (GlobalId(statics), 500), "{kind:?}");
         assert!((0..).zip(scene.statics()).all(|(id, fixed)| fixed.id == GlobalId(id)), "{kind:?}");
-        for (index, body) in (0..).zip(scene.iter()) {
+        for (index, body) in (0..).zip(scene.all()) {
             assert_eq!(body.id, GlobalId(statics + index));
             assert_eq!(body, scene.body(index));
             assert!((body.kind.0 as usize) < scene.kinds().len(), "{kind:?}: {body:?}");
@@ -63,14 +81,14 @@ impl Placed {
 
 #[test]
 fn nothing_starts_inside_anything_else() {
-    for (kind, _) in KINDS {
+    for (kind, _) in &KINDS {
         let scene = scene(kind);
         let kinds = scene.kinds();
         let fixed = scene.statics().iter().map(|one| Placed::new(one.position, one.rotation, one.kind.shape));
         let fixed: Vec<Placed> = fixed.collect();
         let shape = |body: &Body| kinds[body.kind.0 as usize].shape;
         let bodies: Vec<Placed> =
-            scene.iter().map(|body| Placed::new(body.position, body.rotation, shape(&body))).collect();
+            scene.all().map(|body| Placed::new(body.position, body.rotation, shape(&body))).collect();
         for (i, body) in bodies.iter().enumerate() {
             let deepest = fixed.iter().chain(&bodies[..i]).map(|other| body.overlap(other)).fold(f64::MIN, f64::max);
             assert!(deepest < 1e-4, "{kind:?}: body {i} starts {deepest} m inside another");
@@ -81,15 +99,15 @@ fn nothing_starts_inside_anything_else() {
 #[test]
 fn the_seed_matters_and_the_same_seed_repeats() {
     for kind in [SceneKind::Rooms { power: 1.0 }, SceneKind::Sparse, SceneKind::SingleIsland] {
-        let make = |seed| Scene::new(&SceneSpec { kind, bodies: 100, seed });
-        assert!(make(1).iter().eq(make(1).iter()));
-        assert!(!make(1).iter().eq(make(2).iter()), "{kind:?}");
+        let make = |seed| Scene::open(&SceneSpec { kind: kind.clone(), bodies: 100, seed }).unwrap();
+        assert!(make(1).all().eq(make(1).all()));
+        assert!(!make(1).all().eq(make(2).all()), "{kind:?}");
     }
 }
 
 #[test]
 fn a_body_in_another_room_has_escaped() {
-    let scene = scene(SceneKind::Rooms { power: 1.0 });
+    let scene = scene(&SceneKind::Rooms { power: 1.0 });
     let mut body = scene.body(0);
     body.position = scene.body(499).position;
     assert!(scene.has_escaped(&body));
@@ -99,10 +117,11 @@ fn a_body_in_another_room_has_escaped() {
 
 #[test]
 fn bodies_start_within_the_extent_of_any_that_they_are_among() {
-    for (kind, _) in KINDS {
+    for (kind, _) in &KINDS {
         let scene = scene(kind);
         for (first, last) in [(0, 0), (0, 499), (1, 1), (499, 499), (17, 18), (22, 23), (100, 140), (3, 480), (0, 7)] {
-            let (low, high) = scene.layout.extent(first, last);
+            let Source::Made { layout, .. } = &scene.source else { unreachable!("all of these are made") };
+            let (low, high) = layout.extent(first, last);
             for index in first..=last {
                 let place = scene.body(index).position;
                 let within = place.cmpge(low - ROUNDING).all() && place.cmple(high + ROUNDING).all();
@@ -114,29 +133,30 @@ fn bodies_start_within_the_extent_of_any_that_they_are_among() {
 
 #[test]
 fn who_is_near_is_found_without_looking_at_all() {
-    for (kind, _) in KINDS {
-        let scene = Scene::new(&SceneSpec { kind, bodies: 50_000, seed: 3 });
+    for (kind, _) in &KINDS {
+        let scene = with_bodies(kind, 50_000);
         let center = scene.body(31_000).position;
         let (low, high) = (center - 3.0, center + 3.0);
         let is_near = |body: &Body| body.position.cmpge(low).all() && body.position.cmple(high).all();
         let mut looked = 0;
         let near = scene.near(|a, b| a.cmple(high).all() && b.cmpge(low).all()).inspect(|_| looked += 1);
-        let found: Vec<Body> = near.filter(is_near).collect();
-        assert!(scene.iter().filter(is_near).eq(found.iter().copied()), "{kind:?}");
+        let found: Vec<Body> = near.map(Result::unwrap).filter(is_near).collect();
+        assert!(scene.all().filter(is_near).eq(found.iter().copied()), "{kind:?}");
         assert!(!found.is_empty() && looked < 50_000 / 8, "{kind:?}: {looked} looked at");
     }
 }
 
 #[test]
 fn a_sample_stands_for_all() {
-    let spec = |bodies| SceneSpec { kind: SceneKind::Rooms { power: 1.2 }, bodies, seed: 3 };
-    let few = Scene::new(&spec(1000));
-    assert!(few.sample().eq(few.iter().map(|body| (1, body))));
-    let many = Scene::new(&spec(SAMPLES * 3 + 7));
+    let scene = |bodies| with_bodies(&SceneKind::Rooms { power: 1.2 }, bodies);
+    let few = scene(1000);
+    assert!(few.sample().map(Result::unwrap).eq(few.all().map(|body| (1, body.position))));
+    let many = scene(SAMPLES * 3 + 7);
     let (low, high) = many.domain();
-    let lower = |(_, body): &(u64, Body)| body.position.cmplt(0.5 * (low + high)).all();
-    let told = many.sample().filter(lower).map(|(weight, _)| weight).sum::<u64>() as f64;
-    let true_count = many.iter().filter(|body| lower(&(1, *body))).count() as f64;
+    let is_lower = |place: DVec2| place.cmplt(0.5 * (low + high)).all();
+    let samples = || many.sample().map(Result::unwrap);
+    let told = samples().filter(|(_, place)| is_lower(*place)).map(|(weight, _)| weight).sum::<u64>() as f64;
+    let true_count = many.all().filter(|body| is_lower(body.position)).count() as f64;
     assert!((told / true_count - 1.0).abs() < 0.01, "{told} for {true_count}");
-    assert_eq!(many.sample().map(|(weight, _)| weight).sum::<u64>(), many.bodies());
+    assert_eq!(samples().map(|(weight, _)| weight).sum::<u64>(), many.bodies());
 }

@@ -33,6 +33,9 @@ pub struct Summary {
     pub scene: &'static str,
     /// Its seed.
     pub seed: u64,
+    /// Whether that has a say in it: not where bodies are read from files.
+    #[serde(skip)]
+    pub(crate) is_seeded: bool,
     /// Fingerprint of everything in the configuration that the result depends on.
     pub config_hash: String,
     /// Dynamic bodies at the start.
@@ -146,8 +149,9 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             scene: plan.config.scene.kind.name(),
             seed: plan.config.scene.seed,
+            is_seeded: plan.scene.file().is_none(),
             config_hash: plan.config.hash(plan.tiles),
-            bodies: plan.scene.bodies(),
+            bodies: all.expected,
             steps: all.steps,
             resumed_at: all.resumed_at,
             interrupted: all.interrupted > 0,
@@ -163,7 +167,7 @@ impl Summary {
             ms_per_step: wall_s * 1e3 / made.max(1) as f64,
             state_hash: format!("{:032x}", hashes.state),
             contact_hash: format!("{:032x}", hashes.contact),
-            bodies_lost: plan.scene.bodies() as i64 - facts.bodies as i64,
+            bodies_lost: all.expected as i64 - facts.bodies as i64,
             escaped: all.escaped,
             contacts: facts.contacts,
             border_contact_fraction: fraction(facts.border_contacts, facts.contacts),

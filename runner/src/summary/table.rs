@@ -10,7 +10,8 @@ impl fmt::Display for Summary {
         let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
         let tiling = tiles::in_words(self.tiles, self.max_bodies);
-        writeln!(f, "{}: {} bodies, seed {}, {tiling}", self.scene, self.bodies, self.seed)?;
+        let seed = if self.is_seeded { format!(", seed {}", self.seed) } else { String::new() };
+        writeln!(f, "{}: {} bodies{seed}, {tiling}", self.scene, self.bodies)?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
         let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };

@@ -5,6 +5,7 @@ mod project;
 mod recordings;
 mod render;
 mod run;
+mod scene;
 mod values;
 mod view;
 
@@ -12,9 +13,10 @@ pub(crate) use project::ProjectArgs;
 pub(crate) use recordings::{DiffArgs, ExportArgs, InfoArgs, ReportArgs};
 pub(crate) use render::RenderArgs;
 pub(crate) use run::RunArgs;
+pub(crate) use scene::{BodiesAs, SceneArgs, SceneCheckArgs, SceneCommand, SceneExportArgs, SceneImportArgs};
 pub(crate) use view::ViewArgs;
 
-use crate::config::OneLine;
+use crate::wording::OneLine;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsStr;
@@ -47,6 +49,8 @@ pub enum Command {
     Project(Box<ProjectArgs>),
     /// Write what a run has recorded as files for other programs.
     Export(ExportArgs),
+    /// Write and check worlds of one's own in files.
+    Scene(SceneArgs),
 }
 
 /// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.

@@ -57,6 +57,16 @@ pub struct RunArgs {
     /// Go on from the newest snapshot up to so many times where a rank is lost.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "folder")]
     pub restarts: u32,
+    /// Do what this file says while it runs, a line of JSON for each command; with - what comes in on standard input, so that
+    /// another program drives the run. docs/worlds.md tells what there is to say. With --resume, from where it goes on.
+    #[arg(long, value_name = "FILE")]
+    pub commands: Option<PathBuf>,
+    /// Write answers and events to this file, a line of JSON for each; with - to standard output, and no closing report.
+    #[arg(long, value_name = "FILE")]
+    pub answers: Option<PathBuf>,
+    /// Leave out commands that cannot be done, and go on.
+    #[arg(long)]
+    pub skip_refused: bool,
     /// Let a page in the browser look while it goes on; its address is told.
     #[arg(long)]
     pub view: bool,

@@ -19,6 +19,12 @@ pub struct ViewArgs {
     /// Columns and rows of tiles, such as 17x17; auto, or adaptive; of a configuration.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
+    /// Write configuration, summary, log and what hands do to this folder, which must be new or empty; of a configuration.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Do what this file says while it runs, a line of JSON for each command; of a configuration.
+    #[arg(long, value_name = "FILE")]
+    pub commands: Option<PathBuf>,
     /// Serve the page at this port [default: any that is free].
     #[arg(long, value_name = "P")]
     pub port: Option<u16>,
@@ -33,11 +39,13 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// The same as options of a run that stays to be looked at.
     pub(crate) fn into_run(self) -> RunArgs {
-        let Self { mut sources, values, tiles, port, bind, open } = self;
+        let Self { mut sources, values, tiles, out, commands, port, bind, open } = self;
         RunArgs {
             config: sources.pop(),
             values,
             tiles,
+            out,
+            commands,
             view: true,
             port,
             bind,

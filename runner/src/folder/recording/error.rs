@@ -1,6 +1,6 @@
 //! What can go wrong with a recording.
 
-use crate::config::OneLine;
+use crate::wording::OneLine;
 use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use thiserror::Error;

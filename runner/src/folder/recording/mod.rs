@@ -26,7 +26,6 @@
 mod error;
 mod facts;
 mod layout;
-mod quiet;
 mod reader;
 mod record;
 mod remove;

@@ -62,14 +62,27 @@ impl OfRun {
             return Some(format!("format is {ours} in the one and {theirs} in the other"));
         }
         let facts = self.facts.other_run(&segment.facts);
-        let stage = || (self.stage != segment.stage).then(|| "their kinds or statics are not the same".to_owned());
-        facts.or_else(stage)
+        let is_same = match (&self.stage, &segment.stage) {
+            (Some(ours), Some(theirs)) => ours.includes(theirs) || theirs.includes(ours),
+            _ => true,
+        };
+        facts.or_else(|| (!is_same).then(|| "their kinds or statics are not the same".to_owned()))
+    }
+
+    /// Knows all kinds from here on that a segment tells of.
+    fn learn(&mut self, segment: &Segment) {
+        if let (Some(ours), Some(theirs)) = (&self.stage, &segment.stage)
+            && ours != theirs
+            && theirs.includes(ours)
+        {
+            self.stage = Some(theirs.clone());
+        }
     }
 }
 
 impl Recording {
-    /// Reads what all segments say about themselves, and no rows. Kinds and statics are the same in all; of these only one
-    /// is read.
+    /// Reads what all segments say about themselves, and no rows. Kinds and statics are the same in all, but that there
+    /// may be more kinds in later ones; of these only one is read.
     ///
     /// # Errors
     /// If there are no records, a file cannot be read, files do not go together, or one is missing. What is missing after
@@ -124,6 +137,7 @@ impl Recording {
             if let Some(what) = first.other_run(&segment) {
                 return Err(RecordingError::OtherRun { paths: [first.path.clone(), path], what });
             }
+            first.learn(&segment);
             let (ranks, file) = (segment.ranks, files.len());
             parts.extend(segment.records.iter().map(|record| {
                 let (step, rows) = (record.step, record.rows);

@@ -64,6 +64,16 @@ impl StageText {
         Self { kinds: to_json(&kinds), statics: to_json(&StaticsText::new(statics)) }
     }
 
+    /// Whether it tells all that another does, and perhaps of more kinds, which came while a run went on.
+    pub(super) fn includes(&self, other: &Self) -> bool {
+        // Kinds are a list in brackets.
+        let begins_alike = || {
+            let told = other.kinds.strip_suffix(']').and_then(|told| self.kinds.strip_prefix(told));
+            told.is_some_and(|rest| rest.starts_with(',') || other.kinds == "[]")
+        };
+        self.statics == other.statics && (self.kinds == other.kinds || begins_alike())
+    }
+
     /// From what a file says, and none from one of format 1, by name. The error is what is wrong with it.
     pub(super) fn from_texts<'a>(text: impl Fn(&str) -> Option<&'a str>) -> Result<Self, String> {
         Ok(Self { kinds: super::facts::parse(&text, "kinds")?, statics: super::facts::parse(&text, "statics")? })
@@ -216,7 +226,8 @@ mod tests {
     #[test]
     fn every_scene_comes_back_bit_for_bit() {
         for kind in SceneKind::USUAL {
-            let scene = Scene::new(&SceneSpec { bodies: 500.max(kind.least_bodies()), ..SceneSpec::usual(kind) });
+            let bodies = 500.max(kind.least_bodies());
+            let scene = Scene::open(&SceneSpec { bodies, ..SceneSpec::usual(kind) }).unwrap();
             assert_comes_back(&scene.kinds(), scene.statics());
         }
         assert_comes_back(&[], &[]);
@@ -256,6 +267,17 @@ mod tests {
         // Tens of thousands of statics are no burden to every file.
         let many: Vec<_> = (0..30_000).map(|id| wall(id, id as f64 * 0.25)).collect();
         assert!(StageText::new(&[], &many).statics.len() < 20 * many.len());
+    }
+
+    #[test]
+    fn kinds_may_become_more() {
+        let text = |radii: &[f32]| {
+            let kinds: Vec<Kind> = radii.iter().map(|&radius| kind(Shape::circle(radius))).collect();
+            StageText::new(&kinds, &[])
+        };
+        let (none, one, two, other) = (text(&[]), text(&[1.0]), text(&[1.0, 2.0]), text(&[3.0]));
+        assert!(two.includes(&one) && two.includes(&none) && one.includes(&none) && one.includes(&one));
+        assert!(!one.includes(&two) && !two.includes(&other) && !other.includes(&one) && !none.includes(&one));
     }
 
     #[test]

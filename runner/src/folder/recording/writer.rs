@@ -28,6 +28,8 @@ const CHUNK: usize = 8192;
 #[derive(Debug)]
 pub struct RecordingWriter {
     folder: PathBuf,
+    /// What all of its files say about themselves, but for kinds and statics.
+    texts: Vec<(String, String)>,
     schema: TypePtr,
     properties: WriterPropertiesPtr,
     open: Option<OpenSegment>,
@@ -35,6 +37,12 @@ pub struct RecordingWriter {
     complete: Vec<(u32, u32)>,
     /// Whether there are complete segments whose names are perhaps not on the disk yet.
     named: bool,
+}
+
+fn properties(texts: &[(String, String)], stage: &StageText) -> WriterPropertiesPtr {
+    let stage = [("atoll.kinds", &stage.kinds), ("atoll.statics", &stage.statics)];
+    let all = texts.iter().map(|(key, text)| (key.as_str(), text)).chain(stage);
+    layout::properties(all.map(|(key, text)| KeyValue::new(key.to_owned(), text.clone())).collect())
 }
 
 impl RecordingWriter {
@@ -51,13 +59,20 @@ impl RecordingWriter {
     ) -> Result<Self, RecordingError> {
         fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
         let mut texts = facts.to_pairs();
-        texts.push(("atoll.kinds".to_owned(), stage.kinds.clone()));
-        texts.push(("atoll.statics".to_owned(), stage.statics.clone()));
         texts.push(("atoll.rank".to_owned(), rank.to_string()));
         texts.push(("atoll.ranks".to_owned(), ranks.to_string()));
-        let texts = texts.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect();
-        let (schema, properties) = (layout::schema(Format::WithStage), layout::properties(texts));
-        Ok(Self { folder, schema, properties, open: None, complete: Vec::new(), named: false })
+        let (schema, properties) = (layout::schema(Format::WithStage), properties(&texts, stage));
+        Ok(Self { folder, texts, schema, properties, open: None, complete: Vec::new(), named: false })
+    }
+
+    /// From the next record on there are more kinds: completes the segment under way.
+    ///
+    /// # Errors
+    /// As [`close_segment`](Self::close_segment).
+    pub fn set_stage(&mut self, stage: &StageText) -> Result<(), RecordingError> {
+        self.close_segment()?;
+        self.properties = properties(&self.texts, stage);
+        Ok(())
     }
 
     /// Adds a record, and closes the segment if that is its last.

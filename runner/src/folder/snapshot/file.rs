@@ -12,6 +12,7 @@
 //! Everything is little-endian. Each block has a checksum of its own, so every byte is covered.
 
 use super::SnapshotError;
+use crate::command::State;
 use crate::folder::durable::{sync_folder_of, write_durably};
 use atoll_core::{Hashes, SNAPSHOT_FORMAT, SavedTile, TileId};
 use bytemuck::{Pod, Zeroable};
@@ -43,6 +44,9 @@ pub struct Facts {
     /// Of tiles that follow the bodies: how often each was cut from its square, a letter for each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levels: Option<String>,
+    /// What commands add up to beside the tiles, if there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) commands: Option<State>,
     /// Of its run, as [`Config::identity`](crate::Config::identity).
     pub identity: String,
 }
@@ -85,11 +89,24 @@ impl SnapshotWriter {
     /// Writes what a rank of so many has to save; `tiles` and `identity` are those of the whole run.
     pub(crate) fn new(rank: u32, ranks: u32, tiles: [u32; 2], identity: String) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { facts: Facts { version, format: SNAPSHOT_FORMAT, step: 0, rank, ranks, tiles, levels: None, identity } }
+        Self {
+            facts: Facts {
+                version,
+                format: SNAPSHOT_FORMAT,
+                step: 0,
+                rank,
+                ranks,
+                tiles,
+                levels: None,
+                commands: None,
+                identity,
+            },
+        }
     }
 
     /// Writes the tiles that were saved after `step` to `blocks`, one after the other, to a file that is whole and durable
-    /// when it has its name. Returns that name. `levels` are those of all tiles, if these follow the bodies.
+    /// when it has its name. Returns that name. `levels` are those of all tiles, if these follow the bodies, `commands` is what these
+    /// add up to, if there were any.
     ///
     /// # Errors
     /// What the system says, with the file.
@@ -97,12 +114,12 @@ impl SnapshotWriter {
         &mut self,
         snapshots: &Path,
         step: u64,
-        levels: Option<&str>,
+        (levels, commands): (Option<&str>, Option<&State>),
         tiles: &[SavedTile],
         blocks: &[u8],
     ) -> Result<PathBuf, (PathBuf, io::Error)> {
         self.facts.step = step;
-        self.facts.levels = levels.map(str::to_owned);
+        (self.facts.levels, self.facts.commands) = (levels.map(str::to_owned), commands.cloned());
         let folder = snapshots.join(super::store::folder_name(step));
         let path = folder.join(super::store::file_name(self.facts.rank, self.facts.ranks));
         let head = head(&self.facts, tiles);

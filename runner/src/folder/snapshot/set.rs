@@ -1,9 +1,10 @@
 //! A whole snapshot: the files of all ranks that wrote it.
 
 use super::{SnapshotError, SnapshotFile, store};
+use crate::command::State;
 use crate::config::other_run;
 use crate::folder::tilings::of_letters;
-use atoll_core::{Hashes, Partition, TileId, World};
+use atoll_core::{Hashes, Partition, SetupError, TileId, World};
 use std::path::{Path, PathBuf};
 
 /// A snapshot of which all files are there, with every tile in one of them.
@@ -37,6 +38,7 @@ impl Snapshot {
             let facts = &file.facts;
             let alike = (facts.rank, facts.ranks) == (number, ranks)
                 && (facts.step, facts.tiles, &facts.levels) == (first.step, first.tiles, &first.levels)
+                && facts.commands == first.commands
                 && facts.identity == first.identity;
             if !alike {
                 return Err(SnapshotError::damaged(path, "it belongs to another snapshot"));
@@ -89,6 +91,11 @@ impl Snapshot {
         of_letters(levels, [first.min(), first.max()], first.roots()).ok_or_else(damaged)
     }
 
+    /// What commands had added up to, if there were any.
+    pub(crate) fn commands(&self) -> Option<&State> {
+        self.files[0].facts.commands.as_ref()
+    }
+
     /// Columns and rows of tiles, or of the squares that they are cut from.
     pub fn tiles(&self) -> [u32; 2] {
         self.files[0].facts.tiles
@@ -117,6 +124,8 @@ impl Snapshot {
     /// # Errors
     /// If any of them is not what was written.
     pub fn restore(&self, world: &mut World) -> Result<(), SnapshotError> {
+        let refused = |error: SetupError| SnapshotError::damaged(&self.folder, error);
+        self.commands().map_or(Ok(()), |state| state.prepare(world)).map_err(refused)?;
         let mut bytes = Vec::new();
         for tile in world.tiles().collect::<Vec<TileId>>() {
             let (file, place) = self.places[tile.0 as usize];
@@ -125,6 +134,6 @@ impl Snapshot {
             world.restore(tile, &bytes).map_err(|error| SnapshotError::damaged(&file.path, error))?;
         }
         world.resume_at(self.step());
-        Ok(())
+        self.commands().map_or(Ok(()), |state| state.resume(world)).map_err(refused)
     }
 }

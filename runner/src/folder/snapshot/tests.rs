@@ -17,7 +17,7 @@ fn plan(overrides: &[(&str, &str)]) -> Plan {
 fn world(plan: &Plan, tiles: &[u32]) -> World {
     let tiles: Vec<TileId> = tiles.iter().map(|&tile| TileId(tile)).collect();
     let mut world = World::new(&plan.blueprint, &tiles).unwrap();
-    for body in plan.scene.iter() {
+    for body in plan.scene.iter().map(Result::unwrap) {
         world.add(body).unwrap();
     }
     world
@@ -33,7 +33,9 @@ fn write(plan: &Plan, snapshots: &Path, step: u64) -> Hashes {
     for (rank, tiles) in [(0, [0, 3]), (1, [1, 2])] {
         let (world, mut blocks) = (world(plan, &tiles), Vec::new());
         let saved = world.save(&mut blocks);
-        SnapshotWriter::new(rank, 2, plan.tiles, identity(plan)).write(snapshots, step, None, &saved, &blocks).unwrap();
+        SnapshotWriter::new(rank, 2, plan.tiles, identity(plan))
+            .write(snapshots, step, (None, None), &saved, &blocks)
+            .unwrap();
         hashes = hashes.merge(world.hashes());
     }
     hashes

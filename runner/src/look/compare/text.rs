@@ -1,7 +1,7 @@
 //! A comparison as people read it.
 
 use super::{Bodies, Comparison, Difference, Side, State, StepDeviation, unlike_ends};
-use crate::config::OneLine;
+use crate::wording::OneLine;
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 

@@ -2,6 +2,7 @@
 //! each has room for one frame, which a newer one replaces, and is given another once it has drawn the last.
 
 use super::protocol::{Gaze, Say, Wish};
+use crate::command::{Word, word};
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,6 +11,9 @@ use std::time::{Duration, Instant};
 
 /// Pages at a time.
 const MOST_PAGES: usize = 16;
+
+/// Commands that wait to be done; more than that are not taken.
+const MOST_COMMANDS: usize = 1024;
 
 /// Texts that wait for one page; who does not read them misses the older ones.
 const MOST_TEXTS: usize = 64;
@@ -82,6 +86,8 @@ struct Inner {
     picked: Option<Pick>,
     /// How often somebody has wanted something.
     wishes: u64,
+    /// What is to be done to the world, in lines.
+    commands: Vec<String>,
     /// What each new page is told first.
     greeting: Vec<Say>,
     closed: bool,
@@ -122,8 +128,9 @@ impl Desk {
     /// One at which time goes on or stands still at first, at this speed.
     pub(crate) fn new(playing: bool, times: f64) -> Self {
         let pace = Pace { playing, times, by: 0, seek: None };
-        let (pages, greeting) = (BTreeMap::new(), Vec::new());
-        let inner = Inner { pages, next: 0, pace, usual: pace, picked: None, wishes: 0, greeting, closed: false };
+        let (pages, commands, greeting) = Default::default();
+        let inner =
+            Inner { pages, next: 0, pace, usual: pace, picked: None, wishes: 0, commands, greeting, closed: false };
         Self { wanted: AtomicBool::new(false), inner: Mutex::new(inner), wish: Condvar::new(), ready: Condvar::new() }
     }
 
@@ -164,7 +171,7 @@ impl Desk {
     /// A page wants something.
     pub(crate) fn hear(&self, page: PageId, wish: Wish) {
         let mut inner = self.lock();
-        let Inner { pages, pace, picked, wishes, .. } = &mut *inner;
+        let Inner { pages, pace, picked, wishes, commands, .. } = &mut *inner;
         *wishes += 1;
         let Some(page) = pages.get_mut(&page) else { return };
         match wish {
@@ -183,6 +190,8 @@ impl Desk {
                 *picked = Some(Pick::At(source, at, NEAR * page.gaze.map_or(0.0, pixel)));
             }
             Wish::Drop => *picked = None,
+            Wish::Command { line } if commands.len() < MOST_COMMANDS => commands.push(line),
+            Wish::Command { .. } => {}
         }
         drop(inner);
         self.wish.notify_all();
@@ -272,6 +281,28 @@ impl Desk {
         }
         drop(inner);
         self.ready.notify_all();
+    }
+
+    /// Whether pages want something done to the world.
+    pub(crate) fn has_commands(&self) -> bool {
+        !self.lock().commands.is_empty()
+    }
+
+    /// What pages want done after so many steps, as lines with numbers, if there is anything.
+    pub(crate) fn take_commands(&self, steps: u64) -> Option<Vec<u8>> {
+        let mut inner = self.lock();
+        if inner.commands.is_empty() {
+            return None;
+        }
+        let commands = std::mem::take(&mut inner.commands);
+        // What there is to see is not what it was after as many steps.
+        inner.pages.values_mut().for_each(|page| page.seen = None);
+        drop(inner);
+        let line = |line: String| match word(0, &line, steps) {
+            Ok(Word::Line(_, text)) => format!("0\t{text}\n"),
+            _ => String::new(),
+        };
+        Some(commands.into_iter().map(line).collect::<String>().into_bytes())
     }
 
     /// How time is to go on; what was to be done once is taken.

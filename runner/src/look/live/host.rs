@@ -33,7 +33,8 @@ const TELL_SHARE: u32 = 100;
 /// See the head of this file. There is one in every process of a run; only that of rank 0 has pages.
 #[derive(Debug)]
 pub(crate) struct Viewer {
-    setting: Setting,
+    /// What there is to see, but for the bodies.
+    setting: Mutex<Arc<Setting>>,
     ranks: u32,
     last_step: u64,
     lingers: bool,
@@ -115,13 +116,14 @@ impl Viewer {
         };
         let ranks = plan.assignment.ranks();
         let papers = (0..ranks).map(|_| Mutex::default()).collect();
+        let setting = Mutex::new(Arc::new(setting));
         Self { setting, ranks: ranks as u32, last_step, lingers, desk, papers, state: Mutex::new(state) }
     }
 
     /// Gives a page its frame. Returns what that cost, on the slowest rank: ranks that wait for each other in a meeting need not do
     /// so after it.
     fn give(&self, desk: &Desk, state: &mut State, due: &Due, answers: &[Vec<u8>]) -> Duration {
-        let begun = Instant::now();
+        let (begun, setting) = (Instant::now(), self.setting());
         let parts: Vec<_> = answers.iter().filter_map(|answer| portion(answer)).collect();
         let (pixels, image) = compose(parts.iter().map(|part| (part.pixels, part.density)));
         let dots: Vec<&[u8]> = parts.iter().map(|part| part.dots).collect();
@@ -130,11 +132,11 @@ impl Viewer {
             source: 0,
             number: due.number,
             step: due.version,
-            time: due.version as f64 / self.setting.hertz,
-            rectangle: rectangle(&self.setting, &due.gaze),
+            time: due.version as f64 / setting.hertz,
+            rectangle: rectangle(&setting, &due.gaze),
             density: due.gaze.part(pixels),
             picked: found,
-            legend: &scenery::legend(due.gaze.color, &self.setting, self.ranks, state.range(due.gaze.color)),
+            legend: &scenery::legend(due.gaze.color, &setting, self.ranks, state.range(due.gaze.color)),
             pixels: &image,
             dots: &dots,
         };
@@ -153,9 +155,24 @@ impl Viewer {
         }
     }
 
+    fn setting(&self) -> Arc<Setting> {
+        Arc::clone(&lock(&self.setting))
+    }
+
+    /// Knows the kinds that a world has by now, and tells pages of new ones.
+    fn follow_kinds(&self, world: &atoll_core::World) {
+        let mut setting = lock(&self.setting);
+        if setting.kinds.len() != world.kinds().len() {
+            *setting = Arc::new(Setting { kinds: world.kinds().collect(), ..(**setting).clone() });
+            if let Some(desk) = &self.desk {
+                desk.greet(Say::Shapes { shapes: scenery::shapes(&setting) });
+            }
+        }
+    }
+
     /// Tells pages of the body that was looked for.
     fn tell_found(&self, desk: &Desk, pick: Pick, found: Option<(u32, Found)>) {
-        let body = found.map(|(rank, found)| scenery::picked(&found, 0, &self.setting, rank, true));
+        let body = found.map(|(rank, found)| scenery::picked(&found, 0, &self.setting(), rank, true));
         desk.found(pick, found.map(|(_, found)| Pick::Body(0, found.id)));
         desk.tell(&Say::Body { body });
     }
@@ -220,7 +237,8 @@ impl Host for Viewer {
     fn calls(&self, steps: u64) -> bool {
         let Some(desk) = self.desk.as_ref().filter(|desk| desk.is_wanted()) else { return false };
         let (pace, state) = (desk.pace(), lock(&self.state));
-        !pace.playing
+        desk.has_commands()
+            || !pace.playing
             || pace.times > 0.0
             || pace.by != 0
             || state.is_to_tell(desk, steps)
@@ -235,6 +253,9 @@ impl Host for Viewer {
         let (wishes, pace) = (desk.wishes(), desk.pace());
         let is_over = steps >= self.last_step;
         let is_still = !pace.playing || is_over;
+        if let Some(lines) = desk.take_commands(steps) {
+            return Next::Do(lines);
+        }
         if let Some(question) = state.question(desk, steps, is_still) {
             return Next::Ask(serde_json::to_vec(&question).expect("numbers and names"));
         }
@@ -253,7 +274,7 @@ impl Host for Viewer {
             (_, pace) if !pace.playing => None,
             (_, pace) if pace.times == 0.0 => return Next::GoOn,
             (_, pace) => {
-                let step = Duration::from_secs_f64((1.0 / (self.setting.hertz * pace.times)).min(1e6));
+                let step = Duration::from_secs_f64((1.0 / (self.setting().hertz * pace.times)).min(1e6));
                 if now >= state.next_step {
                     // What is late by a little is caught up with.
                     state.next_step = state.next_step.max(now - 2 * step.min(TELL)) + step;
@@ -275,8 +296,9 @@ impl Host for Viewer {
         if let Some(desk) = &self.desk {
             self.tell_of_tiles(desk, held);
         }
+        self.follow_kinds(held.world);
         match (serde_json::from_slice(question), self.papers.get(held.rank.index())) {
-            (Ok(question), Some(paper)) => answer(&question, &self.setting, held, &mut lock(paper)),
+            (Ok(question), Some(paper)) => answer(&question, &self.setting(), held, &mut lock(paper)),
             // It is of another version; that is found out before.
             _ => Vec::new(),
         }

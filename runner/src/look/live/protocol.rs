@@ -17,6 +17,7 @@
 //! | 12 bytes each | bodies: [`Dot`] |
 
 use super::super::picture::{ColorBy, View};
+use crate::command::{Word, word};
 use crate::folder::in_letters;
 use atoll_core::Partition;
 use bytemuck::{Pod, Zeroable};
@@ -32,7 +33,7 @@ const MOST_SIDE: u32 = 8192;
 const MOST_PIXELS: u32 = 1 << 24;
 
 /// What a page wants.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase", deny_unknown_fields)]
 pub(crate) enum Wish {
     /// To see this from now on.
@@ -77,6 +78,11 @@ pub(crate) enum Wish {
     },
     /// To know no more about it.
     Drop,
+    /// That something is done to the world before its next step.
+    Command {
+        /// As a line of a file of commands, which need not say when.
+        line: String,
+    },
 }
 
 impl Wish {
@@ -90,6 +96,7 @@ impl Wish {
             }
             Self::Speed { times } => (0.0..=1e6).contains(times),
             Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),
+            Self::Command { line } => matches!(word(0, line, 0), Ok(Word::Line(..))),
             _ => true,
         };
         sound.then_some(wish)
@@ -135,6 +142,11 @@ pub(crate) enum Say {
     Tiles {
         /// Of each world.
         worlds: Vec<Tiles>,
+    },
+    /// There are more kinds than before, in all of these shapes.
+    Shapes {
+        /// As [`Source::shapes`].
+        shapes: Vec<[f32; 3]>,
     },
     /// The first record in which two worlds differ, or that there is none.
     Difference {

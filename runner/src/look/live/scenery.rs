@@ -31,9 +31,14 @@ pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) ->
         domain: [low.x, low.y, high.x, high.y],
         tiles: setting.partition.roots(),
         held: Tiles::new(&setting.partition, rank_of_tile),
-        shapes: setting.kinds.iter().map(|kind| outline(&kind.shape)).collect(),
+        shapes: shapes(setting),
         statics: setting.statics.iter().map(fixed).collect(),
     }
+}
+
+/// Half width, half height and radius of each kind, in m.
+pub(super) fn shapes(setting: &Setting) -> Vec<[f32; 3]> {
+    setting.kinds.iter().map(|kind| outline(&kind.shape)).collect()
 }
 
 /// Half width, half height and radius.

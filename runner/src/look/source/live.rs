@@ -9,6 +9,7 @@ use crate::launch;
 use crate::look::frame::{Frame, Setting};
 use crate::plan::Plan;
 use crate::rank::Observer;
+use crate::scene::SceneError;
 use crate::summary::Summary;
 use atoll_core::{Blueprint, GlobalId};
 use atoll_transport::Rank;
@@ -58,9 +59,11 @@ impl Live {
     }
 
     /// Whether a dynamic body has that name.
-    pub(crate) fn has(&self, body: GlobalId) -> bool {
-        let scene = &self.plan.scene;
-        (scene.first_id().0..scene.first_id().0 + scene.bodies()).contains(&body.0)
+    ///
+    /// # Errors
+    /// If the files of its scene cannot be read any more.
+    pub(crate) fn has(&self, body: GlobalId) -> Result<bool, SceneError> {
+        Ok(self.plan.scene.find(body)?.is_some())
     }
 
     /// Runs it, and lets `show` see its frames, with what only a run can tell if `live`. It is run no further than the last of

@@ -11,11 +11,12 @@
 mod buffers;
 mod writer;
 
+use crate::command::State;
 use crate::error::RunError;
 use crate::folder::Claim;
-use crate::folder::recording::Record;
+use crate::folder::recording::{Record, StageText};
 use crate::plan::{Output, Plan};
-use atoll_core::World;
+use atoll_core::{StaticBody, World};
 use atoll_transport::Rank;
 use buffers::Buffers;
 use std::fs::File;
@@ -35,6 +36,9 @@ pub(super) struct Recorder<'a> {
     output: &'a Output,
     /// None once no more will come.
     jobs: Option<Sender<Job>>,
+    /// How many kinds the next record may speak of.
+    kinds: usize,
+    statics: &'a [StaticBody],
     records: Buffers<Record>,
     saves: Buffers<Saved>,
     /// Steps of the last snapshot and of the one before.
@@ -73,6 +77,8 @@ impl<'a> Recorder<'a> {
         Ok(Self {
             output,
             jobs: Some(jobs),
+            kinds: plan.blueprint.kinds.len(),
+            statics: &plan.blueprint.statics,
             records,
             saves,
             last_snapshot: resumed,
@@ -85,9 +91,9 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Writes what is due after the steps that were made. Waits where the disk is behind. `stopped` says that somebody asked
-    /// to stop.
-    pub(super) fn write_due(&mut self, world: &World, stopped: bool) {
+    /// Writes what is due after the steps that were made. Waits where the disk is behind. `commands` is what these add up to,
+    /// `stopped` says that somebody asked to stop.
+    pub(super) fn write_due(&mut self, world: &World, commands: Option<&State>, stopped: bool) {
         let start = Instant::now();
         let step = world.step_count();
         let _span = trace_span!("output", step).entered();
@@ -102,11 +108,14 @@ impl<'a> Recorder<'a> {
         if due(self.output.every.record_every)
             && let Some(mut record) = self.records.take()
         {
+            if world.kinds().len() != std::mem::replace(&mut self.kinds, world.kinds().len()) {
+                self.ask(Job::Kinds(StageText::new(&world.kinds().collect::<Vec<_>>(), self.statics)));
+            }
             record.fill(step, world.bodies());
             self.ask(Job::Record(record));
         }
         if step > 0 && due(self.output.every.checkpoint_every) {
-            self.snapshot(world);
+            self.snapshot(world, commands);
         }
         self.time += start.elapsed();
     }
@@ -121,13 +130,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// Takes a snapshot unless the last one is of this step.
-    pub(super) fn snapshot(&mut self, world: &World) {
+    pub(super) fn snapshot(&mut self, world: &World, commands: Option<&State>) {
         let step = world.step_count();
         if self.last_snapshot == Some(step) {
             return;
         }
         if let Some(mut saved) = self.saves.take() {
-            saved.fill(world);
+            saved.fill(world, commands);
             self.ask(Job::Snapshot(saved));
             self.snapshot_before = self.last_snapshot.replace(step);
         }

@@ -1,5 +1,6 @@
 //! The thread that writes what a rank recorded and saved, in the order in which it did.
 
+use crate::command::State;
 use crate::error::RunError;
 use crate::folder::durable::is_gone;
 use crate::folder::in_letters;
@@ -21,6 +22,8 @@ pub(super) enum Job {
     Record(Record),
     /// A snapshot.
     Snapshot(Saved),
+    /// From the next record on there are more kinds.
+    Kinds(StageText),
     /// Files to be made durable with what is written.
     Sync(Vec<(PathBuf, File)>),
     /// Snapshots from before this step are no longer needed.
@@ -32,12 +35,14 @@ pub(super) enum Job {
 pub(super) struct Saved {
     step: u64,
     levels: Option<String>,
+    commands: Option<State>,
     tiles: Vec<SavedTile>,
     blocks: Vec<u8>,
 }
 
 impl Saved {
-    pub(super) fn fill(&mut self, world: &World) {
+    pub(super) fn fill(&mut self, world: &World, commands: Option<&State>) {
+        self.commands = commands.cloned();
         self.step = world.step_count();
         self.levels = world.partition().levels().map(in_letters);
         self.tiles = world.save(&mut self.blocks);
@@ -87,6 +92,10 @@ impl Writer {
                     self.attempt(|writer| writer.save(&saved));
                     let _ = saves.send(saved);
                 }
+                Job::Kinds(stage) => self.attempt(|writer| match &mut writer.recording {
+                    Some(recording) => Ok(recording.set_stage(&stage)?),
+                    None => Ok(()),
+                }),
                 Job::Sync(files) => self.beside.extend(files),
                 // After a failure nobody can tell which snapshots are whole.
                 Job::RemoveBefore(_) if self.failure.get().is_some() => {}
@@ -124,8 +133,8 @@ impl Writer {
     /// Whoever goes on from a snapshot finds everything that was recorded before it, and in segments of its own.
     fn save(&mut self, saved: &Saved) -> Result<(), RunError> {
         self.close()?;
-        let written =
-            self.snapshot.write(&self.snapshots, saved.step, saved.levels.as_deref(), &saved.tiles, &saved.blocks);
+        let beside = (saved.levels.as_deref(), saved.commands.as_ref());
+        let written = self.snapshot.write(&self.snapshots, saved.step, beside, &saved.tiles, &saved.blocks);
         let path = written.map_err(|(path, error)| RunError::Output { path, reason: error.to_string() })?;
         debug!(step = saved.step, bytes = saved.blocks.len(), "saved to {}", path.display());
         self.saved = Some(path);

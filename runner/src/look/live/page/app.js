@@ -11,6 +11,7 @@ const COLORS = ["kind", "speed", "spin", "tile", "rank", "contacts", "asleep"];
 const KEYS = [
   ["space", "play or pause"], ["→ ←", "a step on, a record back"], ["+ −", "zoom"], ["arrows + shift", "move"],
   ["f", "all of the world"], ["t", "tiles and ranks"], ["1 to 7", "color"], ["n", "first difference"],
+  ["v p d e", "hand: view, pull, drop, erase"],
   ["Esc", "let go of a body"],
 ];
 
@@ -44,7 +45,7 @@ socket.onclose = () => say(state.hello ? "The run is over; this is what was seen
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, figures, body, difference, tiles })[type]?.(message);
+    ({ hello, figures, body, difference, tiles, shapes })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -68,6 +69,8 @@ function hello(message) {
   options(at("speed"), message.recorded ? times : [[0, "as fast as can be"], ...times]);
   at("speed").value = message.recorded ? 1 : 0;
   for (const id of ["track", "back"]) at(id).hidden = !message.recorded;
+  at("hand").hidden = message.recorded;
+  name_shapes();
   if (message.recorded) {
     Object.assign(at("scrub"), { min: 0, max: message.steps.length - 1, value: 0 });
   }
@@ -87,6 +90,21 @@ function start_drawing() {
     state.drawing.grid(made, source, state.hello.rank_colors);
     return made;
   });
+}
+
+/// There are more kinds of bodies than before.
+function shapes({ shapes }) {
+  state.hello.sources[0].shapes = shapes;
+  start_drawing();
+  name_shapes();
+  redraw();
+}
+
+function name_shapes() {
+  const name = ([x, y, radius]) => (radius ? `circle, ${short(2 * radius)} m` : `box, ${short(2 * x)} × ${short(2 * y)} m`);
+  const chosen = at("shape").value;
+  options(at("shape"), state.hello.sources[0].shapes.map((shape, kind) => [kind, name(shape)]));
+  if (chosen) at("shape").value = chosen;
 }
 
 /// Tiles were cut or joined, or have gone to other ranks.
@@ -183,6 +201,13 @@ function body({ body }) {
     state.marked = body.at;
     at("body-id").textContent = body.id;
     list(at("body-figures"), body.figures);
+    if (held) held.found = true;
+    if (held?.erases) {
+      command(`{"remove":${body.id}}`);
+      held = null;
+      tell({ do: "drop" });
+    }
+    pull();
   }
   at("follow").setAttribute("aria-pressed", state.following);
   redraw();
@@ -354,12 +379,52 @@ function follow(on) {
   redraw();
 }
 
+/// What the hand holds: where it is, and whether it takes away what is there.
+let held = null;
+
+/// Has something done to the world before its next step. A name may have more digits than numbers have here: so it is text.
+function command(line) {
+  tell({ do: "command", line });
+}
+
+function tool(name) {
+  at("tool").value = name;
+  at("shape-choice").hidden = name !== "drop";
+  held = null;
+}
+
+/// Takes hold of the body that is there, or puts one there.
+function take(event) {
+  const { at: [x, y], source } = place(event), name = at("tool").value;
+  if (name === "drop") {
+    command(JSON.stringify({ add: { kind: Number(at("shape").value), x, y } }));
+  } else {
+    held = { at: [x, y], erases: name === "erase", found: false };
+    tell({ do: "pick", source, at: held.at });
+  }
+}
+
+/// Lets the body that is held come to the hand in an eighth of a second or so; let go, it flies on as it was pulled.
+function pull() {
+  if (!held?.found || held.erases || !state.body) return;
+  const [vx, vy] = [0, 1].map((axis) => 8 * (held.at[axis] - state.body.at[axis]));
+  command(`{"velocity":{"id":${state.body.id},"vx":${vx},"vy":${vy}}}`);
+}
+
 let dragged = null;
 canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
+  if (state.hello && !state.hello.recorded && at("tool").value !== "look") {
+    take(event);
+    return;
+  }
   dragged = { x: event.clientX, y: event.clientY, far: false };
 });
 canvas.addEventListener("pointermove", (event) => {
+  if (held && !held.erases) {
+    held.at = place(event).at;
+    pull();
+  }
   if (!dragged) return;
   const [dx, dy] = [event.clientX - dragged.x, event.clientY - dragged.y];
   dragged.far ||= Math.hypot(dx, dy) > 4;
@@ -374,8 +439,9 @@ canvas.addEventListener("pointermove", (event) => {
 canvas.addEventListener("pointerup", (event) => {
   if (dragged && !dragged.far && state.hello) tell({ do: "pick", ...place(event) });
   dragged = null;
+  if (held && !held.erases) held = null;
 });
-canvas.addEventListener("pointercancel", () => { dragged = null; });
+canvas.addEventListener("pointercancel", () => { dragged = held = null; });
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
   const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
@@ -390,6 +456,7 @@ at("back").onclick = () => step(-1);
 at("fit").onclick = fit;
 at("follow").onclick = () => follow(!state.following);
 at("let-go").onclick = () => tell({ do: "drop" });
+at("tool").onchange = ({ target }) => { tool(target.value); target.blur(); };
 at("tiles").onchange = redraw;
 at("color").onchange = redraw;
 at("speed").onchange = ({ target }) => tell({ do: "speed", times: Number(target.value) });
@@ -414,6 +481,7 @@ addEventListener("keydown", (event) => {
     ArrowUp: () => event.shiftKey && move(0, 1),
     ArrowDown: () => event.shiftKey && move(0, -1),
     n: to_difference,
+    ...(state.hello.recorded ? {} : { v: () => tool("look"), p: () => tool("pull"), d: () => tool("drop"), e: () => tool("erase") }),
     Escape: () => tell({ do: "drop" }),
   }[event.key] ?? (state.hello.colors.includes(color) ? () => { at("color").value = color; redraw(); } : null);
   if (act) {

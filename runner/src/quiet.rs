@@ -13,7 +13,7 @@ thread_local! {
 
 /// Does the work, and catches its panic, of which nothing is printed. Panics of other threads are printed as ever. Whatever
 /// the work was changing is of no use after a panic.
-pub(super) fn catch<R>(work: impl FnOnce() -> R) -> thread::Result<R> {
+pub(crate) fn catch<R>(work: impl FnOnce() -> R) -> thread::Result<R> {
     HOOK.call_once(|| {
         let usual = panic::take_hook();
         panic::set_hook(Box::new(move |panic| {

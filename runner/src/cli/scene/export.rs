@@ -1,0 +1,84 @@
+//! `atoll scene export`: the start of a configuration, or a recorded step of a run, as the files of a scene.
+
+use super::super::args::SceneExportArgs;
+use super::target::Target;
+use crate::config::Config;
+use crate::error::{Exit, RunError};
+use crate::folder::RunFolder;
+use crate::folder::recording::Row;
+use crate::look::frame::Frame;
+use crate::look::recorded::Recorded;
+use crate::scene::file::write::World;
+use crate::scene::{Scene, SceneFile};
+use atoll_core::{Body, GlobalId, KindId, Rot};
+use glam::{DVec2, Vec2};
+
+/// Does it.
+///
+/// # Errors
+/// If there is nothing to be written, or it cannot be.
+pub(super) fn run(args: &SceneExportArgs) -> Result<Exit, RunError> {
+    let SceneExportArgs { from, out, bodies_as, step, overwrite, values } = args;
+    let target = Target::check(out, *bodies_as, *overwrite, from)?;
+    match (from.is_dir(), step) {
+        (true, Some(step)) => of_run(args, *step, &target)?,
+        (true, None) => return Err(unsuitable("--step", "say which recorded step of this run to write")),
+        (false, Some(step)) => {
+            return Err(unsuitable(&format!("--step {step}"), "only the folder of a run has steps; leave it out"));
+        }
+        (false, None) => {
+            let config = Config::load(from, &values.overrides()?)?;
+            let scene = Scene::open(&config.scene)?;
+            let bodies = scene.iter().collect::<Result<Vec<_>, _>>()?;
+            let world = World {
+                name: scene.file().map_or(Some(config.scene.kind.name()), SceneFile::name),
+                domain: scene.domain(),
+                physics: config.unusual_physics(),
+                kinds: &scene.kinds(),
+                names: scene.file().map_or(&[], SceneFile::kind_names),
+                statics: scene.statics(),
+            };
+            target.write(&world, bodies)?;
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// What was recorded of a step.
+fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), RunError> {
+    if let Some(option) = args.values.first() {
+        return Err(unsuitable(option, "a run that was made has its values; leave it out"));
+    }
+    let recorded = Recorded::open(&args.from)?;
+    let config = Config::load_begun(&RunFolder::new("export", &args.from).configuration())?;
+    let mut frame = Frame::default();
+    recorded.read(step, &mut frame)?;
+    let (setting, [low, high]) = (recorded.setting(), recorded.recording().facts().domain);
+    let name = format!("{}, step {step}", config.scene.kind.name());
+    let world = World {
+        name: Some(&name),
+        domain: (low, high),
+        physics: config.unusual_physics(),
+        kinds: &setting.kinds,
+        names: &[],
+        statics: &setting.statics,
+    };
+    target.write(&world, frame.bodies.iter().map(body).collect())
+}
+
+/// A body as it was recorded.
+fn body(row: &Row) -> Body {
+    let Row { id, x, y, angle, vx, vy, omega, kind, .. } = *row;
+    Body {
+        id: GlobalId(id),
+        position: DVec2::new(x, y),
+        rotation: Rot::from_angle(angle),
+        velocity: Vec2::new(vx, vy),
+        angular_velocity: omega,
+        kind: KindId(kind),
+    }
+}
+
+fn unsuitable(option: &str, reason: &str) -> RunError {
+    RunError::Unsuitable { option: option.to_owned(), reason: reason.to_owned() }
+}

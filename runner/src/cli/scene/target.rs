@@ -1,0 +1,91 @@
+//! The folder that the files of a scene are written to.
+
+use super::super::args::BodiesAs;
+use super::super::output::{self, Kept};
+use crate::error::RunError;
+use crate::folder::durable::{create_folder_durably, write_durably};
+use crate::scene::file::digest_of_file;
+use crate::scene::file::write::{self, BodiesFile, World};
+use atoll_core::Body;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What the text of a scene is called that is written here.
+const TEXT: &str = "scene.toml";
+
+/// Where to, and how.
+pub(super) struct Target<'a> {
+    folder: &'a Path,
+    bodies_as: BodiesAs,
+}
+
+impl<'a> Target<'a> {
+    /// Refuses a folder with files that would be lost, before anything heavy starts. `from` is what is read.
+    ///
+    /// # Errors
+    /// If there are some, and they are not to be replaced; or if they must stay.
+    pub(super) fn check(folder: &'a Path, bodies_as: BodiesAs, overwrite: bool, from: &Path) -> Result<Self, RunError> {
+        let target = Self { folder, bodies_as };
+        let files = [target.text(), target.bodies()];
+        let unsuitable =
+            |reason: String| RunError::Unsuitable { option: format!("--out {}", folder.display()), reason };
+        if folder.exists() && !folder.is_dir() {
+            return Err(unsuitable("there is something that is no folder; name another".to_owned()));
+        }
+        if let Some(there) = files.iter().find(|path| !overwrite && fs::symlink_metadata(path).is_ok()) {
+            let name = there.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            return Err(unsuitable(format!(
+                "{name} is there already; name another folder, or replace it with --overwrite"
+            )));
+        }
+        let kept = Kept { configuration: Some(from), ..Kept::default() };
+        kept.check(files.iter().map(|path| ("--out", Some(path.as_path()))))?;
+        Ok(target)
+    }
+
+    fn text(&self) -> PathBuf {
+        self.folder.join(TEXT)
+    }
+
+    fn bodies(&self) -> PathBuf {
+        self.folder.join(match self.bodies_as {
+            BodiesAs::Csv => "bodies.csv",
+            BodiesAs::Parquet => "bodies.parquet",
+        })
+    }
+
+    /// Writes both files, each whole or not at all, and tells what there is in them.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(super) fn write(&self, world: &World<'_>, mut bodies: Vec<Body>) -> Result<(), RunError> {
+        let failed = |path: &Path| {
+            let path = path.to_owned();
+            move |error: std::io::Error| RunError::Output { path, reason: error.to_string() }
+        };
+        write::sort_in_space(&mut bodies, world.domain);
+        create_folder_durably(self.folder).map_err(failed(self.folder))?;
+        let (text, file) = (self.text(), self.bodies());
+        let written = write_durably(&file, |out| match self.bodies_as {
+            BodiesAs::Csv => write::csv(out, &bodies),
+            BodiesAs::Parquet => write::parquet(out, &bodies),
+        });
+        written.map_err(failed(&file))?;
+        let xxh3 = digest_of_file(&file).map_err(failed(&file))?;
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let told = BodiesFile { name: &name, xxh3: &xxh3, count: bodies.len() as u64 };
+        let said = write::text(world, &told);
+        write_durably(&text, |out| std::io::Write::write_all(out, said.as_bytes())).map_err(failed(&text))?;
+        let bytes =
+            [&text, &file].iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum::<u64>();
+        let World { kinds, statics, .. } = world;
+        output::show(&format!(
+            "{} bodies of {} kinds and {} statics, {:.2} MB: `atoll run {}` runs it\n",
+            bodies.len(),
+            kinds.len(),
+            statics.len(),
+            bytes as f64 * 1e-6,
+            text.display()
+        ))
+    }
+}

@@ -1,0 +1,205 @@
+//! Answers: the part of each rank, and all of them joined, as a line of JSON.
+
+use super::text::Question;
+use atoll_core::{Body, GlobalId, RayHit, World};
+use serde::{Deserialize, Serialize};
+
+/// What one rank answers to a question, or all together.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub(crate) enum Part {
+    Ray(Option<Hit>),
+    /// Names, ascending.
+    Names(Vec<u64>),
+    Touching(Vec<Touching>),
+    Bodies(Vec<Option<State>>),
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(crate) struct Hit {
+    id: u64,
+    fraction: f64,
+    point: [f64; 2],
+    normal: [f64; 2],
+}
+
+/// A contact, as seen from one of its bodies.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(crate) struct Touching {
+    /// The other.
+    id: u64,
+    points: [[f64; 2]; 2],
+    impulse: f32,
+}
+
+/// A body, as it is.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(crate) struct State {
+    id: u64,
+    kind: u32,
+    x: f64,
+    y: f64,
+    angle: f32,
+    vx: f32,
+    vy: f32,
+    omega: f32,
+}
+
+impl State {
+    fn new(body: &Body) -> Self {
+        Self {
+            id: body.id.0,
+            kind: body.kind.0,
+            x: body.position.x,
+            y: body.position.y,
+            angle: body.rotation.angle(),
+            vx: body.velocity.x,
+            vy: body.velocity.y,
+            omega: body.angular_velocity,
+        }
+    }
+}
+
+fn names(ids: Vec<GlobalId>) -> Vec<u64> {
+    ids.into_iter().map(|id| id.0).collect()
+}
+
+impl Part {
+    /// What a rank has to say.
+    pub(crate) fn of(question: &Question, world: &World) -> Self {
+        match question {
+            Question::Ray { from, to } => Self::Ray(world.cast_ray(*from, *to).map(Hit::new)),
+            Question::Rectangle { low, high } => Self::Names(names(world.in_rectangle(*low, *high))),
+            Question::Point(point) => Self::Names(names(world.at_point(*point))),
+            Question::Touching(id) => {
+                let contact = |contact: atoll_core::ContactView| {
+                    let [a, b] = contact.bodies;
+                    let other = if a == *id { b } else { a };
+                    Touching {
+                        id: other.0,
+                        points: contact.points.map(|point| point.to_array()),
+                        impulse: contact.normal_impulse,
+                    }
+                };
+                Self::Touching(world.touching(*id).into_iter().map(contact).collect())
+            }
+            Question::Bodies(ids) => {
+                Self::Bodies(ids.iter().map(|id| world.get(*id).as_ref().map(State::new)).collect())
+            }
+        }
+    }
+
+    /// What two ranks say together, whichever of them is asked first.
+    #[must_use]
+    pub(crate) fn join(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Ray(a), Self::Ray(b)) => {
+                let nearer = |a: Hit, b: Hit| if (b.fraction, b.id) < (a.fraction, a.id) { b } else { a };
+                Self::Ray(match (a, b) {
+                    (Some(a), Some(b)) => Some(nearer(a, b)),
+                    (a, b) => a.or(b),
+                })
+            }
+            (Self::Names(mut a), Self::Names(b)) => {
+                // Statics are known to all.
+                a.extend(b);
+                a.sort_unstable();
+                a.dedup();
+                Self::Names(a)
+            }
+            (Self::Touching(mut a), Self::Touching(b)) => {
+                a.extend(b);
+                a.sort_by_key(|contact| contact.id);
+                Self::Touching(a)
+            }
+            (Self::Bodies(a), Self::Bodies(b)) => Self::Bodies(a.into_iter().zip(b).map(|(a, b)| a.or(b)).collect()),
+            (a, _) => a,
+        }
+    }
+}
+
+impl Hit {
+    fn new(hit: RayHit) -> Self {
+        let RayHit { id, fraction, point, normal } = hit;
+        Self { id: id.0, fraction, point: point.to_array(), normal: normal.to_array() }
+    }
+}
+
+/// What is written for whoever asked.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Answer<'a> {
+    /// To a question.
+    To(&'a Question, &'a Part),
+    /// Names that were given to bodies which had none.
+    Added(&'a [u64]),
+    /// Contacts that began and ended in the last step.
+    Contacts { began: &'a [[u64; 2]], ended: &'a [[u64; 2]] },
+    /// Why a command was not done.
+    Refused(&'a str),
+    /// The run waits to be told more.
+    Waits,
+}
+
+impl Answer<'_> {
+    /// As a line of JSON, its end included. `name` is that of the line that asked.
+    pub(crate) fn to_line(self, step: u64, name: Option<&str>) -> String {
+        let name = name.map_or(String::new(), |name| format!("\"name\":{},", json(&name)));
+        let rest = match self {
+            Self::To(question, part) => format!("\"{}\":{}", key(question), value(question, part)),
+            Self::Added(ids) => format!("\"added\":{}", json(&ids)),
+            Self::Contacts { began, ended } => format!("\"began\":{},\"ended\":{}", json(&began), json(&ended)),
+            Self::Refused(reason) => format!("\"refused\":{}", json(&reason)),
+            Self::Waits => "\"waits\":true".to_owned(),
+        };
+        format!("{{\"step\":{step},{name}{rest}}}\n")
+    }
+}
+
+/// Numbers are the shortest decimals that lead back to the same bits.
+fn json<T: Serialize>(value: &T) -> String {
+    serde_json::to_string(value).expect("numbers and texts, under names")
+}
+
+fn key(question: &Question) -> &'static str {
+    match question {
+        Question::Ray { .. } => "ray",
+        Question::Rectangle { .. } => "rectangle",
+        Question::Point(_) => "point",
+        Question::Touching(_) => "touching",
+        Question::Bodies(_) => "body",
+    }
+}
+
+fn value(question: &Question, part: &Part) -> String {
+    match part {
+        Part::Ray(hit) => json(hit),
+        Part::Names(ids) => json(ids),
+        Part::Touching(contacts) => json(contacts),
+        // Who asked for one is given one.
+        Part::Bodies(bodies) if matches!(question, Question::Bodies(ids) if ids.len() == 1) => json(&bodies[0]),
+        Part::Bodies(bodies) => json(bodies),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    #[test]
+    fn parts_join_in_any_order_and_are_told_in_one_line() {
+        let hit = |id, fraction| Part::Ray(Some(Hit { id, fraction, point: [0.5, 1.0], normal: [0.0, 1.0] }));
+        let parts = [Part::Ray(None), hit(4, 0.5), hit(3, 0.5), hit(1, 0.75)];
+        for turn in 0..4 {
+            let all = (0..4).map(|k| parts[(k + turn) % 4].clone()).reduce(Part::join).unwrap();
+            assert_eq!(all, parts[2]);
+        }
+        let names = Part::Names(vec![0, 5, 9]).join(Part::Names(vec![0, 2]));
+        assert_eq!(names, Part::Names(vec![0, 2, 5, 9]));
+        let question = Question::Ray { from: DVec2::ZERO, to: DVec2::ONE };
+        let expected = "{\"step\":7,\"name\":\"up\",\"ray\":{\"id\":3,\"fraction\":0.5,\"point\":[0.5,1.0],\"normal\":[0.0,1.0]}}\n";
+        assert_eq!(Answer::To(&question, &parts[2]).to_line(7, Some("up")), expected);
+        let nobody = Answer::To(&Question::Bodies(vec![GlobalId(3)]), &Part::Bodies(vec![None])).to_line(0, None);
+        assert_eq!(nobody, "{\"step\":0,\"body\":null}\n");
+    }
+}

@@ -1,0 +1,120 @@
+//! What the commands of a run add up to beside its tiles: part of a snapshot, so that a run goes on without the commands that were.
+
+use atoll_core::{Command, GlobalId, Kind, Material, SetupError, Shape, World};
+use glam::Vec2;
+use serde::{Deserialize, Serialize};
+
+/// What a world is told when it goes on.
+#[derive(Clone, PartialEq, Default, Debug, Serialize, Deserialize)]
+pub(crate) struct State {
+    /// How many more bodies there are than at the start.
+    pub(crate) added: i64,
+    /// The name of the next body that is given none.
+    pub(crate) next: u64,
+    /// If it is another than at the start, in m/s^2.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gravity: Option<[f32; 2]>,
+    /// Rows that were added to the table of kinds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    kinds: Vec<KindRow>,
+    /// Forces that push still.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    forces: Vec<Push>,
+    /// Whether contacts that begin and end are told.
+    #[serde(default)]
+    pub(crate) tells_contacts: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+struct Push {
+    id: u64,
+    force: [f32; 2],
+    torque: f32,
+    /// It pushes in the steps before this one is made.
+    until: u64,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+struct KindRow {
+    #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
+    half: Option<[f32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    circle: Option<f32>,
+    density: f32,
+    friction: f32,
+    restitution: f32,
+}
+
+impl State {
+    /// Before any command, where bodies have names below this one.
+    pub(crate) fn new(next: u64) -> Self {
+        Self { next, ..Self::default() }
+    }
+
+    /// Notes a command that was done after `step` steps.
+    pub(crate) fn note(&mut self, command: &Command, step: u64) {
+        match *command {
+            Command::Add(body) => {
+                self.added += 1;
+                self.next = self.next.max(body.id.0.saturating_add(1));
+            }
+            Command::Remove(_) => self.added -= 1,
+            Command::SetGravity(gravity) => self.gravity = Some(gravity.to_array()),
+            Command::AddKind(kind) => self.kinds.push(KindRow::new(&kind)),
+            Command::Force { id, force, torque, steps } => {
+                self.forces.retain(|push| push.until > step);
+                let until = step.saturating_add(steps);
+                self.forces.push(Push { id: id.0, force: force.to_array(), torque, until });
+            }
+            Command::SetVelocity { .. } | Command::Impulse { .. } | Command::SetKind { .. } | Command::Wake(_) => {}
+        }
+    }
+
+    /// Makes the table of kinds and gravity what they were; before a world gets its tiles back.
+    ///
+    /// # Errors
+    /// If they cannot be.
+    pub(crate) fn prepare(&self, world: &mut World) -> Result<(), SetupError> {
+        for kind in &self.kinds {
+            world.add_kind(&kind.read().ok_or(SetupError::BadKind { kind: atoll_core::KindId(u32::MAX) })?)?;
+        }
+        if let Some(gravity) = self.gravity {
+            world.command(&Command::SetGravity(Vec2::from(gravity)))?;
+        }
+        Ok(())
+    }
+
+    /// Lets forces push on that have not done so for long enough; once a world has its tiles back.
+    ///
+    /// # Errors
+    /// If they cannot be.
+    pub(crate) fn resume(&self, world: &mut World) -> Result<(), SetupError> {
+        let step = world.step_count();
+        for &Push { id, force, torque, until } in self.forces.iter().filter(|push| push.until > step) {
+            let steps = until - step;
+            world.command(&Command::Force { id: GlobalId(id), force: force.into(), torque, steps })?;
+        }
+        Ok(())
+    }
+}
+
+impl KindRow {
+    fn new(kind: &Kind) -> Self {
+        let Kind { shape, material: Material { density, friction, restitution } } = *kind;
+        let (half, circle) = match shape {
+            Shape::Box { half } => (Some(half.to_array()), None),
+            Shape::Circle { radius } => (None, Some(radius)),
+        };
+        Self { half, circle, density, friction, restitution }
+    }
+
+    fn read(&self) -> Option<Kind> {
+        let shape = match (self.half, self.circle) {
+            (Some(half), None) => Shape::Box { half: half.into() },
+            (None, Some(radius)) => Shape::Circle { radius },
+            _ => return None,
+        };
+        let Self { density, friction, restitution, .. } = *self;
+        Some(Kind { shape, material: Material { density, friction, restitution } })
+    }
+}

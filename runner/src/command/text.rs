@@ -1,0 +1,342 @@
+//! A line of a file of commands, and what it may say.
+
+use atoll_core::{Body, Command, GlobalId, Kind, KindId, Material, Rot, Shape};
+use glam::{DVec2, Vec2};
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer};
+use serde_json::Value;
+
+/// A line: what, when, and where it was read.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Line {
+    /// How many steps are made when it is its turn.
+    pub(crate) step: u64,
+    /// Its number in the file, from 1.
+    pub(crate) number: u64,
+    /// Repeated in the answer.
+    pub(crate) name: Option<String>,
+    pub(crate) action: Action,
+}
+
+/// What a line asks for.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Action {
+    /// Bodies come, some of them with a name of the run's choosing.
+    Add(Vec<NewBody>),
+    /// All of these are done, or none.
+    Do(Vec<Command>),
+    Ask(Question),
+    /// From here on contacts that begin and end are told, or not.
+    TellContacts(bool),
+}
+
+/// A body to be added.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct NewBody {
+    /// Whether it has a name of its own, and not one that is to be chosen.
+    pub(crate) is_named: bool,
+    pub(crate) body: Body,
+}
+
+/// What may be asked.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Question {
+    Ray { from: DVec2, to: DVec2 },
+    Rectangle { low: DVec2, high: DVec2 },
+    Point(DVec2),
+    Touching(GlobalId),
+    Bodies(Vec<GlobalId>),
+}
+
+/// What whoever drives a run says.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Word {
+    /// Do this; the text is how it is written down.
+    Line(Line, String),
+    /// Until so many steps are made nothing more will be said.
+    Until(u64),
+}
+
+/// What a line may hold: one of all but the first two.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    step: Option<u64>,
+    name: Option<String>,
+    add: Option<Several<BodyText>>,
+    remove: Option<Several<u64>>,
+    velocity: Option<Several<VelocityText>>,
+    impulse: Option<Several<ImpulseText>>,
+    force: Option<Several<ForceText>>,
+    kind: Option<Several<KindOfText>>,
+    add_kind: Option<KindText>,
+    gravity: Option<[f32; 2]>,
+    wake: Option<Several<u64>>,
+    ray: Option<RayText>,
+    rectangle: Option<RectangleText>,
+    point: Option<[f64; 2]>,
+    touching: Option<u64>,
+    body: Option<Several<u64>>,
+    contacts: Option<bool>,
+    until: Option<u64>,
+}
+
+/// One, or a list of some.
+struct Several<T>(Vec<T>);
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Several<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let read = |value| serde_json::from_value(value).map_err(D::Error::custom);
+        match Value::deserialize(deserializer)? {
+            Value::Array(all) => all.into_iter().map(read).collect::<Result<_, _>>().map(Self),
+            one => Ok(Self(vec![read(one)?])),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyText {
+    id: Option<u64>,
+    #[serde(default)]
+    kind: u32,
+    x: f64,
+    y: f64,
+    angle: Option<f32>,
+    cos: Option<f32>,
+    sin: Option<f32>,
+    #[serde(default)]
+    vx: f32,
+    #[serde(default)]
+    vy: f32,
+    #[serde(default)]
+    omega: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VelocityText {
+    id: u64,
+    vx: f32,
+    vy: f32,
+    #[serde(default)]
+    omega: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImpulseText {
+    id: u64,
+    x: f32,
+    y: f32,
+    at: Option<[f64; 2]>,
+    #[serde(default)]
+    angular: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ForceText {
+    id: u64,
+    x: f32,
+    y: f32,
+    #[serde(default)]
+    torque: f32,
+    steps: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KindOfText {
+    id: u64,
+    kind: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KindText {
+    shape: ShapeText,
+    width: Option<f32>,
+    height: Option<f32>,
+    radius: Option<f32>,
+    density: Option<f32>,
+    friction: Option<f32>,
+    restitution: Option<f32>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ShapeText {
+    Box,
+    Circle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RayText {
+    from: [f64; 2],
+    to: [f64; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RectangleText {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+/// What may stand in a line beside step and name.
+const ACTIONS: &str = "add, remove, velocity, impulse, force, kind, add_kind, gravity, wake, ray, rectangle, point, \
+                       touching, body or contacts";
+
+/// Reads a line of a file. The error is what is wrong with it.
+pub(crate) fn parse(number: u64, text: &str) -> Result<Line, String> {
+    let raw = read(text)?;
+    let step = raw.step.ok_or("it has no step: give the number of steps that are made when it is its turn")?;
+    if raw.until.is_some() {
+        return Err("until is for whoever drives a run by --commands -; leave it out".to_owned());
+    }
+    Ok(Line { step, number, name: raw.name.clone(), action: action(raw)? })
+}
+
+/// Reads what whoever drives a run says after `step` steps.
+pub(crate) fn word(number: u64, text: &str, step: u64) -> Result<Word, String> {
+    let raw = read(text)?;
+    if let Some(until) = raw.until {
+        let alone = raw.step.is_none() && raw.name.is_none() && action(raw).is_err();
+        return if alone { Ok(Word::Until(until)) } else { Err("until stands by itself".to_owned()) };
+    }
+    let (step, name) = (raw.step.unwrap_or(step), raw.name.clone());
+    let mut value: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    if let Value::Object(fields) = &mut value {
+        fields.shift_insert(0, "step".to_owned(), step.into());
+    }
+    Ok(Word::Line(Line { step, number, name, action: action(raw)? }, value.to_string()))
+}
+
+fn read(text: &str) -> Result<Raw, String> {
+    // On one line, lines are of no use.
+    let short = |error: serde_json::Error| {
+        let text = error.to_string();
+        text.strip_suffix(&format!(" at line {} column {}", error.line(), error.column()))
+            .map_or_else(|| text.clone(), |words| format!("{words}, at column {}", error.column()))
+    };
+    serde_json::from_str(text).map_err(short)
+}
+
+fn action(raw: Raw) -> Result<Action, String> {
+    let mut actions = Vec::new();
+    if let Some(Several(bodies)) = raw.add {
+        actions.push(Action::Add(bodies.iter().map(new_body).collect::<Result<_, _>>()?));
+    }
+    let mut each = |commands: Vec<Command>| actions.push(Action::Do(commands));
+    if let Some(Several(ids)) = raw.remove {
+        each(ids.into_iter().map(|id| Command::Remove(GlobalId(id))).collect());
+    }
+    if let Some(Several(all)) = raw.velocity {
+        let set = |VelocityText { id, vx, vy, omega }| Command::SetVelocity {
+            id: GlobalId(id),
+            velocity: Vec2::new(vx, vy),
+            angular_velocity: omega,
+        };
+        each(all.into_iter().map(set).collect());
+    }
+    if let Some(Several(all)) = raw.impulse {
+        let strike = |ImpulseText { id, x, y, at, angular }| {
+            let (impulse, at) = (Vec2::new(x, y), at.map(DVec2::from));
+            Command::Impulse { id: GlobalId(id), impulse, at, angular }
+        };
+        each(all.into_iter().map(strike).collect());
+    }
+    if let Some(Several(all)) = raw.force {
+        if all.iter().any(|force| force.steps == 0) {
+            return Err("a force must push for one step at least".to_owned());
+        }
+        let push = |ForceText { id, x, y, torque, steps }| Command::Force {
+            id: GlobalId(id),
+            force: Vec2::new(x, y),
+            torque,
+            steps,
+        };
+        each(all.into_iter().map(push).collect());
+    }
+    if let Some(Several(all)) = raw.kind {
+        let set = |KindOfText { id, kind }| Command::SetKind { id: GlobalId(id), kind: KindId(kind) };
+        each(all.into_iter().map(set).collect());
+    }
+    if let Some(kind) = raw.add_kind {
+        each(vec![Command::AddKind(kind.read()?)]);
+    }
+    if let Some(gravity) = raw.gravity {
+        each(vec![Command::SetGravity(gravity.into())]);
+    }
+    if let Some(Several(ids)) = raw.wake {
+        each(ids.into_iter().map(|id| Command::Wake(GlobalId(id))).collect());
+    }
+    if let Some(RayText { from, to }) = raw.ray {
+        actions.push(Action::Ask(Question::Ray { from: from.into(), to: to.into() }));
+    }
+    if let Some(RectangleText { low, high }) = raw.rectangle {
+        let (low, high) = (DVec2::from(low), DVec2::from(high));
+        if !low.cmple(high).all() {
+            return Err("the high corner of a rectangle lies above and right of the low one".to_owned());
+        }
+        actions.push(Action::Ask(Question::Rectangle { low, high }));
+    }
+    if let Some(point) = raw.point {
+        actions.push(Action::Ask(Question::Point(point.into())));
+    }
+    if let Some(id) = raw.touching {
+        actions.push(Action::Ask(Question::Touching(GlobalId(id))));
+    }
+    if let Some(Several(ids)) = raw.body {
+        actions.push(Action::Ask(Question::Bodies(ids.into_iter().map(GlobalId).collect())));
+    }
+    actions.extend(raw.contacts.map(Action::TellContacts));
+    match (actions.pop(), actions.len()) {
+        (Some(action), 0) => Ok(action),
+        (Some(_), _) => Err(format!("it asks for several things; give each a line: {ACTIONS}")),
+        (None, _) => Err(format!("it asks for nothing; give one of {ACTIONS}")),
+    }
+}
+
+fn new_body(text: &BodyText) -> Result<NewBody, String> {
+    let rotation = match (text.angle, text.cos, text.sin) {
+        (None, None, None) => Rot::IDENTITY,
+        (Some(angle), None, None) => Rot::from_angle(angle),
+        (None, Some(c), Some(s)) => Rot { c, s },
+        _ => return Err("a body is turned by an angle, or by cos and sin together".to_owned()),
+    };
+    let body = Body {
+        id: GlobalId(text.id.unwrap_or_default()),
+        position: DVec2::new(text.x, text.y),
+        rotation,
+        velocity: Vec2::new(text.vx, text.vy),
+        angular_velocity: text.omega,
+        kind: KindId(text.kind),
+    };
+    Ok(NewBody { is_named: text.id.is_some(), body })
+}
+
+impl KindText {
+    fn read(&self) -> Result<Kind, String> {
+        let usual = Material::default();
+        let material = Material {
+            density: self.density.unwrap_or(usual.density),
+            friction: self.friction.unwrap_or(usual.friction),
+            restitution: self.restitution.unwrap_or(usual.restitution),
+        };
+        let shape = match (&self.shape, self.width, self.height, self.radius) {
+            (ShapeText::Box, Some(width), Some(height), None) => Shape::rectangle(width, height),
+            (ShapeText::Circle, None, None, Some(radius)) => Shape::circle(radius),
+            (ShapeText::Box, ..) => return Err("a box has width and height".to_owned()),
+            (ShapeText::Circle, ..) => return Err("a circle has a radius".to_owned()),
+        };
+        let kind = Kind { shape, material };
+        let must = "sizes and density must be positive, friction at least 0, restitution within 0 to 1";
+        if kind.is_valid() { Ok(kind) } else { Err(must.to_owned()) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

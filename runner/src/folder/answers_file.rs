@@ -1,0 +1,92 @@
+//! Answers and events as a file, a line of JSON for each, by ascending steps.
+
+use serde::Deserialize;
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Stdout, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of answers, or standard output.
+pub(crate) struct AnswersFile {
+    path: PathBuf,
+    to: To,
+}
+
+enum To {
+    File(File),
+    Stdout(Stdout),
+}
+
+/// As much of a line as tells whether it stays.
+#[derive(Deserialize)]
+struct Head {
+    step: u64,
+    /// Of contacts that began: told at the end of a step, and not at the beginning of the next.
+    began: Option<serde::de::IgnoredAny>,
+}
+
+impl AnswersFile {
+    /// Opens it for a run that begins, with step 0, or goes on `from` a step: what was said until then stays, and what comes after is
+    /// said again. A path of `-` is standard output.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn open(path: &Path, from: u64) -> io::Result<Self> {
+        if path == Path::new("-") {
+            return Ok(Self { path: PathBuf::from("standard output"), to: To::Stdout(io::stdout()) });
+        }
+        let kept = if from > 0 { Self::kept(path, from)? } else { String::new() };
+        let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
+        file.write_all(kept.as_bytes())?;
+        Ok(Self { path: path.to_owned(), to: To::File(file) })
+    }
+
+    fn kept(path: &Path, from: u64) -> io::Result<String> {
+        if !path.metadata().is_ok_and(|metadata| metadata.is_file()) {
+            return Ok(String::new());
+        }
+        let text = match std::fs::read_to_string(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(String::new()),
+            text => text?,
+        };
+        let stays = |line: &&str| {
+            let head: Result<Head, _> = serde_json::from_str(line);
+            line.ends_with('\n') && head.is_ok_and(|head| head.step < from || head.step == from && head.began.is_some())
+        };
+        Ok(text.split_inclusive('\n').take_while(stays).collect())
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds a line, at once.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn add(&mut self, line: &str) -> io::Result<()> {
+        match &mut self.to {
+            To::File(file) => file.write_all(line.as_bytes()),
+            To::Stdout(stdout) => stdout.write_all(line.as_bytes()).and_then(|()| stdout.flush()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_goes_on_says_nothing_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("answers.jsonl");
+        let said = ["{\"step\":3,\"ray\":null}\n", "{\"step\":5,\"began\":[[1,2]],\"ended\":[]}\n"];
+        let later = ["{\"step\":5,\"ray\":null}\n", "{\"step\":6,\"began\":[],\"ended\":[[1,2]]}\n", "{\"st"];
+        let mut file = AnswersFile::open(&path, 0).unwrap();
+        said.iter().chain(&later).for_each(|line| file.add(line).unwrap());
+        let mut file = AnswersFile::open(&path, 5).unwrap();
+        file.add("{\"step\":5}\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), [said[0], said[1], "{\"step\":5}\n"].concat());
+        drop(AnswersFile::open(&path, 0).unwrap());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
+    }
+}

@@ -1,0 +1,398 @@
+//! What is done to a world between two steps, and asked of it: all ranks take the same lines in the same order, and whether one can
+//! be done depends on the whole world, of which they tell each other beforehand.
+
+mod contacts;
+mod presence;
+
+use super::halo::RankHalo;
+use super::trouble::all_well;
+use super::{Observer, RankError, unreadable};
+use crate::command::{Action, Answer, Line, NewBody, Part, Question, State, parse};
+use crate::error::{Exit, RunError};
+use crate::folder::AnswersFile;
+use crate::folder::durable::write_durably;
+use crate::plan::Plan;
+use crate::wording::OneLine;
+use atoll_core::{Command, GlobalId, World};
+use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
+use contacts::Contacts;
+use presence::{check, find, next_name};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Sees to it that commands are done and questions answered.
+pub(super) struct Commander {
+    rank: Rank,
+    /// What is planned and not done yet begins here.
+    next: usize,
+    lines: Vec<Line>,
+    /// What these are called in errors.
+    source: String,
+    /// Whether whatever cannot be done is left out.
+    skips: bool,
+    /// Whether only pages have something to say while it runs: then nothing of it ends the run.
+    is_page: bool,
+    /// The last step there is to make.
+    steps: u64,
+    state: State,
+    /// Whether anything was ever done.
+    is_used: bool,
+    /// Of the rank that speaks, where somebody wants them.
+    answers: Option<AnswersFile>,
+    /// Where what is done is kept, by one rank of a run that has a folder; opened when there is something.
+    kept_in: Option<PathBuf>,
+    record: Option<File>,
+    /// Contacts after the last step, where they are told.
+    contacts: Contacts,
+    failure: Option<RunError>,
+    /// After how many steps it was last said that the run waits.
+    waits_after: Option<u64>,
+    /// How long all of this took this rank, and what ranks sent each other for it.
+    pub(super) time: Duration,
+    pub(super) sent: Stats,
+}
+
+/// What the words of whoever drives a run are called in errors.
+const LIVE: &str = "what was said";
+
+impl Commander {
+    /// For a rank that begins, or goes on from the snapshot of the step `resumed`, which had this `state`.
+    ///
+    /// # Errors
+    /// If what is done or answered cannot be written down.
+    pub(super) fn start(
+        plan: &Plan,
+        rank: Rank,
+        (resumed, state): (Option<u64>, Option<State>),
+        world: &World,
+        transport: &mut impl Transport,
+    ) -> Result<Self, RankError> {
+        let commands = &plan.commands;
+        let from = resumed.unwrap_or(0);
+        let script = commands.to_come();
+        let lines: Vec<Line> =
+            script.map_or(&[][..], |script| &script.lines).iter().filter(|line| line.step >= from).cloned().collect();
+        let is_used = state.is_some();
+        let mut commander = Self {
+            rank,
+            next: 0,
+            lines,
+            source: script.map_or(String::new(), |script| script.path.display().to_string()),
+            skips: commands.skips,
+            is_page: !commands.drives,
+            steps: plan.config.run.steps,
+            state: match state {
+                Some(state) => state,
+                None => State::new(next_name(plan, world, transport)?),
+            },
+            is_used,
+            answers: None,
+            kept_in: plan.output.as_ref().map(|output| output.folder.commands()).filter(|_| rank == Rank(0)),
+            record: None,
+            contacts: Contacts::default(),
+            failure: None,
+            waits_after: None,
+            time: Duration::ZERO,
+            sent: Stats::default(),
+        };
+        if commander.state.tells_contacts {
+            commander.contacts = Contacts::of(world);
+        }
+        let opened = if rank == Rank(0) { commander.open(plan, from) } else { Ok(()) };
+        all_well(transport, opened.as_ref().err())?;
+        Ok(commander)
+    }
+
+    /// Opens what one rank writes.
+    fn open(&mut self, plan: &Plan, from: u64) -> Result<(), RunError> {
+        if let Some(path) = &plan.commands.answers {
+            let opened = AnswersFile::open(path, from);
+            self.answers = Some(opened.map_err(|error| not_written(path, &error))?);
+        }
+        let Some(path) = &self.kept_in else { return Ok(()) };
+        let text = plan.commands.record(from);
+        let written = match (text.is_empty(), path.exists()) {
+            (true, false) => Ok(()),
+            (true, true) => std::fs::remove_file(path),
+            (false, _) => write_durably(path, |file| file.write_all(text.as_bytes())),
+        };
+        written.map_err(|error| not_written(path, &error))
+    }
+
+    /// What a snapshot is to tell of it, if there is anything.
+    pub(super) fn state(&self) -> Option<&State> {
+        self.is_used.then_some(&self.state)
+    }
+
+    /// How many more bodies there are to be than at the start.
+    pub(super) fn added(&self) -> i64 {
+        self.state.added
+    }
+
+    /// Why the run cannot go on as it was asked to, if something could not be written.
+    pub(super) fn failure(&self) -> Option<&RunError> {
+        self.failure.as_ref()
+    }
+
+    /// Once no more steps are made: what could not be written ends all ranks alike, and what was not done is said.
+    ///
+    /// # Errors
+    /// That something could not be written, or a rank is lost.
+    pub(super) fn close(&self, transport: &mut impl Transport, observer: &Observer) -> Result<(), RankError> {
+        if self.rank == Rank(0)
+            && let [first, others @ ..] = &self.lines[self.next..]
+        {
+            let (rest, step) = (others.len() + 1, first.step);
+            let rest = if rest == 1 { "1 line is".to_owned() } else { format!("{rest} lines are") };
+            observer.note(&format!("{}: {rest} for steps from {step} on, which were not made", self.source));
+        }
+        all_well(transport, self.failure.as_ref()).map_err(Into::into)
+    }
+
+    /// Does what is planned for the step that is to be made next, and answers what is asked of the world as it is. Once all steps
+    /// are made nothing is done any more.
+    ///
+    /// # Errors
+    /// If a rank is lost, or something cannot be done and is not to be left out.
+    pub(super) fn take_turn<T: Transport>(
+        &mut self,
+        world: &mut World,
+        halo: &mut RankHalo<Counting<T>>,
+        observer: &Observer,
+    ) -> Result<(), RankError> {
+        let step = world.step_count();
+        let end = self.next + self.lines[self.next..].partition_point(|line| line.step <= step);
+        if self.next == end {
+            return Ok(());
+        }
+        let mut lines: Vec<Line> = self.lines[self.next..end].to_vec();
+        if step == self.steps {
+            // What is left is told of at the end.
+            self.lines.splice(self.next..end, lines.extract_if(.., |line| !matches!(line.action, Action::Ask(_))));
+        } else {
+            self.next = end;
+        }
+        let (begun, sent, source) = (Instant::now(), halo.transport().stats(), self.source.clone());
+        let done = self.obey(&lines, &source, world, halo.transport(), observer);
+        self.time += begun.elapsed();
+        self.sent += halo.transport().stats().since(&sent);
+        done
+    }
+
+    /// Does what whoever drives the run says, each line of bytes after its number.
+    ///
+    /// # Errors
+    /// As [`take_turn`](Self::take_turn).
+    pub(super) fn hear(
+        &mut self,
+        words: &[u8],
+        world: &mut World,
+        transport: &mut impl Transport,
+        observer: &Observer,
+    ) -> Result<(), RankError> {
+        let (source, step) = (LIVE, world.step_count());
+        for text in String::from_utf8_lossy(words).lines() {
+            let (number, text) = text.split_once('\t').unwrap_or(("0", text));
+            let line = parse(number.parse().unwrap_or(0), text).and_then(|line| match line.action {
+                _ if line.step != step => Err(format!("{} steps are made, and it is for step {}", step, line.step)),
+                _ => Ok(line),
+            });
+            match line {
+                Ok(line) if step >= self.steps && !matches!(line.action, Action::Ask(_)) => {
+                    let text =
+                        format!("{source}: line {}: all steps are made, and nothing can be done any more", line.number);
+                    self.tell(step, None, Answer::Refused(&text));
+                }
+                Ok(line) => {
+                    self.write_down(text);
+                    self.obey(&[line], source, world, transport, observer)?;
+                }
+                Err(reason) => self.refuse(source, number.parse().unwrap_or(0), step, &reason, observer)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells whoever drives the run that it is his turn.
+    pub(super) fn wait(&mut self, step: u64) {
+        if self.waits_after.replace(step) != Some(step) {
+            self.tell(step, None, Answer::Waits);
+        }
+    }
+
+    /// Keeps what was said, before it is done.
+    fn write_down(&mut self, text: &str) {
+        let Some(path) = &self.kept_in else { return };
+        let open = || OpenOptions::new().create(true).append(true).open(path);
+        let file = match &mut self.record {
+            Some(file) => Ok(file),
+            record => open().map(|file| record.insert(file)),
+        };
+        let written = file.and_then(|file| file.write_all(format!("{text}\n").as_bytes()));
+        if let Err(error) = written {
+            self.failure = Some(not_written(path, &error));
+        }
+    }
+
+    fn tell(&mut self, step: u64, name: Option<&str>, answer: Answer<'_>) {
+        if let Some(answers) = &mut self.answers
+            && let Err(error) = answers.add(&answer.to_line(step, name))
+        {
+            self.failure.get_or_insert(not_written(answers.path(), &error));
+        }
+    }
+
+    fn obey(
+        &mut self,
+        lines: &[Line],
+        source: &str,
+        world: &mut World,
+        transport: &mut impl Transport,
+        observer: &Observer,
+    ) -> Result<(), RankError> {
+        let done = self.obey_each(lines, source, world, transport, observer);
+        world.settle();
+        done
+    }
+
+    fn obey_each(
+        &mut self,
+        lines: &[Line],
+        source: &str,
+        world: &mut World,
+        transport: &mut impl Transport,
+        observer: &Observer,
+    ) -> Result<(), RankError> {
+        let step = world.step_count();
+        let mut present = find(lines, world, transport)?;
+        let mut asked: Vec<(&Line, &Question)> = Vec::new();
+        for line in lines {
+            if let Action::Ask(question) = &line.action {
+                asked.push((line, question));
+                continue;
+            }
+            self.answer(&std::mem::take(&mut asked), world, transport)?;
+            let commands = match &line.action {
+                Action::Add(bodies) => self.name(bodies),
+                Action::Do(commands) => commands.clone(),
+                Action::TellContacts(told) => {
+                    self.state.tells_contacts = *told;
+                    self.contacts = if *told { Contacts::of(world) } else { Contacts::default() };
+                    self.is_used = true;
+                    continue;
+                }
+                Action::Ask(_) => continue,
+            };
+            if let Err(reason) = check(&commands, &mut present, world) {
+                self.refuse(source, line.number, step, &reason, observer)?;
+                continue;
+            }
+            for command in &commands {
+                world.command(command).map_err(RankError::Setup)?;
+                self.state.note(command, step);
+                self.is_used = true;
+            }
+            if let Action::Add(bodies) = &line.action
+                && (line.name.is_some() || bodies.iter().any(|new| !new.is_named))
+            {
+                let ids: Vec<u64> = commands.iter().filter_map(added).map(|id| id.0).collect();
+                self.tell(step, line.name.as_deref(), Answer::Added(&ids));
+            }
+        }
+        self.answer(&asked, world, transport)
+    }
+
+    /// Bodies that have no name of their own get the next ones.
+    fn name(&self, bodies: &[NewBody]) -> Vec<Command> {
+        let mut next = self.state.next;
+        let named = |new: &NewBody| {
+            let mut body = new.body;
+            if !new.is_named {
+                body.id = GlobalId(next);
+            }
+            next = next.max(body.id.0.saturating_add(1));
+            Command::Add(body)
+        };
+        bodies.iter().map(named).collect()
+    }
+
+    fn refuse(
+        &mut self,
+        source: &str,
+        number: u64,
+        step: u64,
+        reason: &str,
+        observer: &Observer,
+    ) -> Result<(), RankError> {
+        let text = format!("{source}: line {number}: step {step}: {}", OneLine(reason));
+        self.tell(step, None, Answer::Refused(&text));
+        if self.skips || self.is_page && source == LIVE {
+            if self.rank == Rank(0) {
+                observer.note(&format!("{text}; left out"));
+            }
+            return Ok(());
+        }
+        let text = format!("{text}; mend it, or leave out what cannot be done by --skip-refused");
+        Err(RankError::Agreed { text, exit: Exit::Usage })
+    }
+
+    fn answer(
+        &mut self,
+        asked: &[(&Line, &Question)],
+        world: &World,
+        transport: &mut impl Transport,
+    ) -> Result<(), RankError> {
+        if asked.is_empty() {
+            return Ok(());
+        }
+        let own: Vec<Part> = asked.iter().map(|(_, question)| Part::of(question, world)).collect();
+        let own = serde_json::to_vec(&own).expect("numbers, under names");
+        let Some(parts) = transport.gather(Rank(0), &own).map_err(RankError::Transport)? else { return Ok(()) };
+        let mut joined: Option<Vec<Part>> = None;
+        for (rank, bytes) in parts.iter().enumerate() {
+            let lost = || RankError::Transport(unreadable(Rank::from_index(rank)));
+            let parts: Vec<Part> = serde_json::from_slice(bytes).map_err(|_| lost())?;
+            joined = Some(match joined {
+                Some(joined) => joined.into_iter().zip(parts).map(|(a, b)| a.join(b)).collect(),
+                None => parts,
+            });
+        }
+        for ((line, question), part) in asked.iter().zip(joined.unwrap_or_default()) {
+            self.tell(world.step_count(), line.name.as_deref(), Answer::To(question, &part));
+        }
+        Ok(())
+    }
+
+    /// Tells which contacts began and ended in the last step, where somebody wants to know.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn after_step<T: Transport>(
+        &mut self,
+        world: &World,
+        halo: &mut RankHalo<Counting<T>>,
+    ) -> Result<(), RankError> {
+        if !self.state.tells_contacts {
+            return Ok(());
+        }
+        let (begun, sent) = (Instant::now(), halo.transport().stats());
+        if let Some([began, ended]) = self.contacts.follow(world, halo.transport())?
+            && !(began.is_empty() && ended.is_empty())
+        {
+            self.tell(world.step_count(), None, Answer::Contacts { began: &began, ended: &ended });
+        }
+        self.time += begun.elapsed();
+        self.sent += halo.transport().stats().since(&sent);
+        Ok(())
+    }
+}
+
+fn not_written(path: &std::path::Path, error: &io::Error) -> RunError {
+    RunError::Output { path: path.to_owned(), reason: error.to_string() }
+}
+
+fn added(command: &Command) -> Option<GlobalId> {
+    if let Command::Add(body) = command { Some(body.id) } else { None }
+}

@@ -1,0 +1,90 @@
+//! Whether commands can be done: which of the bodies that they speak of there are, whoever holds them; and which names are free.
+
+use super::super::{RankError, records, unreadable};
+use crate::command::{Action, Line};
+use crate::plan::Plan;
+use atoll_core::{Command, GlobalId, World};
+use atoll_transport::{Collective, Rank, Transport};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// For each body that is spoken of whether there is one.
+pub(super) type Present = BTreeMap<GlobalId, bool>;
+
+/// The body that a command is about, if there is one that must be there.
+fn subject(command: &Command) -> Option<GlobalId> {
+    match *command {
+        Command::Remove(id)
+        | Command::SetVelocity { id, .. }
+        | Command::Impulse { id, .. }
+        | Command::Force { id, .. }
+        | Command::SetKind { id, .. }
+        | Command::Wake(id) => Some(id),
+        Command::Add(_) | Command::AddKind(_) | Command::SetGravity(_) => None,
+    }
+}
+
+/// Which of all bodies that lines speak of there are.
+pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport) -> Result<Present, RankError> {
+    let mut ids = BTreeSet::new();
+    for line in lines {
+        match &line.action {
+            Action::Add(bodies) => ids.extend(bodies.iter().filter(|new| new.is_named).map(|new| new.body.id)),
+            Action::Do(commands) => ids.extend(commands.iter().filter_map(subject)),
+            Action::Ask(_) | Action::TellContacts(_) => {}
+        }
+    }
+    if ids.is_empty() {
+        return Ok(Present::new());
+    }
+    let mut own: Vec<u8> = ids.iter().map(|&id| u8::from(world.get(id).is_some())).collect();
+    if transport.size() > 1 {
+        for (rank, told) in transport.all_gather(&own.clone()).map_err(RankError::Transport)?.iter().enumerate() {
+            if told.len() != own.len() {
+                return Err(RankError::Transport(unreadable(Rank::from_index(rank))));
+            }
+            own.iter_mut().zip(told).for_each(|(own, told)| *own |= told);
+        }
+    }
+    Ok(ids.into_iter().zip(own).map(|(id, is_there)| (id, is_there != 0)).collect())
+}
+
+/// Whether all of these can be done, one after the other; `present` goes on with what is there afterwards. The error is why not.
+pub(super) fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(), String> {
+    let mut before: Vec<(GlobalId, Option<bool>)> = Vec::new();
+    for command in commands {
+        let is_there = |id: &GlobalId| present.get(id) == Some(&true);
+        let checked = world.check(command).map_err(|error| error.to_string()).and_then(|()| match command {
+            Command::Add(body) if is_there(&body.id) => {
+                Err(format!("there is a body {} already; give each a name of its own, or none", body.id))
+            }
+            command => match subject(command) {
+                Some(id) if !is_there(&id) => Err(format!("there is no body {id}")),
+                _ => Ok(()),
+            },
+        });
+        match command {
+            _ if checked.is_err() => {}
+            Command::Add(body) => before.push((body.id, present.insert(body.id, true))),
+            Command::Remove(id) => before.push((*id, present.insert(*id, false))),
+            _ => {}
+        }
+        if let Err(reason) = checked {
+            for (id, was) in before.into_iter().rev() {
+                match was {
+                    Some(was) => present.insert(id, was),
+                    None => present.remove(&id),
+                };
+            }
+            return Err(reason);
+        }
+    }
+    Ok(())
+}
+
+/// A name above all that there are.
+pub(super) fn next_name(plan: &Plan, world: &World, transport: &mut impl Transport) -> Result<u64, RankError> {
+    let own = world.bodies().map(|body| body.id).chain(plan.blueprint.statics.iter().map(|fixed| fixed.id)).max();
+    let own = own.map_or(0, |id| id.0.saturating_add(1));
+    let told = transport.all_gather(&own.to_le_bytes()).map_err(RankError::Transport)?;
+    Ok(records::<u64>(&told).map_err(RankError::Transport)?.into_iter().max().unwrap_or_default())
+}

@@ -1,0 +1,69 @@
+//! Everything that is wrong with the rows of a scene, and what there is in it.
+
+use super::super::SceneError;
+use super::SceneFile;
+use atoll_core::GlobalId;
+use glam::DVec2;
+use std::path::Path;
+
+/// What was found in a scene.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// Bodies of each kind.
+    pub(crate) by_kind: Vec<u64>,
+    /// Low and high corner of where their centers are, in meters, if there are any.
+    pub(crate) extent: Option<(DVec2, DVec2)>,
+    /// The least and the greatest id.
+    pub(crate) ids: Option<[GlobalId; 2]>,
+    /// Bodies that are outside of the domain.
+    pub(crate) outside: u64,
+    /// How much was wrong with it.
+    pub(crate) faults: u64,
+}
+
+impl SceneFile {
+    /// Looks at all of a scene. Tells of each fault in its rows; of ids that are there twice once all are known, and of those
+    /// only the first. Takes eight bytes for each body.
+    ///
+    /// # Errors
+    /// If there is something wrong that keeps the rows from being read.
+    pub(crate) fn check(path: &Path, mut tell: impl FnMut(SceneError)) -> Result<(Self, Found), SceneError> {
+        let (mut scene, told) = Self::begin(path)?;
+        let mut found = Found { by_kind: vec![0; scene.kinds().len()], extent: None, ids: None, outside: 0, faults: 0 };
+        let (low, high) = scene.domain();
+        let mut ids = Vec::new();
+        let mut rows = 0;
+        for body in scene.iter() {
+            rows += 1;
+            match body {
+                Ok(body) => {
+                    let place = body.position;
+                    let (least, most) = found.extent.unwrap_or((place, place));
+                    found.extent = Some((least.min(place), most.max(place)));
+                    found.by_kind[body.kind.0 as usize] += 1;
+                    found.outside += u64::from(!(place.cmpge(low).all() && place.cmple(high).all()));
+                    ids.push(body.id);
+                }
+                Err(error) => {
+                    found.faults += 1;
+                    tell(error);
+                }
+            }
+        }
+        scene.count = rows;
+        ids.sort_unstable();
+        if let Some(pair) = ids.windows(2).find(|pair| pair[0] == pair[1]) {
+            found.faults += 1;
+            tell(scene.doubled(pair[0]));
+        }
+        found.ids = ids.first().copied().zip(ids.last().copied()).map(|(least, most)| [least, most]);
+        let last = ids.last().map(|id| id.0);
+        for wrong in [scene.check_count(told), scene.name_statics(last)] {
+            if let Err(error) = wrong {
+                found.faults += 1;
+                tell(error);
+            }
+        }
+        Ok((scene, found))
+    }
+}

@@ -1,0 +1,303 @@
+//! Scenes that users write: a file of TOML, `format = "atoll-scene/1"`, and perhaps one with the bodies, as CSV or Parquet.
+//!
+//! Bodies are read again by whoever needs them, never all kept, unless they stand in the TOML itself. Nothing in any file is
+//! trusted. `docs/worlds.md` shows the format.
+
+mod check;
+mod csv_rows;
+mod description;
+mod digest;
+mod entries;
+mod footer;
+mod inline;
+mod parquet_file;
+mod parquet_rows;
+#[cfg(test)]
+mod parquet_tests;
+mod row;
+#[cfg(test)]
+mod tests;
+pub(crate) mod write;
+
+pub(crate) use check::Found;
+pub(crate) use description::is_scene;
+pub(crate) use digest::of_file as digest_of_file;
+pub(super) use row::{FARTHEST, is_turn};
+
+use super::{Place, SceneError};
+use atoll_core::{Body, GlobalId, Kind, StaticBody};
+use csv_rows::CsvRows;
+use description::{Bodies, Description};
+use glam::DVec2;
+use parquet_file::ParquetFile;
+use parquet_rows::ParquetRows;
+use row::{Column, Scenery};
+use std::fs::{self, File};
+use std::io::Read;
+use std::iter;
+use std::path::{Path, PathBuf};
+use toml::Table;
+
+/// The text of a scene may have so many bytes: more bodies belong into a file of their own.
+const LONGEST_TEXT: u64 = 64 << 20;
+
+/// The files of a scene, opened and checked but for the rows of a Parquet file, which are checked as they are read.
+#[derive(Debug)]
+pub struct SceneFile {
+    path: PathBuf,
+    digest: String,
+    description: Description,
+    /// With the ids they go by.
+    statics: Vec<StaticBody>,
+    static_ids: Vec<GlobalId>,
+    rows: Rows,
+    count: u64,
+}
+
+/// Where bodies come from.
+#[derive(Debug)]
+enum Rows {
+    Inline(Vec<Body>),
+    Csv(PathBuf),
+    Parquet(Box<ParquetFile>),
+}
+
+/// Bodies as they are read.
+pub(crate) type BodyIter<'a> = Box<dyn Iterator<Item = Result<Body, SceneError>> + 'a>;
+
+impl SceneFile {
+    /// Opens a scene. Rows of CSV are all looked at, those of Parquet where something must be known of all of them.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or holds what cannot be.
+    pub fn open(path: &Path) -> Result<Self, SceneError> {
+        let (mut scene, told) = Self::begin(path)?;
+        let last = scene.look_through()?;
+        scene.check_count(told)?;
+        scene.name_statics(last)?;
+        Ok(scene)
+    }
+
+    /// Opens a scene without a look at its rows. Gives also how many there are to be, if its text says so.
+    fn begin(path: &Path) -> Result<(Self, Option<u64>), SceneError> {
+        let text = read_text(path)?;
+        let description = Description::read(path, &text)?;
+        let mut told = None;
+        let mut static_ids: Vec<GlobalId> = Vec::new();
+        if description.are_named {
+            static_ids = description.statics.iter().map(|fixed| fixed.id).collect();
+            static_ids.sort_unstable();
+        }
+        let scenery =
+            Scenery { file: path, kinds: &description.kinds, names: &description.names, static_ids: &static_ids };
+        let (rows, digest) = match &description.bodies {
+            Bodies::Inline(tables) => {
+                let (bodies, _) = inline::read(path, tables, &scenery)?;
+                (Rows::Inline(bodies), digest::of_scene(&text, None)?)
+            }
+            Bodies::File { path: bodies, xxh3, count } => {
+                let file = path.parent().unwrap_or(Path::new("")).join(bodies);
+                told = *count;
+                check_regular(&file, "these bodies")?;
+                let digest = digest::of_scene(&text, Some((&file, xxh3.as_deref())))?;
+                match file.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase).as_deref()
+                {
+                    Some("csv") => (Rows::Csv(file), digest),
+                    Some("parquet") => (Rows::Parquet(Box::new(ParquetFile::open(&file)?)), digest),
+                    _ => {
+                        let place = Place { name: Some(format!("[bodies], path = {bodies:?}")), ..Place::default() };
+                        return Err(SceneError::bad(path, place, "must end in .csv or .parquet, by what the file is"));
+                    }
+                }
+            }
+        };
+        let statics = description.statics.clone();
+        Ok((Self { path: path.to_owned(), digest, description, statics, static_ids, rows, count: 0 }, told))
+    }
+
+    /// Compares the rows there are with what the text says.
+    fn check_count(&self, told: Option<u64>) -> Result<(), SceneError> {
+        let Some(told) = told.filter(|told| *told != self.count) else { return Ok(()) };
+        let place = Place { name: Some(format!("[bodies], count = {told}")), ..Place::default() };
+        let reason = format!("the file has {} rows; bring back the one that was meant, or mend the count", self.count);
+        Err(SceneError::bad(&self.path, place, reason))
+    }
+
+    /// Counts the bodies. Gives the greatest of their ids, if there are any and statics are to be called by it.
+    fn look_through(&mut self) -> Result<Option<u64>, SceneError> {
+        let wants_last = !self.statics.is_empty() && !self.description.are_named;
+        let (count, last) = match &self.rows {
+            Rows::Parquet(parquet) if !wants_last => (parquet.rows, None),
+            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) => (parquet.rows, parquet.rows.checked_sub(1)),
+            _ => {
+                let (mut count, mut last) = (0, None);
+                for body in self.iter() {
+                    count += 1;
+                    last = last.max(Some(body?.id.0));
+                }
+                (count, last)
+            }
+        };
+        self.count = count;
+        Ok(last)
+    }
+
+    /// Statics without ids of their own get those above all bodies.
+    fn name_statics(&mut self, last: Option<u64>) -> Result<(), SceneError> {
+        if self.description.are_named {
+            return Ok(());
+        }
+        let first = last.map_or(Some(0), |last| last.checked_add(1));
+        let end = first.and_then(|first| first.checked_add(self.statics.len() as u64));
+        let Some((first, _)) = first.zip(end) else {
+            let reason = "there are no ids left above those of the bodies; give statics ids of their own";
+            return Err(SceneError::bad(
+                &self.path,
+                Place { name: Some("[[statics]]".to_owned()), ..Place::default() },
+                reason,
+            ));
+        };
+        for (id, fixed) in (first..).zip(&mut self.statics) {
+            fixed.id = GlobalId(id);
+        }
+        self.static_ids = self.statics.iter().map(|fixed| fixed.id).collect();
+        Ok(())
+    }
+
+    /// Where its text is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The file with the bodies, if they have one of their own.
+    pub fn bodies_path(&self) -> Option<&Path> {
+        match &self.rows {
+            Rows::Inline(_) => None,
+            Rows::Csv(path) => Some(path),
+            Rows::Parquet(parquet) => Some(&parquet.path),
+        }
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> Option<&str> {
+        self.description.name.as_deref()
+    }
+
+    /// What tells its content from that of others, as 32 hexadecimal digits: the same wherever it lies.
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// How many dynamic bodies there are.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// What it says of the physics, as a configuration would.
+    pub(crate) fn physics(&self) -> &Table {
+        &self.description.physics
+    }
+
+    pub(crate) fn kinds(&self) -> &[Kind] {
+        &self.description.kinds
+    }
+
+    /// What its kinds are called.
+    pub(crate) fn kind_names(&self) -> &[Option<String>] {
+        &self.description.names
+    }
+
+    pub(crate) fn statics(&self) -> &[StaticBody] {
+        &self.statics
+    }
+
+    pub(crate) fn domain(&self) -> (DVec2, DVec2) {
+        self.description.domain
+    }
+
+    fn scenery<'a>(&'a self, file: &'a Path) -> Scenery<'a> {
+        let Description { kinds, names, .. } = &self.description;
+        Scenery { file, kinds, names, static_ids: &self.static_ids }
+    }
+
+    /// All bodies, in the order of the file.
+    pub(super) fn iter(&self) -> BodyIter<'_> {
+        self.near(|_, _| true)
+    }
+
+    /// The bodies in any place that `meets` says yes to, in the order of the file.
+    pub(super) fn near<'a>(&'a self, meets: impl Fn(DVec2, DVec2) -> bool + 'a) -> BodyIter<'a> {
+        let all: BodyIter<'a> = match &self.rows {
+            Rows::Inline(bodies) => Box::new(bodies.iter().copied().map(Ok)),
+            Rows::Csv(path) => or_error(CsvRows::open(self.scenery(path))),
+            Rows::Parquet(parquet) => or_error(ParquetRows::open(parquet, Some(self.scenery(&parquet.path)), &meets)),
+        };
+        let is_near = move |body: &Result<Body, SceneError>| {
+            body.as_ref().map_or(true, |body| meets(body.position, body.position))
+        };
+        Box::new(all.filter(is_near))
+    }
+
+    /// Where all bodies are.
+    pub(super) fn places(&self) -> Box<dyn Iterator<Item = Result<DVec2, SceneError>> + '_> {
+        let all = match &self.rows {
+            Rows::Parquet(parquet) => or_error(ParquetRows::open(parquet, None, |_, _| true)),
+            _ => self.iter(),
+        };
+        Box::new(all.map(|body| body.map(|body| body.position)))
+    }
+
+    /// That two bodies have this id, with the rows they stand in.
+    pub(super) fn doubled(&self, id: GlobalId) -> SceneError {
+        let rows =
+            (1_u64..).zip(self.iter()).filter_map(|(row, body)| body.is_ok_and(|body| body.id == id).then_some(row));
+        let rows: Vec<u64> = rows.take(2).collect();
+        let place = Place { row: rows.get(1).copied(), name: Some(format!("id = {id}")), ..Place::default() };
+        let first = rows.first().map_or("another body".to_owned(), |row| format!("the body of row {row}"));
+        let reason = format!("{first} has this id as well; give each its own, or leave the column id out");
+        SceneError::bad(self.bodies_path().unwrap_or(&self.path), place, reason)
+    }
+
+    /// That not all of its bodies came into the world.
+    pub(super) fn lost(&self, found: u64) -> SceneError {
+        let reason = format!(
+            "{found} of its {} bodies were found: what it says of where they are is not so, or it was changed meanwhile; write \
+             it again",
+            self.count
+        );
+        SceneError::whole(self.bodies_path().unwrap_or(&self.path), reason)
+    }
+}
+
+/// What there is to read, or why there is nothing.
+fn or_error<'a>(rows: Result<impl Iterator<Item = Result<Body, SceneError>> + 'a, SceneError>) -> BodyIter<'a> {
+    match rows {
+        Ok(rows) => Box::new(rows),
+        Err(error) => Box::new(iter::once(Err(error))),
+    }
+}
+
+/// The text of a scene's file.
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    const WHAT: &str = "this scene";
+    let length = check_regular(path, WHAT)?;
+    if length > LONGEST_TEXT {
+        let reason =
+            format!("it has {length} bytes, and at most {LONGEST_TEXT} are read; put bodies into a file of their own");
+        return Err(SceneError::whole(path, reason));
+    }
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(LONGEST_TEXT).read_to_end(&mut bytes));
+    read.map_err(|error| SceneError::read(path, WHAT, error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let line = error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|&&byte| byte == b'\n').count();
+        let place = Place { line: Some(line as u64 + 1), ..Place::default() };
+        SceneError::bad(path, place, "it is not UTF-8; save the file as that")
+    })
+}
+
+/// How long a file is that is none of the system's.
+fn check_regular(path: &Path, what: &'static str) -> Result<u64, SceneError> {
+    let data = fs::metadata(path).map_err(|error| SceneError::read(path, what, error))?;
+    if data.is_file() { Ok(data.len()) } else { Err(SceneError::read(path, what, "it is no regular file; name one")) }
+}

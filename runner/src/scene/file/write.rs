@@ -1,0 +1,245 @@
+//! Writes a world as the files of a scene. What is read again has the same bits.
+
+use super::description::FORMAT;
+use super::row::Column;
+use crate::wording::shortest;
+use atoll_core::{Body, Kind, Material, Rot, Shape, StaticBody};
+use glam::{DVec2, Vec2};
+use parquet::basic::{Compression, Encoding};
+use parquet::data_type::{DoubleType, FloatType, Int32Type, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
+use parquet::schema::types::ColumnPath;
+use std::fmt::Write as _;
+use std::io::{self, BufWriter, Write};
+use std::sync::Arc;
+use toml::Value;
+
+/// Rows of a group: the least that is read where only some bodies are wanted.
+const IN_A_GROUP: usize = 1 << 16;
+
+/// Cells along an axis by which bodies are brought in an order in which neighbours stand near each other.
+const CELLS: f64 = 4096.0;
+
+/// Everything about a world but its bodies.
+#[derive(Clone, Debug)]
+pub(crate) struct World<'a> {
+    pub(crate) name: Option<&'a str>,
+    pub(crate) domain: (DVec2, DVec2),
+    /// Keys of `[physics]`.
+    pub(crate) physics: Vec<(&'static str, Value)>,
+    pub(crate) kinds: &'a [Kind],
+    /// What kinds are called, or nothing at all.
+    pub(crate) names: &'a [Option<String>],
+    pub(crate) statics: &'a [StaticBody],
+}
+
+/// The file with the bodies.
+#[derive(Clone, Debug)]
+pub(crate) struct BodiesFile<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) xxh3: &'a str,
+    pub(crate) count: u64,
+}
+
+/// The text of a scene.
+pub(crate) fn text(world: &World<'_>, bodies: &BodiesFile<'_>) -> String {
+    let mut text = format!("format = {}\n", Value::from(FORMAT));
+    let mut line = |line: &str| writeln!(text, "{line}").expect("a string takes any text");
+    if let Some(name) = world.name {
+        line(&format!("name = {}", Value::from(name)));
+    }
+    let (low, high) = world.domain;
+    let corner = |point: DVec2| Value::from(point.to_array().to_vec());
+    line(&format!("domain = {}", Value::from(vec![corner(low), corner(high)])));
+    if !world.physics.is_empty() {
+        line("\n[physics]");
+        world.physics.iter().for_each(|(key, value)| line(&format!("{key} = {value}")));
+    }
+    for (number, kind) in world.kinds.iter().enumerate() {
+        line("\n[[kinds]]");
+        if let Some(Some(name)) = world.names.get(number) {
+            line(&format!("name = {}", Value::from(name.as_str())));
+        }
+        kind_lines(kind, &mut line);
+    }
+    for StaticBody { id, position, rotation, kind } in world.statics {
+        line("\n[[statics]]");
+        line(&format!("id = {id}"));
+        kind_lines(kind, &mut line);
+        line(&format!("x = {}\ny = {}", Value::from(position.x), Value::from(position.y)));
+        if !is_same(*rotation, Rot::IDENTITY) {
+            line(&match angle(*rotation) {
+                Some(angle) => format!("angle = {}", float(angle)),
+                None => format!("cos = {}\nsin = {}", float(rotation.c), float(rotation.s)),
+            });
+        }
+    }
+    let BodiesFile { name, xxh3, count } = *bodies;
+    line(&format!("\n[bodies]\npath = {}\nxxh3 = \"{xxh3}\"\ncount = {count}", Value::from(name)));
+    text
+}
+
+fn kind_lines(kind: &Kind, line: &mut impl FnMut(&str)) {
+    let Kind { shape, material: Material { density, friction, restitution } } = *kind;
+    line(&match shape {
+        // Twice a half is exact, and so is half of that.
+        Shape::Box { half } => {
+            format!("shape = \"box\"\nwidth = {}\nheight = {}", float(2.0 * half.x), float(2.0 * half.y))
+        }
+        Shape::Circle { radius } => format!("shape = \"circle\"\nradius = {}", float(radius)),
+    });
+    let material = format!("density = {}\nfriction = {}", float(density), float(friction));
+    line(&format!("{material}\nrestitution = {}", float(restitution)));
+}
+
+fn float(number: f32) -> Value {
+    Value::Float(shortest(number))
+}
+
+/// The angle that leads back to the same rotation, bit for bit, if there is one.
+fn angle(rotation: Rot) -> Option<f32> {
+    let angle = rotation.angle();
+    is_same(Rot::from_angle(angle), rotation).then_some(angle)
+}
+
+fn is_same(a: Rot, b: Rot) -> bool {
+    bytemuck::bytes_of(&a) == bytemuck::bytes_of(&b)
+}
+
+/// Brings bodies in the order of a Hilbert curve over the domain, so that those of a group of rows are near each other.
+pub(crate) fn sort_in_space(bodies: &mut [Body], (low, high): (DVec2, DVec2)) {
+    let cell = |body: &Body| {
+        let [x, y] =
+            ((body.position - low) / (high - low) * CELLS).clamp(DVec2::ZERO, DVec2::splat(CELLS - 1.0)).to_array();
+        hilbert(x as u32, y as u32)
+    };
+    bodies.sort_by_cached_key(|body| (cell(body), body.id));
+}
+
+/// The place of a cell on the curve.
+fn hilbert(mut x: u32, mut y: u32) -> u32 {
+    let (mut place, mut side) = (0, CELLS as u32 / 2);
+    while side > 0 {
+        let (right, upper) = (u32::from(x & side > 0), u32::from(y & side > 0));
+        place += side * side * ((3 * right) ^ upper);
+        if upper == 0 {
+            if right == 1 {
+                (x, y) = (CELLS as u32 - 1 - x, CELLS as u32 - 1 - y);
+            }
+            (x, y) = (y, x);
+        }
+        side /= 2;
+    }
+    place
+}
+
+/// The columns that these bodies need: angles, unless some rotation is none that an angle leads to.
+fn columns(bodies: &[Body]) -> Vec<Column> {
+    let turned = bodies.iter().any(|body| angle(body.rotation).is_none());
+    let is_needed = |column: &Column| match column {
+        Column::Angle => !turned,
+        Column::Cos | Column::Sin => turned,
+        _ => true,
+    };
+    Column::ALL.into_iter().filter(is_needed).collect()
+}
+
+/// Writes bodies as CSV: each number as the shortest decimal that leads back to its bits.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn csv(out: impl Write, bodies: &[Body]) -> io::Result<()> {
+    let (columns, mut out) = (columns(bodies), BufWriter::new(out));
+    let names: Vec<&str> = columns.iter().map(|column| column.name()).collect();
+    writeln!(out, "{}", names.join(","))?;
+    for Body { id, position, rotation, velocity: Vec2 { x: vx, y: vy }, angular_velocity, kind } in bodies {
+        write!(out, "{id},{},{:?},{:?}", kind.0, position.x, position.y)?;
+        if columns.contains(&Column::Angle) {
+            write!(out, ",{:?}", rotation.angle())?;
+        } else {
+            write!(out, ",{:?},{:?}", rotation.c, rotation.s)?;
+        }
+        writeln!(out, ",{vx:?},{vy:?},{angular_velocity:?}")?;
+    }
+    out.flush()
+}
+
+/// Writes bodies as Parquet, in groups that say where their bodies are.
+///
+/// # Errors
+/// What the library or the system says.
+pub(crate) fn parquet(out: impl Write + Send, bodies: &[Body]) -> io::Result<()> {
+    write_groups(BufWriter::new(out), bodies).map_err(|error| match error {
+        ParquetError::External(error) => io::Error::other(error.to_string()),
+        error => io::Error::other(error),
+    })
+}
+
+fn write_groups(out: impl Write + Send, bodies: &[Body]) -> Result<(), ParquetError> {
+    let columns = columns(bodies);
+    let field = |column: &Column| {
+        let form = match column {
+            Column::Id => "int64 id (INTEGER(64, false))",
+            Column::Kind => "int32 kind (INTEGER(32, false))",
+            Column::X | Column::Y => return format!("required double {};", column.name()),
+            _ => return format!("required float {};", column.name()),
+        };
+        format!("required {form};")
+    };
+    let schema = format!("message atoll {{ {} }}", columns.iter().map(field).collect::<String>());
+    let mut properties = WriterProperties::builder()
+        .set_created_by(concat!("atoll version ", env!("CARGO_PKG_VERSION")).to_owned())
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::None)
+        .set_compression(Compression::SNAPPY);
+    for column in &columns {
+        let path = ColumnPath::from(column.name());
+        properties = match column {
+            Column::Id => properties.set_column_encoding(path.clone(), Encoding::DELTA_BINARY_PACKED),
+            Column::Kind => properties.set_column_dictionary_enabled(path.clone(), true),
+            _ => properties.set_column_encoding(path.clone(), Encoding::BYTE_STREAM_SPLIT),
+        };
+        if matches!(column, Column::Id | Column::X | Column::Y) {
+            properties = properties.set_column_statistics_enabled(path, EnabledStatistics::Chunk);
+        }
+    }
+    let schema = Arc::new(parse_message_type(&schema)?);
+    let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties.build()))?;
+    for bodies in bodies.chunks(IN_A_GROUP) {
+        let mut group = writer.next_row_group()?;
+        for column in &columns {
+            let mut next =
+                group.next_column()?.ok_or_else(|| ParquetError::General("a column is missing".to_owned()))?;
+            let floats = |read: fn(&Body) -> f32| bodies.iter().map(read).collect::<Vec<f32>>();
+            let doubles = |read: fn(&Body) -> f64| bodies.iter().map(read).collect::<Vec<f64>>();
+            match column {
+                Column::Id => {
+                    let ids: Vec<i64> = bodies.iter().map(|body| body.id.0.cast_signed()).collect();
+                    next.typed::<Int64Type>().write_batch(&ids, None, None)
+                }
+                Column::Kind => {
+                    let kinds: Vec<i32> = bodies.iter().map(|body| body.kind.0.cast_signed()).collect();
+                    next.typed::<Int32Type>().write_batch(&kinds, None, None)
+                }
+                Column::X => next.typed::<DoubleType>().write_batch(&doubles(|body| body.position.x), None, None),
+                Column::Y => next.typed::<DoubleType>().write_batch(&doubles(|body| body.position.y), None, None),
+                Column::Angle => {
+                    next.typed::<FloatType>().write_batch(&floats(|body| body.rotation.angle()), None, None)
+                }
+                Column::Cos => next.typed::<FloatType>().write_batch(&floats(|body| body.rotation.c), None, None),
+                Column::Sin => next.typed::<FloatType>().write_batch(&floats(|body| body.rotation.s), None, None),
+                Column::Vx => next.typed::<FloatType>().write_batch(&floats(|body| body.velocity.x), None, None),
+                Column::Vy => next.typed::<FloatType>().write_batch(&floats(|body| body.velocity.y), None, None),
+                Column::Omega => {
+                    next.typed::<FloatType>().write_batch(&floats(|body| body.angular_velocity), None, None)
+                }
+            }?;
+            next.close()?;
+        }
+        group.close()?;
+    }
+    writer.close().map(drop)
+}

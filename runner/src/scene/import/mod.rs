@@ -1,0 +1,132 @@
+//! Worlds that other programs have saved: what of them there is here, and what there is no counterpart for.
+
+mod lammps;
+mod rube;
+
+use super::SceneError;
+use super::file::write::World;
+use super::file::{FARTHEST, is_turn};
+use atoll_core::{Body, GlobalId, Kind, Material, Rot, Shape, StaticBody};
+use glam::DVec2;
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
+use std::path::Path;
+use toml::Value;
+
+/// Longer files are not read.
+const LONGEST: u64 = 4 << 30;
+
+/// A world as it is made up from another program's.
+#[derive(Default, Debug)]
+pub(crate) struct Imported {
+    domain: (DVec2, DVec2),
+    gravity: Option<[f64; 2]>,
+    kinds: Vec<Kind>,
+    names: Vec<Option<String>>,
+    statics: Vec<StaticBody>,
+    pub(crate) bodies: Vec<Body>,
+    rows: HashMap<[u32; 7], u32>,
+    left_out: BTreeMap<&'static str, u64>,
+}
+
+/// Reads a file of another program.
+///
+/// # Errors
+/// If it cannot be read, or is none of those that are known.
+pub(crate) fn read(path: &Path) -> Result<Imported, SceneError> {
+    const WHAT: &str = "this world";
+    let data = fs::metadata(path).map_err(|error| SceneError::read(path, WHAT, error))?;
+    if !data.is_file() || data.len() > LONGEST {
+        return Err(SceneError::read(path, WHAT, "it is no regular file of at most 4 GiB; name one"));
+    }
+    let bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))?;
+    if text.trim_start().starts_with('{') { rube::read(path, &text) } else { lammps::read(path, &text) }
+}
+
+/// Whether a file of another program can be read; whatever it is, it is refused in one line or makes a world.
+///
+/// # Errors
+/// As with reading it.
+pub fn check(path: &Path) -> Result<(), SceneError> {
+    read(path).map(drop)
+}
+
+impl Imported {
+    /// What there was no counterpart for, in words; nothing if all is there.
+    pub(crate) fn left_out(&self) -> Option<String> {
+        let parts: Vec<String> = self.left_out.iter().map(|(what, count)| format!("{count} {what}")).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    /// All but the bodies.
+    pub(crate) fn world<'a>(&'a self, name: &'a str) -> World<'a> {
+        let gravity = self.gravity.map(|gravity| ("gravity", Value::from(gravity.to_vec())));
+        World {
+            name: Some(name),
+            domain: self.domain,
+            physics: gravity.into_iter().collect(),
+            kinds: &self.kinds,
+            names: &self.names,
+            statics: &self.statics,
+        }
+    }
+
+    fn leave_out(&mut self, what: &'static str, count: u64) {
+        if count > 0 {
+            *self.left_out.entry(what).or_default() += count;
+        }
+    }
+
+    /// The row of a kind in the table; those of different groups stay apart, so that their materials can be told apart later.
+    fn row(&mut self, kind: Kind, group: u32, name: impl FnOnce() -> Option<String>) -> u32 {
+        let (tag, x, y) = match kind.shape {
+            Shape::Box { half } => (0, half.x, half.y),
+            Shape::Circle { radius } => (1, radius, 0.0),
+        };
+        let Material { density, friction, restitution } = kind.material;
+        let numbers = [x, y, density, friction, restitution].map(f32::to_bits);
+        let key = [tag, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], group];
+        *self.rows.entry(key).or_insert_with(|| {
+            let name = name().filter(|name| !self.names.iter().any(|other| other.as_ref() == Some(name)));
+            self.kinds.push(kind);
+            self.names.push(name);
+            self.kinds.len() as u32 - 1
+        })
+    }
+
+    /// Refuses numbers that no world can have.
+    fn check(&self, path: &Path) -> Result<(), SceneError> {
+        let refuse = |what: String| Err(SceneError::whole(path, what));
+        let is_place = |place: DVec2| place.is_finite() && place.abs().cmple(DVec2::splat(FARTHEST)).all();
+        if let Some(at) = self.kinds.iter().position(|kind| !kind.is_valid()) {
+            return refuse(format!("it has a shape or a material that cannot be: {:?}", self.kinds[at]));
+        }
+        let is_good = |place: DVec2, rotation: Rot| is_place(place) && is_turn(rotation);
+        if let Some(fixed) =
+            self.statics.iter().find(|fixed| !is_good(fixed.position, fixed.rotation) || !fixed.kind.is_valid())
+        {
+            return refuse(format!("static {} has a number that cannot be; positions must be within 1e9 m", fixed.id));
+        }
+        let moves = |body: &Body| body.velocity.is_finite() && body.angular_velocity.is_finite();
+        if let Some(body) = self.bodies.iter().find(|body| !is_good(body.position, body.rotation) || !moves(body)) {
+            return refuse(format!("body {} has a number that cannot be; positions must be within 1e9 m", body.id));
+        }
+        let (low, high) = self.domain;
+        if !(is_place(low) && is_place(high) && low.cmplt(high).all()) {
+            return refuse(
+                "its bounds are none of a domain: low ones must be below high ones, all within 1e9 m".to_owned(),
+            );
+        }
+        let mut ids: Vec<GlobalId> = self.bodies.iter().map(|body| body.id).collect();
+        ids.sort_unstable();
+        match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => refuse(format!("id {} is there twice; give each its own", pair[0])),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
