@@ -172,6 +172,24 @@ impl Browser {
         }
     }
 
+    /// Presses at a place of the page, waits until an expression is true, and lets go at another place.
+    ///
+    /// # Panics
+    /// As [`wait_for`](Self::wait_for).
+    pub fn drag(&mut self, from: [f64; 2], to: [f64; 2], holds: &str) {
+        let tell = |browser: &mut Self, kind: &str, [x, y]: [f64; 2]| {
+            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1 });
+            browser.call("Input.dispatchMouseEvent", event);
+        };
+        tell(self, "mousePressed", from);
+        self.wait_for(holds);
+        for part in 1..=4 {
+            let at = [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * f64::from(part) / 4.0);
+            tell(self, "mouseMoved", at);
+        }
+        tell(self, "mouseReleased", to);
+    }
+
     /// Turns the wheel at a place of the page, so many pixels downwards.
     pub fn wheel(&mut self, [x, y]: [f64; 2], down: f64) {
         let event = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": down });

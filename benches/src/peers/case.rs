@@ -4,7 +4,7 @@ use super::Failure;
 use super::given::{Corners, Given};
 use ::atoll::Config;
 use ::atoll::internals::Plan;
-use ::atoll_core::{Blueprint, Body};
+use ::atoll_core::{Blueprint, Body, GlobalId};
 use clap::ValueEnum;
 use std::fmt;
 
@@ -109,11 +109,12 @@ impl Given for Case {
     }
 
     fn bodies(&self) -> impl Iterator<Item = Body> {
-        self.plan.scene.iter()
+        self.plan.scene.iter().map(|body| body.expect("scenes of this crate are made, not read"))
     }
 
     fn home(&self, index: u64) -> Corners {
-        let (low, high) = self.plan.scene.home(index);
+        let id = GlobalId(self.plan.scene.statics().len() as u64 + index);
+        let (low, high) = self.plan.scene.home(id).expect("one of this scene");
         [low.to_array(), high.to_array()]
     }
 

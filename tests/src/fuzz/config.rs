@@ -43,9 +43,10 @@ pub fn config(bytes: &[u8]) -> Outcome<ConfigError> {
 fn check(config: &Config) {
     let Config { scene, run, params, output: _ } = config;
     params.check().expect("what the core refuses is refused as a configuration");
-    assert!(scene.bodies >= 1 && run.steps >= 1 && run.ranks >= 1 && run.threads != Some(0));
+    assert!(scene.bodies >= scene.kind.least_bodies() && run.steps >= 1 && run.ranks >= 1 && run.threads != Some(0));
     assert!(!run.peer_timeout.is_zero());
     match scene.kind {
+        SceneKind::File(_) => panic!("no such file is there"),
         SceneKind::Rooms { power } => assert!(power.is_finite() && power > 0.0),
         SceneKind::Pile { jitter } => assert!(jitter.is_finite() && jitter >= 0.0),
         SceneKind::Pyramids { base } => assert!(base >= 2),
@@ -76,7 +77,10 @@ fn check_plan(plan: &Plan) {
     let (low, high) = plan.scene.domain();
     assert!(low.is_finite() && high.is_finite() && low.cmplt(high).all(), "{low} to {high}");
     assert_eq!(plan.blueprint.partition.tiles(), plan.tiles.iter().product::<u32>() as usize);
-    assert!(!plan.scene.iter().any(|body| plan.scene.has_escaped(&body)), "a body starts outside of its home");
+    assert!(
+        !plan.scene.iter().map(Result::unwrap).any(|body| plan.scene.has_escaped(&body)),
+        "a body starts outside of its home"
+    );
     let tiles: usize = (0..plan.assignment.ranks()).map(|rank| plan.assignment.tiles_of(rank).len()).sum();
     assert_eq!(tiles, plan.blueprint.partition.tiles(), "every tile is somebody's");
 }

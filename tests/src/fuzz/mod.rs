@@ -1,21 +1,25 @@
 //! Bytes of any kind against everything that reads what others wrote: frames, saved tiles, recordings,
-//! configurations, command lines.
+//! configurations, scenes, command lines.
 //!
 //! Each target takes bytes and panics where a promise is broken; whatever else it is given, it returns, and says what became
 //! of it. The same functions are driven by `tests/hostile/` on stable Rust and by the fuzzer of `fuzz/`.
 
 mod arguments;
 mod codec;
+mod commands;
 mod config;
 mod page;
+mod scene;
 mod segment;
 mod snapshot;
 mod transport;
 
 pub use arguments::{NoRun, arguments};
 pub use codec::{FRAME, FrameLayout, Letter, TILES, codec, codec_by, frame};
+pub use commands::commands;
 pub use config::config;
 pub use page::page;
+pub use scene::{ScenePart, scene, scene_part};
 pub use segment::{footer, segment, segment_file};
 pub use snapshot::{BLOCK, BlockLayout, block, fresh, seal, snapshot};
 pub use transport::transport;

@@ -7,7 +7,7 @@ use atoll::config::ConfigError;
 use atoll::scene::SplitMix64;
 use atoll_tests::{fuzz, program};
 
-/// Every kind of refusal that a text can meet. Not among them: a file that cannot be read and an assignment without an equals
+/// Every kind of refusal that a text can meet. Not among them: a file that cannot be read, a scene in one, and an assignment without an equals
 /// sign, as none is given; and an ambiguous key, as no two keys end alike today.
 const KINDS: [&str; 6] = ["syntax", "unknown key", "unknown section", "missing", "bad value", "inapplicable"];
 
@@ -23,6 +23,7 @@ fn kind(error: &ConfigError) -> &'static str {
         ConfigError::BadValue { .. } => "bad value",
         ConfigError::NotBuiltIn { .. } => "not built in",
         ConfigError::Inapplicable { .. } => "inapplicable",
+        ConfigError::Scene(_) => "scene",
     }
 }
 

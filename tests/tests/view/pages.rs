@@ -301,3 +301,63 @@ fn what_cannot_be_shown_is_refused_in_one_line() {
         assert!(ended.stderr.contains(&format!("--port {port}: Address already in use")), "{ended}");
     }
 }
+
+#[test]
+fn a_hand_drops_pulls_and_takes_away_bodies_and_the_run_repeats_from_its_folder() {
+    let Some(program) = browser::find() else { return };
+    let served = serve("world.toml --steps 100000 --out hand");
+    let mut browser = show(&program, &served);
+    browser.press(" ");
+    browser.wait_for("document.getElementById('play').textContent === 'Play'");
+    let zoom = "atoll.state.camera.zoom > 60";
+    let middle = browser.evaluate("[atoll.state.camera.x, atoll.state.camera.y]");
+    let middle = [0, 1].map(|i| middle[i].as_f64().unwrap());
+    let at = place(&mut browser, middle[0], middle[1]).map(f64::round);
+    browser.wheel(at, -1200.0);
+    browser.wait_for(zoom);
+    let kept = || std::fs::read_to_string(folder("hand").join("commands.jsonl")).unwrap_or_default();
+    let wait_for = |what: &str| {
+        let begun = std::time::Instant::now();
+        while !kept().contains(what) {
+            assert!(begun.elapsed() < program::LIMIT, "{what} is not in {}", kept());
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    };
+    // One that was dropped is where it was dropped, as nothing moves.
+    browser.press("d");
+    browser.wait_for("!document.getElementById('shape-choice').hidden");
+    browser.click(at);
+    wait_for("\"add\"");
+    browser.screenshot("hand");
+    browser.press("p");
+    browser.drag(at, [at[0] + 90.0, at[1] - 40.0], "atoll.state.body !== null");
+    wait_for("\"velocity\"");
+    let dropped = browser.evaluate("atoll.state.body.id").as_str().unwrap().parse::<u64>().unwrap();
+    for _ in 0..3 {
+        browser.press("ArrowRight");
+    }
+    browser.press("e");
+    browser.wait_for("atoll.state.body !== null");
+    let now = browser.evaluate("atoll.state.body.at");
+    let now = place(&mut browser, now[0].as_f64().unwrap(), now[1].as_f64().unwrap());
+    browser.click(now);
+    wait_for(&format!("\"remove\":{dropped}"));
+    browser.press("d");
+    browser.click(at);
+    browser.press(" ");
+    browser.wait_for("atoll.state.step > 30");
+    assert_well(&browser, &served);
+    served.interrupt();
+    let ended = served.end();
+    assert_eq!(ended.code, Some(130), "{ended}");
+    let summary = program::summary(&folder("hand").join("summary.json"));
+    assert_eq!((&summary["bodies"], &summary["bodies_lost"]), (&json!(601), &json!(0)), "{}", kept());
+    let (json, steps) = (folder("again.json"), summary["steps"].to_string());
+    let mut again = program::command();
+    again.arg("run").arg(folder("hand").join("run.toml")).args(["--quiet", "--ranks", "1", "--steps", &steps]);
+    let again = again.arg("--commands").arg(folder("hand").join("commands.jsonl"));
+    let repeated = program::run_to_summary(again, &json);
+    for key in ["state_hash", "contact_hash", "steps"] {
+        assert_eq!(repeated[key], summary[key], "{key}");
+    }
+}
