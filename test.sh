@@ -181,7 +181,7 @@ step cargo test --release --workspace --exclude atoll --lib --bins --tests ${fea
 begin_aarch64
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
 # that there is for that (golden). What programs do around that is the same in both profiles.
-calculates=(borders collisions fast golden hostile library physics reported sleep snapshots strategies)
+calculates=(borders collisions configs fast golden hostile library physics reported scenes sleep snapshots strategies)
 step cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 
