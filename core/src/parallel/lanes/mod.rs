@@ -252,8 +252,9 @@ impl LaneSet {
         self.0
     }
 
-    /// Runs a kernel. The result does not depend on which lanes these are.
-    #[inline]
+    /// Runs a kernel. The result does not depend on which lanes these are. Not inlined: else all that a kernel comes to would be compiled
+    /// anew for each place that runs it.
+    #[inline(never)]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
             Set::Portable => kernel.run::<Portable>(),
