@@ -4,7 +4,7 @@ use atoll_core::*;
 use glam::{DVec2, Vec2};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let solid = |shape| Kind { shape, material: Material::default() };
+    let solid = |shape| Kind::new(shape, Material::default());
     let floor = solid(Shape::rectangle(40.0, 2.0));
     let mut world = World::whole(&Blueprint {
         params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },

@@ -4,7 +4,7 @@ use atoll_core::*;
 use glam::{DVec2, Vec2};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let solid = |width, height| Kind { shape: Shape::rectangle(width, height), material: Material::default() };
+    let solid = |width, height| Kind::new(Shape::rectangle(width, height), Material::default());
     let blueprint = Blueprint {
         params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
         partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,

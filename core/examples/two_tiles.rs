@@ -22,7 +22,7 @@ impl Halo for Counting {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let partition = Partition::uniform(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1)?;
-    let disc = Kind { shape: Shape::circle(0.2), material: Material::default() };
+    let disc = Kind::new(Shape::circle(0.2), Material::default());
     let blueprint = Blueprint { params: Params::default(), partition, kinds: vec![disc], statics: vec![] };
     let mut world = World::whole(&blueprint)?;
     let disc = Body::at_rest(GlobalId(0), KindId(0), DVec2::new(9.0, 5.0));

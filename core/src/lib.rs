@@ -14,7 +14,7 @@
 //! use atoll_core::*;
 //! use glam::{DVec2, Vec2};
 //!
-//! let solid = |width, height| Kind { shape: Shape::rectangle(width, height), material: Material::default() };
+//! let solid = |width, height| Kind::new(Shape::rectangle(width, height), Material::default());
 //! let blueprint = Blueprint {
 //!     params: Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() },
 //!     partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1)?,
@@ -88,9 +88,11 @@ pub use model::body::{Bodies, Body, StaticBody};
 pub use model::contact::{Contact, ContactPoint};
 pub use model::error::{CodecError, SetupError, StepError};
 pub use model::id::{GlobalId, KindId, TileId};
+pub use model::kind::{Dynamics, Filter, Kind, Material};
 pub use model::math::Rot;
 pub use model::params::{BroadPhase, Exchange, Ghosts, Instructions, IslandSearch, Parallel, Params, Solver};
-pub use model::shape::{Kind, Material, Shape};
+pub use model::path::{Path, Travel};
+pub use model::shape::{Compound, MOST_CORNERS, MOST_PARTS, Part, Polygon, Segment, Shape, ShapeError};
 pub use state::facts::{Facts, TileFacts};
 pub use state::figures::Figures;
 pub use state::hash::Hashes;

@@ -1,7 +1,8 @@
 //! What this crate's own tests share.
 
+use crate::model::kind::{Kind, Material};
 use crate::model::math::Rot;
-use crate::model::shape::{Kind, Material, Shape};
+use crate::model::shape::Shape;
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 
@@ -13,18 +14,39 @@ pub(crate) fn cases(cases: u32) -> ProptestConfig {
 
 /// A rough circle.
 pub(crate) fn circle(radius: f32) -> Kind {
-    Kind { shape: Shape::circle(radius), material: Material::default() }
+    Kind::new(Shape::circle(radius), Material::default())
 }
 
 /// A rough box of the given whole sides.
 pub(crate) fn rectangle(width: f32, height: f32) -> Kind {
-    Kind { shape: Shape::rectangle(width, height), material: Material::default() }
+    Kind::new(Shape::rectangle(width, height), Material::default())
 }
 
 /// Circles and boxes, evenly spread over the orders of magnitude between two sizes.
 pub(crate) fn any_kind(least: f32, most: f32) -> impl Strategy<Value = Kind> {
     let size = move || (least.log10()..most.log10()).prop_map(|exponent| 10.0_f32.powf(exponent));
     prop_oneof![size().prop_map(circle), (size(), size()).prop_map(|(width, height)| rectangle(width, height))]
+}
+
+/// Circles, boxes, polygons, capsules and rounded polygons, as [`any_kind`].
+pub(crate) fn any_convex(least: f32, most: f32) -> impl Strategy<Value = Kind> {
+    let size = move || (least.log10()..most.log10()).prop_map(|exponent| 10.0_f32.powf(exponent));
+    let corner = || (-1.0_f32..1.0, -1.0_f32..1.0).prop_map(|(x, y)| Vec2::new(x, y));
+    let rounding = || prop_oneof![Just(0.0_f32), 0.01_f32..1.0];
+    let polygon = (prop::collection::vec(corner(), 3..9), size(), rounding()).prop_filter_map(
+        "points that make a polygon",
+        |(points, size, rounding)| {
+            let points: Vec<Vec2> = points.into_iter().map(|point| point * size).collect();
+            Shape::polygon(&points, rounding * size).ok()
+        },
+    );
+    let capsule =
+        (size(), size()).prop_filter_map("sizes of a capsule", |(length, radius)| Shape::capsule(length, radius).ok());
+    prop_oneof![
+        1 => any_kind(least, most),
+        3 => polygon.prop_map(|shape| Kind::new(shape, Material::default())),
+        1 => capsule.prop_map(|shape| Kind::new(shape, Material::default())),
+    ]
 }
 
 /// Any direction; the four straight ones more often than chance would have it.
@@ -36,26 +58,30 @@ pub(crate) fn any_rotation() -> impl Strategy<Value = Rot> {
     ]
 }
 
-/// The outline of a shape in double precision: corners, and how far around them it reaches.
-pub(crate) fn outline(shape: Shape, rotation: Rot, center: DVec2) -> (Vec<DVec2>, f64) {
+/// The outline of a convex shape in double precision: corners, and how far around them it reaches.
+pub(crate) fn outline(shape: &Shape, rotation: Rot, center: DVec2) -> (Vec<DVec2>, f64) {
+    let (c, s) = (f64::from(rotation.c), f64::from(rotation.s));
+    let place = |v: DVec2| center + DVec2::new(c * v.x - s * v.y, s * v.x + c * v.y);
     match shape {
-        Shape::Circle { radius } => (vec![center], f64::from(radius)),
+        Shape::Circle { radius } => (vec![center], f64::from(*radius)),
         Shape::Box { half } => {
-            let (c, s) = (f64::from(rotation.c), f64::from(rotation.s));
-            let half = half.as_dvec2();
-            let corner =
-                |x: f64, y: f64| center + DVec2::new(c * x * half.x - s * y * half.y, s * x * half.x + c * y * half.y);
-            (vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0.0)
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            (corners.map(|(x, y)| place(half.as_dvec2() * DVec2::new(x, y))).to_vec(), 0.0)
         }
+        Shape::Polygon(polygon) => {
+            let corners = polygon.corners().iter().map(|corner| place(corner.as_dvec2()));
+            (corners.collect(), f64::from(polygon.radius()))
+        }
+        Shape::Segment(_) | Shape::Compound(_) => panic!("not convex, or not solid"),
     }
 }
 
 /// Distance of two shapes by trying every edge against every edge; zero or less where they overlap.
-pub(crate) fn distance(a: Shape, rot_a: Rot, b: Shape, rot_b: Rot, offset: Vec2) -> f64 {
+pub(crate) fn distance(a: &Shape, rot_a: Rot, b: &Shape, rot_b: Rot, offset: Vec2) -> f64 {
     let (corners_a, round_a) = outline(a, rot_a, DVec2::ZERO);
     let (corners_b, round_b) = outline(b, rot_b, offset.as_dvec2());
     if holds(&corners_a, corners_b[0]) || holds(&corners_b, corners_a[0]) {
-        return 0.0;
+        return -round_a - round_b;
     }
     let edges = |corners: &[DVec2]| -> Vec<(DVec2, DVec2)> {
         (0..corners.len()).map(|i| (corners[i], corners[(i + 1) % corners.len()])).collect()
@@ -66,7 +92,7 @@ pub(crate) fn distance(a: Shape, rot_a: Rot, b: Shape, rot_b: Rot, offset: Vec2)
             if cross(a1 - a0, b0 - a0) * cross(a1 - a0, b1 - a0) < 0.0
                 && cross(b1 - b0, a0 - b0) * cross(b1 - b0, a1 - b0) < 0.0
             {
-                return 0.0;
+                return -round_a - round_b;
             }
             // Edges that do not cross are nearest at an end of one of them.
             for (point, edge) in [(a0, (b0, b1)), (a1, (b0, b1)), (b0, (a0, a1)), (b1, (a0, a1))] {
@@ -81,9 +107,9 @@ fn cross(a: DVec2, b: DVec2) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
-/// Whether a point lies in the box of the given corners, counter-clockwise; never in a single point.
+/// Whether a point lies in the polygon of the given corners, counter-clockwise; never in a point or a line.
 fn holds(corners: &[DVec2], point: DVec2) -> bool {
-    corners.len() > 1
+    corners.len() > 2
         && (0..corners.len()).all(|i| {
             let (from, to) = (corners[i], corners[(i + 1) % corners.len()]);
             cross(to - from, point - from) >= 0.0

@@ -3,7 +3,7 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
 use crate::collide::proxies::Proxies;
-use crate::collide::touch::{is_slow, recycle, touch};
+use crate::collide::touch::{is_slow, recycle, touch, touch_pieces};
 use crate::collide::wide_boxes::BoxOutlook;
 use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
 use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
@@ -13,6 +13,7 @@ use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::Zeroable;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Candidates, and pairs, in a piece of work, at least.
@@ -109,6 +110,10 @@ impl NarrowPhase {
         team.append(&mut self.near, candidates.len(), GRAIN, |range, near| {
             setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates: &candidates[range], near });
         });
+        if setup.filters {
+            let kind = |body: u32| setup.kind(tile.bodies.kind[body as usize]);
+            self.near.retain(|&[a, b]| kind(a).touches(kind(b)));
+        }
         self.start.clear();
         self.start.resize(proxies.pairing + 2, 0);
         for pair in &self.near {
@@ -169,27 +174,31 @@ struct Named<'a> {
 const BLOCK: usize = 256;
 
 /// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes. Of each kind there are two lists: first those that had
-/// no contact in the last step, most of whom do not touch yet, then those that had one, most of whom do.
+/// no contact in the last step, most of whom do not touch yet, then those that had one, most of whom do. And a last one of pairs with
+/// other shapes.
 struct Lists {
     /// Places in the block.
     places: [[u8; BLOCK]; LISTS],
     count: [usize; LISTS],
 }
 
-const LISTS: usize = 6;
+const LISTS: usize = 7;
 
 /// Of boxes.
 const NEW_BOXES: usize = 4;
 const KNOWN_BOXES: usize = 5;
+
+/// Of bodies one of which is made of pieces.
+const OF_PIECES: usize = 6;
 
 impl Lists {
     #[inline(always)]
     fn new(pairs: &[Pair], named: &[Named<'_>; BLOCK], tile: &Tile, setup: &Setup) -> Self {
         let mut lists = Self { places: [[0; BLOCK]; LISTS], count: [0; LISTS] };
         for (place, (&pair, named)) in pairs.iter().zip(named).enumerate() {
-            let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).not_round);
-            let list = 2 * (a + b) as usize + usize::from(named.known.is_some());
-            lists.push(list, place as u8);
+            let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).form as usize);
+            let list = 2 * (a + b) + usize::from(named.known.is_some());
+            lists.push(list.min(OF_PIECES), place as u8);
         }
         lists
     }
@@ -213,6 +222,8 @@ struct Block<'a> {
     /// The contacts of those that are found anew.
     found: [Contact; BLOCK],
     separation: [[f32; 2]; BLOCK],
+    /// The contacts of pairs that have any number of them, each with the place of its pair, ascending.
+    several: Vec<(u8, Contact, [f32; 2])>,
 }
 
 /// What comes of a pair.
@@ -222,6 +233,8 @@ enum Outcome {
     /// The contact that is known, as it is.
     Known,
     Found,
+    /// What is among several.
+    Several,
 }
 
 impl Kernel for FindAmong<'_> {
@@ -237,17 +250,47 @@ impl Kernel for FindAmong<'_> {
             outcome: [Outcome::Nothing; BLOCK],
             found: [Contact::zeroed(); BLOCK],
             separation: [[0.0; 2]; BLOCK],
+            several: Vec::new(),
         };
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
             for list in 0..NEW_BOXES {
-                block.find::<V, RoundOutlook>(lists.get(list), tile, setup);
+                setup.lanes.run(Find::<RoundOutlook>::new(&mut block, lists.get(list), tile, setup));
             }
             block.keep_known(&mut lists, tile, setup);
-            block.find::<V, BoxOutlook>(lists.get(NEW_BOXES), tile, setup);
-            block.keep(pairs.len(), contacts);
+            setup.lanes.run(Find::<BoxOutlook>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
+            if lists.get(OF_PIECES).is_empty() {
+                block.keep(pairs.len(), contacts);
+            } else {
+                block.find_several(lists.get(OF_PIECES), by_name, tile, setup);
+                block.keep_several(pairs.len(), contacts);
+            }
         }
+    }
+}
+
+/// Finds the contacts of pairs of one kind: a kernel of its own, as all in one would be more than a compiler can look over.
+struct Find<'b, 'a, O> {
+    block: &'b mut Block<'a>,
+    list: &'b [u8],
+    tile: &'b Tile,
+    setup: &'b Setup,
+    outlook: PhantomData<O>,
+}
+
+impl<'b, 'a, O: Outlook> Find<'b, 'a, O> {
+    fn new(block: &'b mut Block<'a>, list: &'b [u8], tile: &'b Tile, setup: &'b Setup) -> Self {
+        Self { block, list, tile, setup, outlook: PhantomData }
+    }
+}
+
+impl<O: Outlook> Kernel for Find<'_, '_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        self.block.find::<V, O>(self.list, self.tile, self.setup);
     }
 }
 
@@ -276,6 +319,52 @@ impl Block<'_> {
         contacts.truncate(kept);
         separation.truncate(kept);
         bodies.truncate(kept);
+    }
+
+    /// Finds the contacts of pairs of which one body is made of pieces.
+    #[inline(never)]
+    fn find_several(&mut self, list: &[u8], by_name: &[bool], tile: &Tile, setup: &Setup) {
+        self.several.clear();
+        let mut known = Vec::new();
+        for &place in list {
+            let Named { key, bodies, .. } = self.named[usize::from(place)];
+            known.clear();
+            if bodies.iter().any(|&body| by_name[body as usize]) {
+                let pair = (tile.bodies.id[bodies[0] as usize], tile.bodies.id[bodies[1] as usize]);
+                known.extend(tile.strays.find_all(pair, key.is_own()));
+            } else {
+                known.extend(tile.contacts.find_all(key));
+            }
+            let several = &mut self.several;
+            touch_pieces(tile, bodies, &known, setup, |contact, now| several.push((place, contact, now)));
+            self.outcome[usize::from(place)] = Outcome::Several;
+        }
+    }
+
+    /// As [`keep`](Self::keep), with those of which there may be several.
+    #[inline(never)]
+    fn keep_several(&self, pairs: usize, contacts: &mut Contacts) {
+        let Contacts { cache, separation, bodies, .. } = contacts;
+        let mut several = self.several.iter().peekable();
+        for i in 0..pairs {
+            let named = &self.named[i];
+            let mut keep = |contact: &Contact, now: [f32; 2]| {
+                cache.keys.push(named.key);
+                cache.contacts.push(*contact);
+                separation.push(now);
+                bodies.push(named.bodies);
+            };
+            match self.outcome[i] {
+                Outcome::Nothing => {}
+                Outcome::Known => keep(named.known.expect("it is known"), self.separation[i]),
+                Outcome::Found => keep(&self.found[i], self.separation[i]),
+                Outcome::Several => {
+                    while let Some((_, contact, now)) = several.next_if(|(place, ..)| usize::from(*place) == i) {
+                        keep(contact, *now);
+                    }
+                }
+            }
+        }
     }
 
     /// Finds the contacts of pairs of one kind.

@@ -80,6 +80,9 @@ impl Proxies {
             range,
         });
         team.for_each(parts.collect(), |part| setup.lanes.run(part));
+        if setup.any_drives() {
+            self.sweep(bodies, dynamic, setup);
+        }
         (self.owned, self.dynamic, self.pairing) = (owned, dynamic, owned);
         self.weight.clear();
         self.weight.resize(owned, 2);
@@ -87,6 +90,17 @@ impl Proxies {
         self.weight.resize(total, 1);
         self.size = rectangle.size().as_vec2().to_array();
         self.lanes = setup.lanes;
+    }
+
+    /// Statics have no margin. Those that move get room for all that they sweep in the step.
+    fn sweep(&mut self, bodies: &Bodies, dynamic: usize, setup: &Setup) {
+        for i in dynamic..bodies.len() {
+            let turns = setup.kind(bodies.kind[i]).bounding_radius * bodies.angular_velocity[i].abs();
+            let swept = setup.params.dt * (bodies.velocity[i].abs().max_element() + turns);
+            self.extent[i] += swept;
+            self.outline[i][0] += swept;
+            self.outline[i][1] += swept;
+        }
     }
 
     /// Lets ghosts of the tile whose proxies these are be paired with each other, and with statics, where they are near.

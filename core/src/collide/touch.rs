@@ -7,11 +7,12 @@
 //! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::{Manifold, collide};
-use crate::collide::wide_pairs::TOUCHING;
+use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
+use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
+use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, cross, dot, max, min, turn};
-use crate::model::shape::KindRow;
+use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -48,7 +49,7 @@ impl<'a> Side<'a> {
 
     #[inline(always)]
     fn is_round(&self) -> bool {
-        self.kind.shape.is_round()
+        self.kind.form == Form::Round
     }
 
     /// How it will have turned after some seconds, as far as that can be seen: in four parts, as in the substeps of a step.
@@ -83,6 +84,10 @@ struct Approach<'a> {
     offset: Vec2,
     /// Velocity of B as seen from A, in m/s.
     between: Vec2,
+    /// Which pieces of them meet; none of circles and boxes.
+    pieces: Option<[&'a Piece; 2]>,
+    /// Their numbers, as features of contacts name them (see [`Contact::pieces`]).
+    features: u32,
 }
 
 /// A manifold, and the moment in which it is one.
@@ -103,27 +108,12 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
     Approach::new(tile, pair, setup).far(setup.params.dt) < setup.params.speculative_distance
 }
 
-/// The contact of bodies A and B, if there is one, and the separation of its points.
-#[inline(always)]
+/// The contact of bodies A and B, if there is one, and the separation of its points. Not inlined: kernels ask for it seldom, and with
+/// it the compiler would take many minutes over them.
+#[inline(never)]
 pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
     let pair = Approach::new(tile, pair, setup);
-    if pair.pass_by(setup) {
-        return None;
-    }
-    let far = pair.far(setup.params.dt);
-    let reach = setup.params.speculative_distance + far;
-    let now = pair.at(0.0, reach);
-    let nearest = now.manifold.nearest()?.separation;
-    let is_now = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
-    // Speeds that overflow tell of no other moment.
-    if is_now || far.is_infinite() {
-        return pair.contact(&now, known, setup);
-    }
-    match pair.first_touch(&now, reach, setup.params.dt) {
-        Some(then) => pair.contact(&then, known, setup),
-        None if nearest < setup.params.speculative_distance => pair.contact(&now, known, setup),
-        None => None,
-    }
+    if pair.pass_by(setup) { None } else { pair.touch(known, setup) }
 }
 
 impl<'a> Approach<'a> {
@@ -132,13 +122,32 @@ impl<'a> Approach<'a> {
         let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
         let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
         let between = b.velocity - a.velocity;
-        Self { a, b, offset, between }
+        Self { a, b, offset, between, pieces: None, features: 0 }
+    }
+
+    /// The contact, if there is one.
+    #[inline(always)]
+    fn touch(&self, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+        let far = self.far(setup.params.dt);
+        let reach = setup.params.speculative_distance + far;
+        let now = self.at(0.0, reach);
+        let nearest = now.manifold.nearest()?.separation;
+        let is_now = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
+        // Speeds that overflow tell of no other moment.
+        if is_now || far.is_infinite() {
+            return self.contact(&now, known, setup);
+        }
+        match self.first_touch(&now, reach, setup.params.dt) {
+            Some(then) => self.contact(&then, known, setup),
+            None if nearest < setup.params.speculative_distance => self.contact(&now, known, setup),
+            None => None,
+        }
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.
     #[inline(always)]
     fn pass_by(&self, setup: &Setup) -> bool {
-        let Self { a, b, offset, between } = self;
+        let Self { a, b, offset, between, .. } = self;
         let nearest = -dot(*offset, *between) / max(dot(*between, *between), f32::MIN_POSITIVE);
         // Where speeds overflow nothing is known: then they do not pass.
         let gap = *offset + *between * min(max(nearest, 0.0), setup.params.dt);
@@ -162,7 +171,13 @@ impl<'a> Approach<'a> {
             (self.offset, Rot::IDENTITY, Rot::IDENTITY)
         };
         let (rotation_a, rotation_b) = (turning_a.after(self.a.rotation), turning_b.after(self.b.rotation));
-        let manifold = collide(self.a.kind, rotation_a, self.b.kind, rotation_b, offset, reach);
+        let manifold = match self.pieces {
+            None => collide(self.a.kind, rotation_a, self.b.kind, rotation_b, offset, reach),
+            Some(pieces) => {
+                let found = convex::collide(pieces, [rotation_a, rotation_b], offset, reach);
+                found.named(self.features)
+            }
+        };
         Moment { time, manifold, offset, turning_a, turning_b }
     }
 
@@ -264,33 +279,100 @@ impl<'a> Approach<'a> {
         });
         Some((contact, separation))
     }
+
+    /// The separations of a contact whose manifold still serves: they touch, and have hardly moved against each other.
+    ///
+    /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever.
+    #[inline(always)]
+    fn recycle(&self, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
+        let Approach { a, b, offset, .. } = self;
+        if a.is_round() || b.is_round() {
+            return None;
+        }
+        let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
+        if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
+            return None;
+        }
+        let moved = turned_a.unrotate(*offset) - known.offset;
+        let turns = |side: &Side<'_>| side.kind.inv_mass > 0.0 || side.angular_velocity != 0.0;
+        let extent = |side: &Side<'_>| if turns(side) { side.kind.bounding_radius } else { 0.0 };
+        let twist = turned_a.to(turned_b).s.abs() * max(extent(a), extent(b));
+        if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
+            return None;
+        }
+        let shift = *offset - known.offset;
+        let separation = known.points.map(|point| {
+            let (arm_a, arm_b) = (point.anchor, point.anchor - known.offset);
+            let swing = (turned_b.rotate(arm_b) - arm_b) - (turned_a.rotate(arm_a) - arm_a);
+            point.separation + dot(shift + swing, known.normal)
+        });
+        let touches = |(point, now): (&ContactPoint, f32)| point.separation < TOUCHING && now < TOUCHING;
+        known.points().iter().zip(separation).any(touches).then_some(separation)
+    }
+
+    /// The contact of a round body with what it has touched and still touches, slowly: that of the middle of the step, as in
+    /// `wide_pairs.rs`, which tells why.
+    fn roll(&self, known: &Contact, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+        let mut then = self.at(0.5 * setup.params.dt, f32::INFINITY);
+        let point = *then.manifold.nearest()?;
+        let normal = then.manifold.normal;
+        let on_a = self.a.swing(then.turning_a, point.anchor, normal);
+        let on_b = self.b.swing(then.turning_b, point.anchor - then.offset, normal);
+        let nearer = dot(self.between, normal) * then.time + (on_b - on_a);
+        let now = point.separation - nearer;
+        if nearer.abs() >= ROLLING || now >= TOUCHING {
+            return None;
+        }
+        // As if they had come so near at once, along the normal.
+        let mut manifold = Manifold { normal, ..Manifold::EMPTY };
+        manifold.push(ManifoldPoint { anchor: point.anchor - normal * (0.5 * nearer), separation: now, ..point });
+        (then.manifold, then.offset, then.time) = (manifold, then.offset - normal * nearer, 0.0);
+        self.contact(&then, Some(known), setup)
+    }
 }
 
-/// The separations of a contact of boxes whose manifold still serves: they touch, and have hardly moved against each other.
-///
-/// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever.
+/// The separations of a contact of boxes whose manifold still serves.
 #[inline(always)]
 pub(super) fn recycle(tile: &Tile, pair: Pair, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
-    let Approach { a, b, offset, .. } = &Approach::new(tile, pair, setup);
-    if a.is_round() || b.is_round() {
-        return None;
+    Approach::new(tile, pair, setup).recycle(known, setup)
+}
+
+/// Appends the contacts of two bodies of which one is neither a circle nor a box: one for each two of their pieces that touch, in their
+/// order. `known` are those of the last step.
+pub(super) fn touch_pieces(
+    tile: &Tile,
+    pair: Pair,
+    known: &[&Contact],
+    setup: &Setup,
+    mut found: impl FnMut(Contact, [f32; 2]),
+) {
+    let mut pair = Approach::new(tile, pair, setup);
+    if pair.pass_by(setup) {
+        return;
     }
-    let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
-    if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
-        return None;
+    let far = pair.far(setup.params.dt);
+    let is_slow = far < setup.params.speculative_distance;
+    let rolls = pair.a.is_round() || pair.b.is_round();
+    let (rotation_a, rotation_b, offset) = (pair.a.rotation, pair.b.rotation, pair.offset);
+    let (pieces_a, pieces_b) = (&pair.a.kind.pieces, &pair.b.kind.pieces);
+    for (number_a, a) in (0..).zip(pieces_a.iter()) {
+        let center = offset - rotation_a.rotate(a.center);
+        for (number_b, b) in (0..).zip(pieces_b.iter()) {
+            let (gap, near) =
+                (center + rotation_b.rotate(b.center), a.reach + b.reach + setup.params.speculative_distance + far);
+            if dot(gap, gap) > near * near {
+                continue;
+            }
+            (pair.pieces, pair.features) = (Some([a, b]), Contact::features_of(number_a, number_b));
+            let known = known.iter().copied().find(|known| known.pieces() == pair.features);
+            let contact = match known {
+                Some(known) if is_slow && rolls => pair.roll(known, setup),
+                Some(known) if is_slow => pair.recycle(known, setup).map(|separation| (*known, separation)),
+                _ => None,
+            };
+            if let Some((contact, separation)) = contact.or_else(|| pair.touch(known, setup)) {
+                found(contact, separation);
+            }
+        }
     }
-    let moved = turned_a.unrotate(*offset) - known.offset;
-    let extent = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { side.kind.bounding_radius } else { 0.0 };
-    let twist = turned_a.to(turned_b).s.abs() * max(extent(a), extent(b));
-    if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
-        return None;
-    }
-    let shift = *offset - known.offset;
-    let separation = known.points.map(|point| {
-        let (arm_a, arm_b) = (point.anchor, point.anchor - known.offset);
-        let swing = (turned_b.rotate(arm_b) - arm_b) - (turned_a.rotate(arm_a) - arm_a);
-        point.separation + dot(shift + swing, known.normal)
-    });
-    let touches = |(point, now): (&ContactPoint, f32)| point.separation < TOUCHING && now < TOUCHING;
-    known.points().iter().zip(separation).any(touches).then_some(separation)
 }

@@ -15,7 +15,7 @@ use glam::Vec2;
 pub(super) const TOUCHING: f32 = 0.002;
 
 /// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
-const ROLLING: f32 = 0.0005;
+pub(super) const ROLLING: f32 = 0.0005;
 
 /// Sixteen pairs of bodies A and B, one of which is round.
 #[derive(Default, Debug)]

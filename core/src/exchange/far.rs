@@ -10,15 +10,15 @@
 //!
 //! Not seen: two such bodies from tiles apart that meet over a tile where nobody is.
 
-use crate::collide::manifold::collide;
+use crate::collide::manifold::nearest;
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::{GhostRecord, Unseen};
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::id::TileId;
+use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot, max, min};
-use crate::model::shape::KindRow;
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -62,7 +62,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
 }
 
 /// Takes in what lies on the way of the tile's own bodies, and the statics that its bodies and ghosts may come to.
-pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup) {
+pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64) {
     let mut ghosts: Vec<(TileId, Body, Unseen)> = Vec::new();
     for message in mail.messages() {
         ghosts.extend(
@@ -84,7 +84,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup) {
             tile.ghost_owners.push(owner);
             tile.unseen.push(unseen);
         }
-        tile.push_statics(setup);
+        tile.push_statics(setup, step);
     }
     let dynamic = owned + tile.ghosts();
     let Some(speed) =
@@ -97,11 +97,12 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup) {
     let corners = |(low, high): (DVec2, DVec2), place: &DVec2| (low.min(*place), high.max(*place));
     let (low, high) = tile.bodies.position[..dynamic].iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), corners);
     let (low, high) = (low - reach, high + reach);
-    for (row, fixed) in (0..).zip(&setup.statics) {
+    for row in 0..setup.statics.len() as u32 {
+        let fixed = setup.static_at(row, step);
         let half = setup.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
         let is_met = (fixed.position - half).cmple(high).all() && (fixed.position + half).cmpge(low).all();
         if is_met && tile.statics.binary_search(&row).is_err() {
-            tile.bodies.push(*fixed);
+            tile.bodies.push(fixed);
         }
     }
 }
@@ -124,7 +125,7 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
         return Vec::new();
     }
     let may = |&row: &usize| {
-        let much = 0.5 * setup.kind(bodies.kind[row]).shape.inner_radius();
+        let much = 0.5 * setup.kind(bodies.kind[row]).inner_radius;
         let moved = |moved: Vec2| moved.abs().max_element() > much;
         setup.goes_far(bodies.velocity[row]) || solved.displacement(row).is_some_and(moved)
     };
@@ -166,10 +167,10 @@ fn free_part(
 ) -> f32 {
     const MOST_ROUNDS: usize = 32;
     let reach = dot(way, way).sqrt() + dot(offset, offset).sqrt();
-    let depth = 0.25 * kind.shape.inner_radius();
+    let depth = 0.25 * kind.inner_radius;
     let mut part = 0.0;
     for round in 0..MOST_ROUNDS {
-        let manifold = collide(kind, rotation, other, other_rotation, offset - way * part, reach);
+        let manifold = nearest(kind, rotation, other, other_rotation, offset - way * part, reach);
         let Some(nearest) = manifold.nearest() else { return 1.0 };
         let (apart, closing) = (nearest.separation + depth, dot(way, manifold.normal));
         if apart <= 1e-3 * depth {

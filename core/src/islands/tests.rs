@@ -185,6 +185,7 @@ fn pile() -> World {
         position: DVec2::new(3.0, -0.5),
         rotation: Rot::IDENTITY,
         kind: rectangle(20.0, 1.0),
+        path: None,
     };
     let params = Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() };
     let kinds = vec![circle(0.2), rectangle(0.2, 0.2)];

@@ -1,8 +1,9 @@
 //! Bodies: one by one as records, and many as a structure of arrays.
 
 use crate::model::id::{GlobalId, KindId};
+use crate::model::kind::Kind;
 use crate::model::math::Rot;
-use crate::model::shape::Kind;
+use crate::model::path::Path;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, Vec2};
 use std::ops::Range;
@@ -39,8 +40,8 @@ impl Body {
     }
 }
 
-/// A body that never moves: every rank knows all of them.
-#[derive(Clone, Copy, PartialEq, Debug)]
+/// A body that never moves, or moves as its path has it, whatever it meets: every rank knows all of them.
+#[derive(Clone, PartialEq, Debug)]
 pub struct StaticBody {
     /// Name; statics take the lowest.
     pub id: GlobalId,
@@ -48,14 +49,16 @@ pub struct StaticBody {
     pub position: DVec2,
     /// Orientation.
     pub rotation: Rot,
-    /// Outline and stuff.
+    /// What it is.
     pub kind: Kind,
+    /// How it moves; none if it never does.
+    pub path: Option<Path>,
 }
 
 impl StaticBody {
-    /// A static that stands upright.
+    /// A static that stands upright and never moves.
     pub fn new(id: GlobalId, kind: Kind, position: DVec2) -> Self {
-        Self { id, position, rotation: Rot::IDENTITY, kind }
+        Self { id, position, rotation: Rot::IDENTITY, kind, path: None }
     }
 }
 

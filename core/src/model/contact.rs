@@ -2,6 +2,7 @@
 
 use crate::model::id::GlobalId;
 use crate::model::math::{Rot, cross, max, right_perp};
+use crate::model::shape::MOST_PARTS;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
@@ -29,6 +30,12 @@ impl ContactPoint {
     pub(crate) const NONE: Self =
         Self { anchor: Vec2::ZERO, separation: 0.0, normal_impulse: 0.0, tangent_impulse: 0.0, feature: Self::ABSENT };
 }
+
+/// Bits of a feature that tell apart those of two convex pieces, and then bits for each of the pieces' numbers.
+const FEATURE_BITS: u32 = 10;
+const PIECE_BITS: u32 = 8;
+const PIECES: u32 = 1 << PIECE_BITS;
+const _: () = assert!(MOST_PARTS <= PIECES as usize);
 
 /// A contact of body A, the one with the lower GlobalId, and body B. Its manifold is kept for as long as the two hardly
 /// move against each other ([`Params::recycle_distance`](crate::Params::recycle_distance)).
@@ -58,6 +65,17 @@ impl Contact {
     #[inline(always)]
     pub fn point_count(&self) -> usize {
         1 + usize::from(self.points[1].feature != ContactPoint::ABSENT)
+    }
+
+    /// Which of their convex pieces touch, as their features say: those of the first body, then those of the second, above what tells
+    /// apart the features of two pieces. Zero for circles and boxes.
+    pub(crate) fn pieces(&self) -> u32 {
+        self.points[0].feature & Self::features_of(PIECES - 1, PIECES - 1)
+    }
+
+    /// The part of a feature that names two pieces.
+    pub(crate) fn features_of(piece_a: u32, piece_b: u32) -> u32 {
+        (piece_a << PIECE_BITS | piece_b) << FEATURE_BITS
     }
 
     pub(crate) fn is_finite(&self) -> bool {
@@ -218,6 +236,13 @@ impl ContactCache {
         self.contacts.extend_from_slice(&other.contacts);
     }
 
+    /// Those of a pair.
+    pub(crate) fn find_all(&self, key: PairKey) -> impl Iterator<Item = &Contact> {
+        let first = self.keys.partition_point(|&other| other < key);
+        let count = self.keys[first..].iter().take_while(|&&other| other == key).count();
+        self.contacts[first..][..count].iter()
+    }
+
     #[cfg(test)]
     pub(crate) fn push(&mut self, key: PairKey, contact: Contact) {
         self.keys.push(key);
@@ -281,7 +306,7 @@ pub(crate) struct Stray {
     pub(crate) contact: Contact,
 }
 
-/// Contacts by the names of their bodies, sorted, one per pair.
+/// Contacts by the names of their bodies and of their pieces, sorted, one for each two pieces.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Strays(Vec<Stray>);
 
@@ -296,13 +321,22 @@ impl Strays {
 
     /// Sorts, and keeps the entry of the highest authority of each pair.
     pub(crate) fn settle(&mut self) {
-        self.0.sort_unstable_by(|a, b| a.pair.cmp(&b.pair).then(b.authority.cmp(&a.authority)));
-        self.0.dedup_by_key(|stray| stray.pair);
+        let key = |stray: &Stray| (stray.pair, stray.contact.pieces());
+        self.0.sort_unstable_by(|a, b| key(a).cmp(&key(b)).then(b.authority.cmp(&a.authority)));
+        self.0.dedup_by_key(|stray| key(stray));
     }
 
-    /// What is remembered of a pair: of which one is owned, or neither.
+    /// What is remembered of a pair: of which one is owned, or neither. Of circles and boxes there is one contact at most.
     pub(crate) fn find(&self, pair: (GlobalId, GlobalId), is_own: bool) -> Option<&Contact> {
         let found = &self.0[self.0.binary_search_by_key(&pair, |stray| stray.pair).ok()?];
         (!is_own || found.authority != Authority::Overlap).then_some(&found.contact)
+    }
+
+    /// All that is remembered of a pair.
+    pub(crate) fn find_all(&self, pair: (GlobalId, GlobalId), is_own: bool) -> impl Iterator<Item = &Contact> {
+        let first = self.0.partition_point(|stray| stray.pair < pair);
+        let of_pair = self.0[first..].iter().take_while(move |stray| stray.pair == pair);
+        let is_known = move |stray: &&Stray| !is_own || stray.authority != Authority::Overlap;
+        of_pair.filter(is_known).map(|stray| &stray.contact)
     }
 }

@@ -12,6 +12,18 @@ pub enum SetupError {
         /// Its row.
         kind: KindId,
     },
+    /// Belts are statics.
+    #[error("kind {}: its surface runs, which only that of a static can: set surface_speed to 0", kind.0)]
+    SurfaceMoves {
+        /// Its row.
+        kind: KindId,
+    },
+    /// Segments have no mass.
+    #[error("kind {}: a segment has no area, and so no mass: use it for statics, or a capsule", kind.0)]
+    SegmentMoves {
+        /// Its row.
+        kind: KindId,
+    },
     /// A static body.
     #[error(
         "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive"

@@ -52,16 +52,16 @@ impl Batch {
 }
 
 /// The contacts of a tile and their islands.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Graph<'a> {
     pub(crate) contacts: &'a [Pair],
     /// For each node, a body with contacts, the lowest of its island.
     pub(crate) roots: &'a [u32],
     /// Nodes in the largest island.
     pub(crate) largest: u64,
-    /// Nodes from here on are ghosts that are heard of within the step. Islands with such, or with bodies that others hear of, and
+    /// The nodes that are ghosts that are heard of within the step. Islands with such, or with bodies that others hear of, and
     /// islands without are not mixed: these need not wait for word.
-    pub(crate) first_ghost: usize,
+    pub(crate) ghosts: Range<usize>,
     /// Bodies of the tile that others hear of within the step.
     pub(crate) sent: &'a [u32],
     /// For each root whether its island sleeps. None where nobody may.
@@ -111,7 +111,7 @@ impl Batches {
         };
         let crew = parallel == Parallel::Coloring || parallel == Parallel::Auto && is_large;
         if together && sleeps.is_none() {
-            let at_border = graph.first_ghost < roots.len() || !graph.sent.is_empty();
+            let at_border = !graph.ghosts.is_empty() || !graph.sent.is_empty();
             self.put_together(contacts.len(), nodes, roots.len(), [crew, at_border])
         } else {
             self.put_apart(graph, nodes, parallel, together.then_some(crew))
@@ -157,7 +157,7 @@ impl Batches {
         }
         self.at_border.clear();
         self.at_border.resize(roots.len(), false);
-        roots[graph.first_ghost.min(roots.len())..].iter().for_each(|&root| self.at_border[root as usize] = true);
+        roots[graph.ghosts.clone()].iter().for_each(|&root| self.at_border[root as usize] = true);
         for node in graph.sent.iter().filter_map(|&body| nodes[body as usize].number()) {
             self.at_border[roots[node as usize] as usize] = true;
         }
@@ -285,12 +285,12 @@ mod tests {
             let roots = islands.roots();
             let asleep: Vec<bool> = (0..count).map(|root| root % 3 == 0).collect();
             let sleeps = sleep.then_some(&asleep[..]);
-            let first_ghost = count - count / 8;
-            let graph = Graph { contacts: &contacts, roots, largest, first_ghost, sent: &[2], sleeps };
+            let ghosts = count - count / 8..count;
+            let graph = Graph { contacts: &contacts, roots, largest, ghosts, sent: &[2], sleeps };
             for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
                 for team in [Team::ALONE, Team::of_pool()] {
                     let mut batches = Batches::default();
-                    let place = batches.divide(graph, nodes.clone(), parallel, team);
+                    let place = batches.divide(graph.clone(), nodes.clone(), parallel, team);
                     let mut solved = vec![false; contacts.len()];
                     let mut next = (0, 0);
                     for batch in &batches.all {

@@ -3,7 +3,9 @@
 use super::batches::{Batches, Graph};
 use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
+use crate::collide::narrow_phase::Contacts;
 use crate::exchange::record::{GhostRefresh, Unseen};
+use crate::model::math::right_perp;
 use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::Quad;
 use crate::parallel::team::Team;
@@ -28,34 +30,57 @@ pub(crate) struct SolverBodies {
     pub(crate) start: Vec<Quad>,
     /// Roots of mass, inertia, inverse inertia, inverse mass.
     pub(crate) weight: Vec<Quad>,
-    /// Ghosts, in the order of these bodies.
+    /// How each moves by itself ([`Dynamics::factors`](crate::model::kind::Dynamics::factors)); empty where all do alike.
+    pub(crate) factors: Vec<Quad>,
+    /// Ghosts, and what moves statics' surfaces, in the order of these bodies.
     pub(crate) ghosts: Vec<Ghost>,
-    /// For each body of the tile what it is in the graph of contacts; empty once that is made into `index`.
+    /// For each body of the tile, and then each carrier, what it is in the graph of contacts; empty once that is made into `index`.
     node: Vec<GraphNode>,
-    /// For each body of the tile which of these it is; empty while it has a `node`.
+    /// For each body of the tile, and then each carrier, which of these it is; empty while it has a `node`.
     index: Vec<SolverIndex>,
+    /// One for each contact of a static whose surface moves with a body, ascending.
+    carriers: Vec<Carrier>,
     /// Contacts between bodies that move, as nodes: bodies with contacts, in the order of the tile.
     links: Vec<Pair>,
     /// For each node which body of the tile it is.
     touched: Vec<u32>,
     /// The first node that is a ghost.
     pub(crate) first_ghost: usize,
-    pub(crate) frozen: bool,
+    frozen: bool,
 }
 
-/// A ghost among the solver's bodies.
+/// A body of the solver whose velocity is given from outside: a ghost, or a [`Carrier`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ghost {
     pub(crate) place: SolverIndex,
-    /// What it is given in every substep, mass-weighted; its velocity, if it is frozen.
+    /// What it is given in every substep, mass-weighted; its velocity, if it is held.
     pub(crate) given: [f32; 3],
+    /// Whether nothing else moves it.
+    pub(crate) held: bool,
 }
+
+/// Stands for a static whose surface moves, in one of its contacts: a body of a velocity that no impulse changes. One for each contact,
+/// as bodies that share one could not be solved side by side, and would be one island.
+#[derive(Clone, Copy, Debug)]
+struct Carrier {
+    contact: u32,
+    /// The static, among the bodies of the tile.
+    body: u32,
+    /// Who touches it, as a node of the graph.
+    partner: u32,
+}
+
+/// The roots of the mass and the inertia of a carrier: so large that nothing is left of what an impulse does to its velocity.
+const CARRIER: f32 = (1_u64 << 50) as f32;
+
+/// More than the root of a carrier's inverse mass, less than that of any body.
+pub(crate) const LIGHTEST: f32 = 2.0 / CARRIER;
 
 const ZERO: Quad = [0.0; 4];
 
 impl SolverBodies {
     /// Numbers the bodies that have contacts: the nodes of the contact graph.
-    pub(crate) fn number(&mut self, tile: &Tile, contacts: &[Pair]) {
+    pub(crate) fn number(&mut self, tile: &Tile, contacts: &[Pair], setup: &Setup) {
         let dynamic = tile.owned + tile.ghosts();
         self.node = forget(std::mem::take(&mut self.index), tile.bodies.len());
         // Whoever has a contact is taken for a static, until it turns out to move.
@@ -83,6 +108,34 @@ impl SolverBodies {
                 self.links.push([a, b]);
             }
         }
+        self.carriers.clear();
+        if setup.any_drives() {
+            self.number_carriers(tile, contacts, setup);
+        }
+    }
+
+    /// Carriers are nodes behind all others, known by places behind all bodies of the tile.
+    fn number_carriers(&mut self, tile: &Tile, contacts: &[Pair], setup: &Setup) {
+        for (contact, &[a, b]) in (0..).zip(contacts) {
+            for (body, other) in [(a, b), (b, a)] {
+                let is_static = self.node[body as usize] == GraphNode::STATIC;
+                if is_static && setup.drives(tile.bodies.kind[body as usize]) {
+                    let partner = self.node[other as usize].number().expect("one of a contact's bodies moves");
+                    self.node.push(GraphNode::new((self.touched.len() + self.carriers.len()) as u32));
+                    self.carriers.push(Carrier { contact, body, partner });
+                }
+            }
+        }
+    }
+
+    /// Who touches a static whose surface moves: as nodes, one for each carrier, which belongs to their islands.
+    pub(crate) fn carried(&self) -> impl Iterator<Item = u32> + '_ {
+        self.carriers.iter().map(|carrier| carrier.partner)
+    }
+
+    /// The body of the tile that a node is.
+    pub(crate) fn body_of(&self, node: u32) -> u32 {
+        self.touched[node as usize]
     }
 
     /// For each body of the tile what it is in the graph of contacts.
@@ -106,11 +159,15 @@ impl SolverBodies {
     }
 
     /// Takes in the bodies of the batches.
-    pub(crate) fn load(&mut self, tile: &Tile, batches: &Batches, setup: &Setup) {
+    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, batches: &Batches, setup: &Setup) {
         let total = batches.all.last().map_or(0, |batch| batch.bodies.end);
         for column in [&mut self.velocity, &mut self.pose, &mut self.start, &mut self.weight] {
             column.clear();
             column.resize(total, ZERO);
+        }
+        self.factors.clear();
+        if !setup.factors.is_empty() {
+            self.factors.resize(total, ZERO);
         }
         self.ghosts.clear();
         self.frozen = setup.params.ghosts == Ghosts::Frozen;
@@ -129,12 +186,36 @@ impl SolverBodies {
             self.velocity[place.get()] = [velocity[0], velocity[1], velocity[2], 0.0];
             self.weight[place.get()] =
                 [root_mass, root_inertia, kind.root_inv_inertia / scale, kind.root_inv_mass / scale];
+            if let Some(&factors) = setup.factors.get(bodies.kind[i].0 as usize) {
+                self.factors[place.get()] = factors;
+            }
             if i >= tile.owned {
                 let given = if self.frozen { velocity } else { self.given(place, &tile.unseen[i - tile.owned]) };
-                self.ghosts.push(Ghost { place, given });
+                self.ghosts.push(Ghost { place, given, held: self.frozen });
             }
         }
+        self.load_carriers(tile, contacts, setup);
         self.ghosts.sort_unstable_by_key(|ghost| ghost.place);
+    }
+
+    /// A carrier goes as its static does; where that is a belt, along the contact as well, which the separation does not show.
+    fn load_carriers(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
+        let bodies = &tile.bodies;
+        for (&Carrier { contact, body, .. }, &place) in self.carriers.iter().zip(&self.index[bodies.len()..]) {
+            if place == SolverIndex::NOT_SOLVED {
+                continue;
+            }
+            let [first, _] = contacts.bodies[contact as usize];
+            let normal = contacts.cache.contacts[contact as usize].normal;
+            let outward = if first == body { normal } else { -normal };
+            let i = body as usize;
+            let runs = right_perp(outward) * setup.kind(bodies.kind[i]).material.surface_speed;
+            let velocity = bodies.velocity[i] + runs;
+            let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
+            self.velocity[place.get()] = [given[0], given[1], given[2], 0.0];
+            self.weight[place.get()] = [CARRIER, CARRIER, 1.0 / CARRIER, 1.0 / CARRIER];
+            self.ghosts.push(Ghost { place, given, held: true });
+        }
     }
 
     /// What the roots of a body's masses are multiplied by.
@@ -182,6 +263,20 @@ impl SolverBodies {
             Vec2::new(x, y) * root_inv_mass
         };
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
+    }
+
+    /// Whether there are any that stand for statics whose surface moves.
+    #[inline(always)]
+    pub(crate) fn have_carriers(&self) -> bool {
+        !self.carriers.is_empty()
+    }
+
+    /// Which of these the bodies of a contact are, given their places: of a static whose surface moves, the one that carries there.
+    #[cold]
+    pub(crate) fn carried_in(&self, contact: u32, places: [SolverIndex; 2]) -> [SolverIndex; 2] {
+        let Ok(found) = self.carriers.binary_search_by_key(&contact, |carrier| carrier.contact) else { return places };
+        let carrier = self.index[self.index.len() - self.carriers.len() + found];
+        places.map(|place| if place == SolverIndex::STATIC { carrier } else { place })
     }
 
     /// Which of these a body of the tile is.

@@ -23,12 +23,13 @@ pub(crate) struct Job<'a> {
     pub(crate) pose: Shared<'a, Quad>,
     pub(crate) start: Shared<'a, Quad>,
     pub(crate) weight: &'a [Quad],
+    /// Empty where all bodies move alike by themselves.
+    pub(crate) factors: &'a [Quad],
     pub(crate) groups: SharedColumns<'a>,
     pub(crate) colors: &'a [Color],
     /// Sorted by place, which counts from `base`.
     pub(crate) ghosts: &'a [Ghost],
     pub(crate) base: usize,
-    pub(crate) frozen: bool,
     /// Whether it waits for word from other tiles, or gives it, between substeps.
     pub(crate) at_border: bool,
     /// Whether it is worth a crew.
@@ -84,10 +85,16 @@ impl<'a> Job<'a> {
             let (velocities, starts) = unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
             let weights = self.weight[range.clone()].as_chunks::<LANES>().0;
             let (velocity, start) = (velocities.as_chunks_mut::<LANES>().0, starts.as_chunks_mut::<LANES>().0);
-            for ((velocity, start), weight) in velocity.iter_mut().zip(start).zip(weights) {
+            let factors =
+                if self.factors.is_empty() { &[] } else { self.factors[range.clone()].as_chunks::<LANES>().0 };
+            for (i, ((velocity, start), weight)) in velocity.iter_mut().zip(start).zip(weights).enumerate() {
                 let [vx, vy, w, rest] = V::load_quads(velocity);
                 let [root_mass, root_inertia, ..] = V::load_quads(weight);
-                let new = motion.accelerate([vx, vy, w], root_mass, root_inertia);
+                let outer = match factors.get(i) {
+                    None => motion.outer(),
+                    Some(factors) => motion.outer_of(factors),
+                };
+                let new = motion.accelerate(outer, [vx, vy, w], root_mass, root_inertia);
                 let [nx, ny, nw] = new;
                 let warm = if first {
                     new
@@ -101,7 +108,7 @@ impl<'a> Job<'a> {
             for ghost in self.ghosts_in(&range) {
                 let i = ghost.place.get() - self.base - range.start;
                 for (k, given) in ghost.given.into_iter().enumerate() {
-                    if self.frozen {
+                    if ghost.held {
                         (starts[i][k], velocities[i][k]) = (given, given);
                     } else {
                         starts[i][k] += given;

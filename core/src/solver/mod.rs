@@ -53,6 +53,8 @@ use std::ops::Range;
 pub(crate) struct Solver {
     pub(crate) bodies: SolverBodies,
     islands: Islands,
+    /// The roots of all nodes, those of carriers last, where there are carriers.
+    carried_roots: Vec<u32>,
     batches: Batches,
     coloring: Coloring,
     pub(crate) groups: Groups,
@@ -107,26 +109,35 @@ impl Solver {
         setup: &Setup,
         team: Team,
     ) -> IslandSizes {
-        let Self { bodies, islands, batches, .. } = self;
-        bodies.number(tile, contacts);
+        let Self { bodies, islands, batches, carried_roots, .. } = self;
+        bodies.number(tile, contacts, setup);
         let (nodes, links) = bodies.graph();
         let sizes = islands.find(setup.params.island_search, nodes, links, team);
         let roots = islands.roots();
+        // Whoever is moved does not rest.
+        bodies.carried().for_each(|node| tile.sleep.wake(bodies.body_of(node) as usize));
         // Not those of ghosts alone.
         let own = (0..bodies.first_ghost as u32).zip(roots).filter(|(node, root)| node == *root).count() as u64;
         debug_assert!(own == sizes.islands || setup.overlap.is_some());
         tile.fall_asleep(bodies.nodes(), roots, setup);
         let sleeps = setup.params.sleep.then(|| tile.sleep.islands());
         let heard_of = setup.params.exchange == Exchange::Substep;
-        let first_ghost = if heard_of { bodies.first_ghost } else { roots.len() };
-        let graph = Graph { contacts, roots, largest: sizes.largest, first_ghost, sent, sleeps };
+        let ghosts = if heard_of { bodies.first_ghost..nodes } else { 0..0 };
+        carried_roots.clear();
+        let roots = if bodies.carried().next().is_none() {
+            roots
+        } else {
+            carried_roots.extend(roots.iter().copied().chain(bodies.carried().map(|node| roots[node as usize])));
+            carried_roots
+        };
+        let graph = Graph { contacts, roots, largest: sizes.largest, ghosts, sent, sleeps };
         bodies.arrange(batches, graph, setup.params.parallel, team);
         IslandSizes { islands: own, ..sizes }
     }
 
     /// Takes in the bodies of the batches.
-    pub(crate) fn load(&mut self, tile: &Tile, setup: &Setup) {
-        self.bodies.load(tile, &self.batches, setup);
+    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
+        self.bodies.load(tile, contacts, &self.batches, setup);
     }
 
     /// Colors the contacts and gives each its place, as long as they do not have both. Returns how many colors there are.
@@ -177,11 +188,11 @@ impl Solver {
     /// The batches, each with its part of the buffers.
     fn jobs(&mut self) -> impl Iterator<Item = Job<'_>> {
         const IN_ORDER: &str = "batches lie in order";
-        let SolverBodies { velocity, pose, start, weight, ghosts, frozen, .. } = &mut self.bodies;
+        let SolverBodies { velocity, pose, start, weight, factors, ghosts, .. } = &mut self.bodies;
         let (mut groups, colors) = self.groups.parts();
         let (mut velocity, mut pose, mut start) = (&mut velocity[..], &mut pose[..], &mut start[..]);
         let mut ghosts = &ghosts[..];
-        let (weight, frozen) = (&weight[..], *frozen);
+        let (weight, factors) = (&weight[..], &factors[..]);
         self.batches.all.iter().map(move |batch| {
             let bodies = batch.bodies.len();
             let own_ghosts = ghosts.partition_point(|ghost| ghost.place.get() < batch.bodies.end);
@@ -191,11 +202,11 @@ impl Solver {
                 pose: Shared::new(pose.split_off_mut(..bodies).expect(IN_ORDER)),
                 start: Shared::new(start.split_off_mut(..bodies).expect(IN_ORDER)),
                 weight: &weight[batch.bodies.clone()],
+                factors: if factors.is_empty() { &[] } else { &factors[batch.bodies.clone()] },
                 groups: groups.split_off(lengths(&batch.groups)).share(),
                 colors,
                 ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
                 base: batch.bodies.start,
-                frozen,
                 at_border: batch.at_border,
                 large: batch.large && colors.iter().any(|color| color.slices > 1),
             }

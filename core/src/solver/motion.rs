@@ -1,7 +1,7 @@
 //! How bodies move within a substep: gravity, damping, speed limits, and positions by velocities.
 
 use crate::model::math::min;
-use crate::parallel::lanes::Lanes;
+use crate::parallel::lanes::{LANES, Lanes, Quad};
 use crate::parallel::vectors::Vectors;
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
@@ -30,6 +30,14 @@ pub(crate) struct Motion {
     max_angular_speed: f32,
 }
 
+/// What moves some bodies in a substep: velocity gained, and what velocities are multiplied by.
+#[derive(Clone, Copy)]
+pub(crate) struct Outer<V> {
+    gravity: [V; 2],
+    linear_damping: V,
+    angular_damping: V,
+}
+
 impl Motion {
     pub(crate) fn new(setup: &Setup) -> Self {
         let (h, params) = (setup.h, &setup.params);
@@ -46,13 +54,37 @@ impl Motion {
         }
     }
 
+    /// What moves bodies that move as most do.
+    #[inline(always)]
+    pub(crate) fn outer<V: Lanes>(&self) -> Outer<V> {
+        Outer {
+            gravity: [V::splat(self.gravity.x), V::splat(self.gravity.y)],
+            linear_damping: V::splat(self.linear_damping),
+            angular_damping: V::splat(self.angular_damping),
+        }
+    }
+
+    /// What moves bodies each of which moves in a way of its own.
+    #[inline(always)]
+    pub(crate) fn outer_of<V: Lanes>(&self, factors: &[Quad; LANES]) -> Outer<V> {
+        let [gravity, linear_damping, angular_damping, _] = V::load_quads(factors);
+        let gravity = [self.gravity.x, self.gravity.y].map(|part| V::splat(part).mul(gravity));
+        Outer { gravity, linear_damping, angular_damping }
+    }
+
     /// The velocities after the substep's outer forces. The roots of mass and inertia weigh them; ones do not.
     #[inline(always)]
-    pub(crate) fn accelerate<V: Lanes>(&self, [vx, vy, w]: [V; 3], root_mass: V, root_inertia: V) -> [V; 3] {
+    pub(crate) fn accelerate<V: Lanes>(
+        &self,
+        outer: Outer<V>,
+        [vx, vy, w]: [V; 3],
+        root_mass: V,
+        root_inertia: V,
+    ) -> [V; 3] {
         let one = V::splat(1.0);
-        let damping = V::splat(self.linear_damping);
-        let mut vx = vx.add(root_mass.mul(V::splat(self.gravity.x))).mul(damping);
-        let mut vy = vy.add(root_mass.mul(V::splat(self.gravity.y))).mul(damping);
+        let Outer { gravity: [gx, gy], linear_damping: damping, angular_damping } = outer;
+        let mut vx = vx.add(root_mass.mul(gx)).mul(damping);
+        let mut vy = vy.add(root_mass.mul(gy)).mul(damping);
         if self.max_linear_speed < f32::INFINITY {
             let speed = vx.mul(vx).add(vy.mul(vy)).sqrt();
             let limit = V::splat(self.max_linear_speed).mul(root_mass);
@@ -60,7 +92,7 @@ impl Motion {
             (vx, vy) = (vx.mul(scale), vy.mul(scale));
         }
         let limit = V::splat(self.max_angular_speed).mul(root_inertia);
-        let w = w.mul(V::splat(self.angular_damping)).min(limit).max(V::splat(0.0).sub(limit));
+        let w = w.mul(angular_damping).min(limit).max(V::splat(0.0).sub(limit));
         [vx, vy, w]
     }
 

@@ -2,7 +2,7 @@
 
 use super::bodies::SolverBodies;
 use super::index::SolverIndex;
-use super::motion::Motion;
+use super::motion::{Motion, Outer};
 use crate::exchange::rim::{Rim, RimBody};
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId};
@@ -95,6 +95,7 @@ impl<'a> Owned<'a> {
             velocity: blocks(&mut self.velocity[range.clone()]),
             spin: blocks(&mut self.angular_velocity[range.clone()]),
             place: self.place[range.clone()].as_chunks().0.try_into().expect("as many"),
+            kind: self.kind[range.clone()].as_chunks().0.try_into().expect("as many"),
             asleep: if self.asleep.is_empty() { &[] } else { &self.asleep[range] },
         }
     }
@@ -126,6 +127,7 @@ struct Eights<'a, const N: usize> {
     velocity: &'a mut [[Pair; LANES]; N],
     spin: &'a mut [Row; N],
     place: &'a [[SolverIndex; LANES]; N],
+    kind: &'a [[KindId; LANES]; N],
     /// Empty where nobody sleeps.
     asleep: &'a [bool],
 }
@@ -192,11 +194,13 @@ impl WriteBack<'_> {
         let (mut position, mut rotation, mut velocity) =
             ([[[0.0; 2]; LANES]], [[[1.0, 0.0]; LANES]], [[[0.0; 2]; LANES]]);
         let (mut spin, mut place, mut asleep) = ([[0.0; LANES]], [[SolverIndex::NOT_SOLVED; LANES]], [false; LANES]);
+        let mut kind = [[KindId(0); LANES]];
         position[0][..count].copy_from_slice(&owned.position[rest.clone()]);
         rotation[0][..count].copy_from_slice(&owned.rotation[rest.clone()]);
         velocity[0][..count].copy_from_slice(&owned.velocity[rest.clone()]);
         spin[0][..count].copy_from_slice(&owned.angular_velocity[rest.clone()]);
         place[0][..count].copy_from_slice(&owned.place[rest.clone()]);
+        kind[0][..count].copy_from_slice(&owned.kind[rest.clone()]);
         if !owned.asleep.is_empty() {
             asleep[..count].copy_from_slice(&owned.asleep[rest.clone()]);
         }
@@ -206,6 +210,7 @@ impl WriteBack<'_> {
             velocity: &mut velocity,
             spin: &mut spin,
             place: &place,
+            kind: &kind,
             asleep: if owned.asleep.is_empty() { &[] } else { &asleep },
         };
         self.mover.go::<V, 1>(eight);
@@ -251,7 +256,7 @@ impl Mover<'_> {
     /// for all of them where there are some of either. Whether those of each block concern no other tile now, and all are finite.
     #[inline(always)]
     fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>) -> ([bool; N], bool) {
-        let Eights { position, rotation, velocity, spin, place, asleep } = eights;
+        let Eights { position, rotation, velocity, spin, place, kind, asleep } = eights;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let nothing = Vectors::new(zero, zero);
         let mut motions = [Motions { moved: nothing, turned: nothing, velocity: nothing, spin: zero }; N];
@@ -272,7 +277,7 @@ impl Mover<'_> {
             (motions[block].velocity, motions[block].spin) = (Vectors::new(vx, vy), V::load(&spin[block]));
         }
         if flying > 0 {
-            self.fly(&mut motions);
+            self.fly(&mut motions, kind);
         }
         if flying < (N * LANES) as u32 {
             for block in 0..N {
@@ -317,15 +322,30 @@ impl Mover<'_> {
 
     /// Bodies without contacts, through all substeps.
     #[inline(always)]
-    fn fly<V: Lanes, const N: usize>(&self, blocks: &mut [Motions<V>; N]) {
+    fn fly<V: Lanes, const N: usize>(&self, blocks: &mut [Motions<V>; N], kinds: &[[KindId; LANES]; N]) {
+        let alike = self.motion.outer();
+        if self.setup.factors.is_empty() {
+            return self.fly_by::<V, N, false>(blocks, &[alike; N]);
+        }
+        let mut outer = [alike; N];
+        for (outer, kinds) in outer.iter_mut().zip(kinds) {
+            *outer = self.motion.outer_of(&kinds.map(|kind| self.setup.factors[kind.0 as usize]));
+        }
+        self.fly_by::<V, N, true>(blocks, &outer);
+    }
+
+    /// As [`fly`](Self::fly), by what moves each block, or all of them alike: that stays in registers.
+    #[inline(always)]
+    fn fly_by<V: Lanes, const N: usize, const EACH: bool>(&self, blocks: &mut [Motions<V>; N], outer: &[Outer<V>; N]) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
         for block in &mut *blocks {
             (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
         }
         for _ in 0..self.setup.params.integrations() {
-            for block in &mut *blocks {
+            for (i, block) in blocks.iter_mut().enumerate() {
+                let outer = if EACH { outer[i] } else { self.motion.outer() };
                 let velocity = [block.velocity.x, block.velocity.y, block.spin];
-                let [vx, vy, spin] = self.motion.accelerate(velocity, one, one);
+                let [vx, vy, spin] = self.motion.accelerate(outer, velocity, one, one);
                 (block.velocity, block.spin) = (Vectors::new(vx, vy), spin);
                 block.moved = Vectors::new(block.moved.x.add(h.mul(vx)), block.moved.y.add(h.mul(vy)));
                 block.turned = self.motion.turn_on(block.turned, spin);

@@ -168,7 +168,7 @@ impl Overlaps {
 #[derive(Default)]
 struct BodySums {
     twice_kinetic: f64,
-    /// Of masses about the low corner of the domain.
+    /// Of the masses that gravity pulls, about the low corner of the domain.
     moment: [f64; 2],
     momentum: [f64; 2],
     angular: f64,
@@ -216,25 +216,25 @@ struct WideSums {
 }
 
 impl WideSums {
-    /// Adds four bodies: masses and moments of inertia, places, velocities and spins.
+    /// Adds four bodies: masses, moments of inertia and masses that gravity pulls, places, velocities and spins.
     #[inline(always)]
     fn add(
         &mut self,
-        masses: [[f32; 2]; WIDTH],
+        masses: [[f32; 3]; WIDTH],
         positions: &[DVec2; WIDTH],
         velocities: &[Vec2; WIDTH],
         spins: &[f32; WIDTH],
         setup: &Setup,
     ) {
         let low = setup.partition.min();
-        let (mass, inertia) = (each(|k| f64::from(masses[k][0])), each(|k| f64::from(masses[k][1])));
+        let [mass, inertia, pulled] = [0, 1, 2].map(|column| each(|k| f64::from(masses[k][column])));
         let (x, y) = (each(|k| positions[k].x), each(|k| positions[k].y));
         let (dx, dy) = (sub(x, [low.x; WIDTH]), sub(y, [low.y; WIDTH]));
         let (vx, vy) = (each(|k| f64::from(velocities[k].x)), each(|k| f64::from(velocities[k].y)));
         let w = each(|k| f64::from(spins[k]));
         let (px, py, spin) = (mul(mass, vx), mul(mass, vy), mul(inertia, w));
         self.momentum = [add(self.momentum[0], px), add(self.momentum[1], py)];
-        self.moment = [add(self.moment[0], mul(mass, dx)), add(self.moment[1], mul(mass, dy))];
+        self.moment = [add(self.moment[0], mul(pulled, dx)), add(self.moment[1], mul(pulled, dy))];
         self.twice_kinetic = add(self.twice_kinetic, add(add(mul(px, vx), mul(py, vy)), mul(spin, w)));
         self.angular = add(self.angular, add(sub(mul(x, py), mul(y, px)), spin));
     }
@@ -273,7 +273,7 @@ impl Kernel for SumBodies<'_> {
             positions[..few].copy_from_slice(last_positions);
             velocities[..few].copy_from_slice(last_velocities);
             spins[..few].copy_from_slice(last_spins);
-            let masses = std::array::from_fn(|k| last_kinds.get(k).map_or([0.0; 2], |&kind| setup.kind(kind).masses()));
+            let masses = std::array::from_fn(|k| last_kinds.get(k).map_or([0.0; 3], |&kind| setup.kind(kind).masses()));
             sums.add(masses, &positions, &velocities, &spins, setup);
         }
         sums.total()

@@ -159,7 +159,7 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
     if verdict.is_far() {
         world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::send(b.tile, b.outgoing, b.setup)));
         world.exchange(halo)?;
-        world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::receive(b.tile, b.mail, b.setup)));
+        world.each_tile(|bench| bench.stage(Phase::Migrate, |b| far::receive(b.tile, b.mail, b.setup, b.step)));
     }
     world.dismiss_idle();
     Ok(verdict)
@@ -195,7 +195,7 @@ fn prepare(bench: &mut Bench<'_>) {
         let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
         let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
         let islands = solver.arrange(b.tile, contacts, sent, b.setup, b.team);
-        solver.load(b.tile, b.setup);
+        solver.load(b.tile, contacts, b.setup);
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
         (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);

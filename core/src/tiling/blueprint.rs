@@ -4,13 +4,14 @@ use crate::exchange::overlap;
 use crate::model::body::{Body, StaticBody};
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::kind::{Dynamics, Filter, Kind, KindRow};
 use crate::model::math::{self, Rot};
 use crate::model::params::{Exchange, Params};
-use crate::model::shape::{Kind, KindRow};
+use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
 use crate::tiling::partition::Partition;
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 
 /// Everything about a world but its dynamic bodies. Every rank must be given the same.
 #[derive(Clone, PartialEq, Debug)]
@@ -21,7 +22,7 @@ pub struct Blueprint {
     pub partition: Partition,
     /// Shapes and materials of dynamic bodies; a body names its row. The largest sets the width of the halo.
     pub kinds: Vec<Kind>,
-    /// Bodies that never move.
+    /// Bodies that never move, or move whatever they meet.
     pub statics: Vec<StaticBody>,
 }
 
@@ -52,6 +53,17 @@ fn width_for(radius: f32, params: &Params) -> f64 {
     f64::from(radius + params.margin_cap) * 1.001
 }
 
+/// Whether bodies of a kind do not touch all others.
+fn is_choosy(kind: &KindRow) -> bool {
+    kind.sensor || kind.filter != Filter::default()
+}
+
+/// How the bodies of each kind move by themselves; empty if all do alike.
+fn factors(kinds: &[KindRow], params: &Params) -> Vec<[f32; 4]> {
+    let all_alike = kinds.iter().all(|kind| kind.dynamics == Dynamics::default());
+    if all_alike { Vec::new() } else { kinds.iter().map(|kind| kind.dynamics.factors(params)).collect() }
+}
+
 /// The blueprint, made ready.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
@@ -61,6 +73,10 @@ pub(crate) struct Setup {
     pub(crate) kinds: Vec<KindRow>,
     pub(crate) dynamic_kinds: usize,
     pub(crate) statics: Vec<Body>,
+    /// How each of them moves; empty where none does.
+    paths: Vec<Option<Path>>,
+    /// For each of them whether its surface moves; empty where none does.
+    driving: Vec<bool>,
     /// Their names, sorted.
     static_names: Vec<GlobalId>,
     /// Bodies this near a tile's region may matter to it, in meters.
@@ -79,6 +95,10 @@ pub(crate) struct Setup {
     pub(crate) totals: bool,
     /// Whether anything bounces.
     pub(crate) bouncy: bool,
+    /// Whether there are bodies that do not touch all others.
+    pub(crate) filters: bool,
+    /// For each dynamic kind how its bodies move by themselves ([`Dynamics::factors`]); empty where all do alike.
+    pub(crate) factors: Vec<[f32; 4]>,
 }
 
 impl Setup {
@@ -108,12 +128,17 @@ impl Setup {
                 angular_velocity: 0.0,
                 kind: KindId(kinds.len() as u32),
             };
-            if !body.is_finite() {
+            if !body.is_finite() || fixed.path.is_some_and(|path| !path.is_valid()) {
                 return Err(refuse);
             }
             kinds.push(row);
             statics.push(body);
         }
+        let any_moves = blueprint.statics.iter().any(|fixed| fixed.path.is_some());
+        let paths = if any_moves { blueprint.statics.iter().map(|fixed| fixed.path).collect() } else { Vec::new() };
+        let drives = |fixed: &StaticBody| fixed.path.is_some() || fixed.kind.material.surface_speed != 0.0;
+        let any_drives = blueprint.statics.iter().any(drives);
+        let driving = if any_drives { blueprint.statics.iter().map(drives).collect() } else { Vec::new() };
         let mut static_names: Vec<_> = statics.iter().map(|body| body.id).collect();
         static_names.sort_unstable();
         if let Some(pair) = static_names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -121,6 +146,8 @@ impl Setup {
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
+        let filters = kinds.iter().any(is_choosy);
+        let factors = factors(&kinds[..dynamic_kinds], &params);
         Ok(Self {
             partition: blueprint.partition.clone(),
             halo_width,
@@ -133,9 +160,13 @@ impl Setup {
             static_softness: Softness::static_contact(&params),
             totals: bouncy || params.exchange == Exchange::Substep,
             bouncy,
+            filters,
+            factors,
             kinds,
             dynamic_kinds,
             statics,
+            paths,
+            driving,
             static_names,
             params,
         })
@@ -150,12 +181,14 @@ impl Setup {
     pub(crate) fn with_kind(&self, kind: &Kind) -> Result<Self, SetupError> {
         let row = KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32))?;
         let mut setup = self.clone();
+        setup.set_halo_width(self.halo_width.max(width_for(row.bounding_radius, &self.params)));
         setup.kinds.insert(self.dynamic_kinds, row);
         setup.dynamic_kinds += 1;
         setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
-        setup.set_halo_width(self.halo_width.max(width_for(row.bounding_radius, &self.params)));
         setup.bouncy |= kind.material.restitution > 0.0;
         setup.totals |= setup.bouncy;
+        setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
+        setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
         Ok(setup)
     }
 
@@ -219,10 +252,42 @@ impl Setup {
     /// three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
         let reach = if self.overlap.is_some() { 3.0 * self.halo_width } else { self.halo_width };
-        let reaches = |body: &Body| {
-            let half = self.kind(body.kind).half_extents(body.rotation);
-            self.partition.reaches(tile, body.position, half, reach)
+        let reaches = |row: u32, body: &Body| match self.path(row) {
+            None => {
+                let half = self.kind(body.kind).half_extents(body.rotation);
+                self.partition.reaches(tile, body.position, half, reach)
+            }
+            // Wherever it may be at any time, turned any way.
+            Some(path) => {
+                let bound = DVec2::splat(f64::from(self.kind(body.kind).bounding_radius) + reach);
+                let [least, most] = path.extent().map(|moved| body.position + moved);
+                self.partition.region(tile).meets(least - bound, most + bound)
+            }
         };
-        (0..).zip(&self.statics).filter(|(_, body)| reaches(body)).map(|(row, _)| row).collect()
+        (0..).zip(&self.statics).filter(|&(row, body)| reaches(row, body)).map(|(row, _)| row).collect()
+    }
+
+    /// How a static moves, if it does.
+    pub(crate) fn path(&self, row: u32) -> Option<&Path> {
+        self.paths.get(row as usize)?.as_ref()
+    }
+
+    /// A static as a step begins.
+    pub(crate) fn static_at(&self, row: u32, step: u64) -> Body {
+        let body = self.statics[row as usize];
+        let Some(path) = self.path(row) else { return body };
+        let Course { position, rotation, velocity, angular_velocity } =
+            path.course(body.position, body.rotation, step, self.params.dt);
+        Body { position, rotation, velocity, angular_velocity, ..body }
+    }
+
+    /// Whether the surface of any static moves.
+    pub(crate) fn any_drives(&self) -> bool {
+        !self.driving.is_empty()
+    }
+
+    /// Whether the surface of a static moves, on a path or as a belt.
+    pub(crate) fn drives(&self, fixed: KindId) -> bool {
+        self.any_drives() && self.driving[fixed.0 as usize - self.dynamic_kinds]
     }
 }

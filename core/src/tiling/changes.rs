@@ -191,7 +191,8 @@ impl Tile {
         });
         if !self.bodies.is_empty() {
             self.bodies.truncate(self.owned + self.ghosts());
-            self.push_statics(setup);
+            // Where they are the next step tells.
+            self.push_statics(setup, 0);
         }
         self.interior = self.region.shrunk(setup.inset);
         self.rim.is_known = false;

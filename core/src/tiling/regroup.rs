@@ -189,9 +189,11 @@ impl Target {
             tile.ghost_owners.push(owner);
         }
         tile.unseen = vec![Unseen::default(); ghosts.len()];
-        tile.push_statics(setup);
-        entries.sort_unstable_by(|a, b| a.pair.cmp(&b.pair).then(b.authority.cmp(&a.authority)));
-        entries.dedup_by_key(|entry| entry.pair);
+        // Where they are the next step tells.
+        tile.push_statics(setup, 0);
+        let name = |entry: &Entry| (entry.pair, entry.contact.pieces());
+        entries.sort_unstable_by(|a, b| name(a).cmp(&name(b)).then(b.authority.cmp(&a.authority)));
+        entries.dedup_by_key(|entry| name(entry));
         let (owned, ghost_count) = (tile.owned, ghosts.len());
         let slot = |end: End| {
             let index = match end {
@@ -212,7 +214,7 @@ impl Target {
                 Some((if a < b { PairKey::new(a, b) } else { PairKey::new(b, a) }, entry.contact))
             })
             .collect();
-        contacts.sort_unstable_by_key(|(key, _)| *key);
+        contacts.sort_unstable_by_key(|(key, contact)| (*key, contact.pieces()));
         let (keys, contacts) = contacts.into_iter().unzip();
         tile.contacts = ContactCache { keys, contacts };
         tile

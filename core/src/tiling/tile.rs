@@ -159,10 +159,10 @@ impl Tile {
         self.violation = Violation::default();
     }
 
-    /// Puts the statics behind owned bodies and ghosts.
-    pub(crate) fn push_statics(&mut self, setup: &Setup) {
+    /// Puts the statics behind owned bodies and ghosts, as they are at the beginning of a step.
+    pub(crate) fn push_statics(&mut self, setup: &Setup, step: u64) {
         for &row in &self.statics {
-            self.bodies.push(setup.statics[row as usize]);
+            self.bodies.push(setup.static_at(row, step));
         }
     }
 

@@ -5,8 +5,8 @@ use super::locator::{At, Locator, Place};
 use crate::model::body::Body;
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId};
+use crate::model::kind::{Kind, KindRow};
 use crate::model::names::Names;
-use crate::model::shape::{Kind, KindRow};
 use crate::state::questions::Index;
 use crate::tiling::tile::Tile;
 use rayon::prelude::*;
@@ -118,8 +118,7 @@ impl World {
 
     /// The table of kinds as it is now.
     pub fn kinds(&self) -> impl ExactSizeIterator<Item = Kind> + '_ {
-        let kind = |row: &KindRow| Kind { shape: row.shape, material: row.material };
-        self.setup.kinds[..self.setup.dynamic_kinds].iter().map(kind)
+        self.setup.kinds[..self.setup.dynamic_kinds].iter().map(KindRow::kind)
     }
 
     /// Settles which place those bodies have that came since the last step, and that others left. A step begins with this; whoever

@@ -6,9 +6,9 @@ use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId};
+use crate::model::kind::{Kind, KindRow};
 use crate::model::math::cross;
 use crate::model::params::Params;
-use crate::model::shape::{Kind, KindRow};
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use std::sync::Arc;
@@ -108,7 +108,7 @@ impl World {
                 }
                 Ok(changed)
             }
-            Command::AddKind(kind) => self.add_kind(&kind).map(|_| true),
+            Command::AddKind(ref kind) => self.add_kind(kind).map(|_| true),
             Command::SetGravity(gravity) => {
                 Arc::make_mut(&mut self.setup).params.gravity = gravity;
                 self.tiles.iter_mut().for_each(|tile| tile.sleep.wake_all());
@@ -137,7 +137,7 @@ impl World {
                 let is_there = (kind.0 as usize) < self.setup.dynamic_kinds;
                 if is_there { Ok(()) } else { Err(SetupError::NoKind { id, kind }) }
             }
-            Command::AddKind(kind) => self.setup.check_kind(&kind),
+            Command::AddKind(ref kind) => self.setup.check_kind(kind),
             Command::SetGravity(gravity) => Params { gravity, ..self.setup.params.clone() }.check(),
             Command::Remove(_) | Command::Wake(_) => Ok(()),
         }

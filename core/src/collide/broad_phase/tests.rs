@@ -7,9 +7,10 @@ use crate::collide::proxies::Proxies;
 use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::kind::Kind;
 use crate::model::math::{Rot, dot, max};
 use crate::model::params::{Instructions, Params};
-use crate::model::shape::{Kind, Shape};
+use crate::model::shape::Shape;
 use crate::parallel::lanes::LaneSet;
 use crate::parallel::team::Team;
 use crate::testing::{any_kind, any_rotation, cases, circle, distance, rectangle};
@@ -182,6 +183,7 @@ pub(in crate::collide) fn any_tile(bodies: usize, statics: usize) -> impl Strate
             position: place(x, y),
             rotation,
             kind,
+            path: None,
         });
         let fixed = fixed.collect();
         Stuffed::new(size, kinds, bodies, owned, fixed)
@@ -197,7 +199,7 @@ impl std::fmt::Debug for Stuffed {
             self.tile.rectangle.min,
             self.tile.owned
         )?;
-        let kinds = self.tile.bodies.kind.iter().map(|&kind| self.setup.kind(kind).shape);
+        let kinds = self.tile.bodies.kind.iter().map(|&kind| &self.setup.kind(kind).shape);
         self.tile.bodies.iter().zip(kinds).try_for_each(|(body, shape)| writeln!(f, "{body:?} {shape:?}"))
     }
 }
@@ -233,7 +235,7 @@ proptest! {
             if !(slow(a) && slow(b)) {
                 continue;
             }
-            let [shape_a, shape_b] = [a, b].map(|body| tile.setup.kind(bodies.kind[body]).shape);
+            let [shape_a, shape_b] = [a, b].map(|body| &tile.setup.kind(bodies.kind[body]).shape);
             for part in (0..=16).map(|k| k as f32 / 16.0) {
                 let offset = tile.offset(pair) + (bodies.velocity[b] - bodies.velocity[a]) * (part * params.dt);
                 let apart = distance(shape_a, bodies.rotation[a], shape_b, bodies.rotation[b], offset);
@@ -286,6 +288,7 @@ fn a_wall_pairs_only_with_what_is_near_it() {
         position: DVec2::new(15.0, 9.0),
         rotation: Rot::IDENTITY,
         kind: rectangle(1_000.0, 2.0),
+        path: None,
     };
     let bodies = (0..400).map(|i| body(0, DVec2::new(f64::from(i % 20), f64::from(i / 20)) * 0.5)).collect();
     let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.1)], bodies, 1.0, vec![wall]);
@@ -298,13 +301,13 @@ fn a_wall_pairs_only_with_what_is_near_it() {
 fn shapes_know_their_distance() {
     // The oracle's own oracle.
     let (square, disc) = (Shape::rectangle(2.0, 2.0), Shape::circle(1.0));
-    let gap = |a, b, offset| distance(a, Rot::IDENTITY, b, Rot::IDENTITY, offset);
-    assert_eq!(gap(square, square, Vec2::new(3.0, 0.5)), 1.0);
-    assert_eq!(gap(square, square, Vec2::new(5.0, 6.0)), 5.0);
-    assert_eq!(gap(square, square, Vec2::new(0.1, 0.1)), 0.0);
-    assert_eq!(gap(square, disc, Vec2::new(4.0, 5.0)), 4.0);
-    assert_eq!(gap(disc, disc, Vec2::new(0.0, 3.0)), 1.0);
+    let gap = |a: &Shape, b: &Shape, offset| distance(a, Rot::IDENTITY, b, Rot::IDENTITY, offset);
+    assert_eq!(gap(&square, &square, Vec2::new(3.0, 0.5)), 1.0);
+    assert_eq!(gap(&square, &square, Vec2::new(5.0, 6.0)), 5.0);
+    assert_eq!(gap(&square, &square, Vec2::new(0.1, 0.1)), 0.0);
+    assert_eq!(gap(&square, &disc, Vec2::new(4.0, 5.0)), 4.0);
+    assert_eq!(gap(&disc, &disc, Vec2::new(0.0, 3.0)), 1.0);
     let turned =
-        distance(square, Rot::from_angle(std::f32::consts::FRAC_PI_4), disc, Rot::IDENTITY, Vec2::new(3.0, 0.0));
+        distance(&square, Rot::from_angle(std::f32::consts::FRAC_PI_4), &disc, Rot::IDENTITY, Vec2::new(3.0, 0.0));
     assert!((turned - (2.0 - 2.0_f64.sqrt())).abs() < 1e-6);
 }

@@ -1,16 +1,18 @@
 //! Manifolds: where and along what two shapes touch: of two boxes, and of a round body and any other.
 //!
-//! All of them see body A at the origin and body B at `offset`, in world directions. A new shape needs a line in [`collide`] for
-//! every pair it forms.
+//! All of them see body A at the origin and body B at `offset`, in world directions. Of shapes that are neither round nor boxes
+//! the convex pieces meet one by one.
 
 pub(super) mod box_box;
+mod chain;
+pub(super) mod convex;
 mod round;
 #[cfg(test)]
 mod tests;
 
 use crate::model::contact::ContactPoint;
+use crate::model::kind::{Form, KindRow};
 use crate::model::math::Rot;
-use crate::model::shape::{KindRow, Shape};
 use glam::Vec2;
 
 /// A point of a manifold.
@@ -44,6 +46,23 @@ impl Manifold {
         Self { normal, points: [point, ManifoldPoint::NONE], count: 1 }
     }
 
+    /// The same, of B and A, seen from A, from which B lies at `offset`; it was seen from B.
+    fn swapped(mut self, offset: Vec2) -> Self {
+        self.points[..self.count].iter_mut().for_each(|point| point.anchor += offset);
+        self.turned_round()
+    }
+
+    /// The same, of B and A.
+    fn turned_round(self) -> Self {
+        Self { normal: -self.normal, ..self }
+    }
+
+    /// The same, its features being those of these pieces.
+    pub(super) fn named(mut self, pieces: u32) -> Self {
+        self.points[..self.count].iter_mut().for_each(|point| point.feature |= pieces);
+        self
+    }
+
     pub(crate) fn push(&mut self, point: ManifoldPoint) {
         self.points[self.count] = point;
         self.count += 1;
@@ -65,11 +84,29 @@ impl Manifold {
     }
 }
 
-/// The manifold of two bodies whose surfaces are nearer than `reach`; further ones may give none.
+/// The manifold of two bodies, circles or boxes, whose surfaces are nearer than `reach`; further ones may give none.
 #[inline(always)]
 pub(crate) fn collide(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
-    match (a.shape, b.shape) {
-        (Shape::Box { half: ha }, Shape::Box { half: hb }) => box_box::collide(ha, rot_a, hb, rot_b, offset, reach),
+    match (a.form, b.form) {
+        (Form::Box, Form::Box) => box_box::collide(a.extent, rot_a, b.extent, rot_b, offset, reach),
         _ => round::collide(a, rot_a, b, rot_b, offset),
     }
+}
+
+/// The manifold of two bodies of any shapes where they are nearest.
+pub(crate) fn nearest(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
+    if a.form != Form::Pieces && b.form != Form::Pieces {
+        return collide(a, rot_a, b, rot_b, offset, reach);
+    }
+    let pairs = a.pieces.iter().flat_map(|a| b.pieces.iter().map(move |b| [a, b]));
+    let mut least = (f32::INFINITY, Manifold::EMPTY);
+    for pair in pairs {
+        let manifold = convex::collide(pair, [rot_a, rot_b], offset, reach);
+        if let Some(nearest) = manifold.nearest()
+            && nearest.separation < least.0
+        {
+            least = (nearest.separation, manifold);
+        }
+    }
+    least.1
 }

@@ -3,8 +3,8 @@
 //! One way for all of them, without a branch: kinds come in no order, and a branch on them would be a coin toss.
 
 use super::Manifold;
+use crate::model::kind::KindRow;
 use crate::model::math::{Rot, clamp, dot};
-use crate::model::shape::KindRow;
 use glam::Vec2;
 
 /// The manifold of two bodies, one of which is round: it has one point, of feature 0.

@@ -1,16 +1,17 @@
 //! Manifolds against the distance of outlines, found by trying every edge against every edge.
 
-use super::{Manifold, collide};
+use super::{Manifold, collide, convex};
 use crate::model::id::KindId;
+use crate::model::kind::{Form, Kind, KindRow, Material};
 use crate::model::math::Rot;
-use crate::model::shape::{Kind, KindRow, Shape};
-use crate::testing::{any_kind, any_rotation, cases, circle, distance, outline, rectangle};
+use crate::model::shape::Shape;
+use crate::testing::{any_convex, any_rotation, cases, circle, distance, outline, rectangle};
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use std::ops::Range;
 
 /// Two bodies; B lies at `offset` from A.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Two {
     a: Kind,
     rot_a: Rot,
@@ -26,15 +27,31 @@ fn row(kind: &Kind) -> KindRow {
 impl Two {
     /// With no end of a reach: a manifold, however far they are apart.
     fn manifold(&self) -> Manifold {
-        collide(&row(&self.a), self.rot_a, &row(&self.b), self.rot_b, self.offset, f32::INFINITY)
+        self.within(f32::INFINITY)
+    }
+
+    fn within(&self, reach: f32) -> Manifold {
+        let (a, b) = (row(&self.a), row(&self.b));
+        if a.form == Form::Pieces || b.form == Form::Pieces {
+            convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, reach)
+        } else {
+            collide(&a, self.rot_a, &b, self.rot_b, self.offset, reach)
+        }
+    }
+
+    /// As if both were made of pieces.
+    fn of_pieces(&self) -> Manifold {
+        let (a, b) = (row(&self.a), row(&self.b));
+        convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, f32::INFINITY)
     }
 
     fn swapped(&self) -> Self {
-        Self { a: self.b, rot_a: self.rot_b, b: self.a, rot_b: self.rot_a, offset: -self.offset }
+        let (a, b) = (self.b.clone(), self.a.clone());
+        Self { a, rot_a: self.rot_b, b, rot_b: self.rot_a, offset: -self.offset }
     }
 
     fn distance(&self) -> f64 {
-        distance(self.a.shape, self.rot_a, self.b.shape, self.rot_b, self.offset)
+        distance(&self.a.shape, self.rot_a, &self.b.shape, self.rot_b, self.offset)
     }
 
     /// The length that errors are measured by.
@@ -48,22 +65,48 @@ impl Two {
     }
 
     fn has_circle(&self) -> bool {
-        [self.a, self.b].iter().any(|kind| matches!(kind.shape, Shape::Circle { .. }))
+        [&self.a, &self.b].iter().any(|kind| matches!(kind.shape, Shape::Circle { .. }))
     }
 
-    /// How deep they are in each other: the least way out along the axes of both and 720 other directions.
+    /// How deep they are in each other: the least way out across the edges of both and in 720 other directions.
     fn sampled_depth(&self) -> f64 {
-        let (corners_a, round_a) = outline(self.a.shape, self.rot_a, DVec2::ZERO);
-        let (corners_b, round_b) = outline(self.b.shape, self.rot_b, self.offset.as_dvec2());
+        let (corners_a, round_a) = outline(&self.a.shape, self.rot_a, DVec2::ZERO);
+        let (corners_b, round_b) = outline(&self.b.shape, self.rot_b, self.offset.as_dvec2());
+        let across = |corners: &[DVec2]| -> Vec<DVec2> {
+            let next = corners.iter().cycle().skip(1);
+            corners.iter().zip(next).map(|(from, to)| (to - from).perp().normalize_or_zero()).collect()
+        };
         let depth = |axis: DVec2| {
             let front_a = corners_a.iter().map(|corner| corner.dot(axis)).fold(f64::NEG_INFINITY, f64::max) + round_a;
             let back_b = corners_b.iter().map(|corner| corner.dot(axis)).fold(f64::INFINITY, f64::min) - round_b;
             front_a - back_b
         };
-        let axes = [self.rot_a, self.rot_b].map(|rot| DVec2::new(f64::from(rot.c), f64::from(rot.s)));
-        let axes = axes.into_iter().flat_map(|axis| [axis, axis.perp(), -axis, -axis.perp()]);
+        let axes = across(&corners_a).into_iter().chain(across(&corners_b)).filter(|&axis| axis != DVec2::ZERO);
+        let axes = axes.flat_map(|axis| [axis, -axis]);
         let around = (0..720).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 720.0));
         axes.chain(around).map(depth).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Two {
+    /// Of shapes whose cores meet: the least way out across an edge of either.
+    fn exact_depth(&self) -> f64 {
+        let (corners_a, round_a) = outline(&self.a.shape, self.rot_a, DVec2::ZERO);
+        let (corners_b, round_b) = outline(&self.b.shape, self.rot_b, self.offset.as_dvec2());
+        let mut least = f64::INFINITY;
+        for (own, other) in [(&corners_a, &corners_b), (&corners_b, &corners_a)] {
+            for (from, to) in own.iter().zip(own.iter().cycle().skip(1)) {
+                let along = (to - from).normalize_or_zero();
+                // Two discs, whose cores are one point, part in any direction.
+                let axes = if along == DVec2::ZERO { vec![] } else { vec![-along.perp(), along.perp(), along, -along] };
+                for axis in axes {
+                    let front = own.iter().map(|corner| corner.dot(axis)).fold(f64::NEG_INFINITY, f64::max);
+                    let back = other.iter().map(|corner| corner.dot(axis)).fold(f64::INFINITY, f64::min);
+                    least = least.min(front - back);
+                }
+            }
+        }
+        (if least.is_finite() { least } else { 0.0 }) + round_a + round_b
     }
 }
 
@@ -73,7 +116,7 @@ fn least(manifold: &Manifold) -> f32 {
 
 /// Sizes within two orders of magnitude; the centers as far apart as a part of the bounding radii together.
 fn any_two(part: Range<f32>) -> impl Strategy<Value = Two> {
-    let kind = || any_kind(0.1, 10.0);
+    let kind = || any_convex(0.1, 10.0);
     (kind(), any_rotation(), kind(), any_rotation(), any_rotation(), part).prop_map(
         |(a, rot_a, b, rot_b, direction, part)| {
             let far = a.shape.bounding_radius() + b.shape.bounding_radius();
@@ -129,7 +172,7 @@ proptest! {
         }
         // Pulled apart along the normal by the depth, nothing overlaps any more: B lies where the normal points.
         let out = manifold.normal * (-least(&manifold) + 0.002 + two.rounding());
-        let moved = Two { offset: two.offset + out, ..two };
+        let moved = Two { offset: two.offset + out, ..two.clone() };
         prop_assert!(least(&manifold) > 0.0 || moved.distance() > 0.0, "{:?} does not lead out", manifold.normal);
     }
 
@@ -152,7 +195,7 @@ proptest! {
     /// A contact may be left out only if it is further than asked for.
     #[test]
     fn what_is_within_reach_is_found(two in any_two(0.0..1.5), reach in 0.0_f32..2.0) {
-        let manifold = collide(&row(&two.a), two.rot_a, &row(&two.b), two.rot_b, two.offset, reach);
+        let manifold = two.within(reach);
         if manifold.count == 0 {
             prop_assert!(two.distance() > f64::from(reach - two.rounding()));
         } else {
@@ -200,8 +243,86 @@ fn shapes_upon_one_another_are_told_apart_always_alike() {
     for kinds in
         [[circle(1.0), circle(0.5)], [circle(1.0), rectangle(1.0, 2.0)], [rectangle(1.0, 2.0), rectangle(0.5, 0.5)]]
     {
-        let manifold = two(kinds[0], kinds[1], 0.0, 0.0).manifold();
+        let [a, b] = kinds;
+        let upon = two(a, b, 0.0, 0.0);
+        let manifold = upon.manifold();
         assert!(manifold.count > 0 && least(&manifold) < 0.0 && (manifold.normal.length() - 1.0).abs() < 1e-6);
-        assert_eq!(manifold, two(kinds[0], kinds[1], 0.0, 0.0).manifold());
+        assert_eq!(manifold, upon.manifold());
     }
+}
+
+/// Numbers that are as good as random.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as f32 / (1_u64 << 31) as f32
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        ((self.next() * end as f32) as usize).min(end - 1)
+    }
+}
+
+/// Shapes of every form; many of them fit each other exactly.
+fn forms() -> Vec<Shape> {
+    let polygon = |points: &[(f32, f32)], radius| {
+        Shape::polygon(&points.iter().map(|&(x, y)| Vec2::new(x, y)).collect::<Vec<_>>(), radius).unwrap()
+    };
+    let around = |count: usize| -> Vec<(f32, f32)> {
+        (0..count).map(|i| (i as f32 / count as f32 * std::f32::consts::TAU).sin_cos()).collect()
+    };
+    let square = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+    let mut all = vec![Shape::circle(0.5), Shape::circle(2.0), Shape::rectangle(1.0, 1.0), Shape::rectangle(4.0, 0.25)];
+    all.extend([polygon(&square, 0.0), polygon(&square, 0.25), polygon(&[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0)]);
+    all.extend([
+        polygon(&[(0.0, 0.0), (6.0, 0.1), (0.0, 0.2)], 0.0),
+        polygon(&[(0.0, 0.0), (3.0, 1.0), (0.0, 1.0)], 0.5),
+    ]);
+    all.extend((3..9).map(|count| polygon(&around(count), 0.0)));
+    all.extend([(1.0, 0.5), (4.0, 0.1), (0.1, 1.0)].map(|(length, radius)| Shape::capsule(length, radius).unwrap()));
+    all
+}
+
+/// A million placements, and a good part of them just so that faces, corners and axes meet.
+#[test]
+fn pieces_are_as_far_apart_or_as_deep_as_they_are() {
+    let (mut random, forms) = (Random(7), forms());
+    let placements = 1_000_000;
+    let quarter = std::f32::consts::FRAC_PI_4;
+    let mut deep = 0;
+    for number in 0..placements {
+        let [a, b] = [0, 1].map(|_| Kind::new(forms[random.below(forms.len())].clone(), Material::default()));
+        let exact = number % 4 == 0;
+        let mut rotation = || match exact {
+            true => Rot::from_angle(random.below(8) as f32 * quarter),
+            false => Rot::from_angle(random.next() * 6.3),
+        };
+        let (rot_a, rot_b) = (rotation(), rotation());
+        let far = a.shape.bounding_radius() + b.shape.bounding_radius();
+        let offset = match exact {
+            true => Vec2::new(random.below(17) as f32 - 8.0, random.below(17) as f32 - 8.0) * 0.25,
+            false => Rot::from_angle(random.next() * 6.3).rotate(Vec2::new(1.3 * far * random.next(), 0.0)),
+        };
+        let two = Two { a, rot_a, b, rot_b, offset };
+        let (apart, manifold) = (two.distance(), two.of_pieces());
+        let (found, rounding) = (f64::from(least(&manifold)), f64::from(two.rounding()));
+        assert!((manifold.normal.length() - 1.0).abs() < 1e-5, "{two:?}: {manifold:?}");
+        let (_, round_a) = outline(&two.a.shape, rot_a, DVec2::ZERO);
+        let (_, round_b) = outline(&two.b.shape, rot_b, DVec2::ZERO);
+        let cores = apart + round_a + round_b;
+        if cores > rounding {
+            let error = found - apart;
+            assert!(-rounding <= error && error <= rounding + 0.0006, "{error} m off: {two:?} {manifold:?}");
+        } else {
+            deep += 1;
+            let depth = two.exact_depth();
+            assert!((found + depth).abs() <= 0.0006 + rounding, "{depth} m deep: {two:?} {manifold:?}");
+        }
+        for point in manifold.points() {
+            assert!(point.anchor.is_finite() && point.anchor.length() <= two.size(), "{two:?} {manifold:?}");
+        }
+    }
+    assert!(deep > placements / 8, "{deep}");
 }

@@ -255,14 +255,16 @@ impl Border {
     pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, contacts: &Contacts, mail: Mail<'_>) {
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
-            match self.contacts.binary_search_by_key(&pair, |border| border.pair) {
-                Ok(i) => {
-                    let border = &self.contacts[i];
-                    for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                        solver.move_together(contacts, border, theirs);
-                    }
+            // One for each two pieces of the pair that touch; features tell them apart.
+            let first = self.contacts.partition_point(|border| border.pair < pair);
+            let of_pair = self.contacts[first..].iter().take_while(|border| border.pair == pair);
+            if of_pair.clone().next().is_none() {
+                tile.counts.fault = Some(Fault::Protocol);
+            }
+            for border in of_pair {
+                for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
+                    solver.move_together(contacts, border, theirs);
                 }
-                Err(_) => tile.counts.fault = Some(Fault::Protocol),
             }
         }
     }

@@ -4,9 +4,10 @@ use crate::exchange::halo::Halo;
 use crate::exchange::mail::{Inbox, Outbox};
 use crate::model::body::Body;
 use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::kind::{Kind, Material};
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
-use crate::model::shape::{Kind, Material, Shape};
+use crate::model::shape::Shape;
 use crate::step;
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::Partition;
@@ -46,7 +47,7 @@ impl Halo for Counting {
 fn row(restitution: f32) -> World {
     let partition = Partition::uniform(DVec2::new(-20.0, -20.0), DVec2::new(20.0, 20.0), 2, 1).unwrap();
     let material = Material { restitution, ..Material::default() };
-    let kinds = vec![Kind { shape: Shape::circle(0.5), material }];
+    let kinds = vec![Kind::new(Shape::circle(0.5), material)];
     let params = Params { exchange: Exchange::Substep, ..Params::default() };
     let mut world =
         World::new(&Blueprint { params, partition, kinds, statics: vec![] }, &[TileId(0), TileId(1)]).unwrap();

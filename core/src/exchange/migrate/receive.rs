@@ -43,7 +43,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
         place::sort(tile, setup);
     }
     take_ghosts(tile, mail, &mut work.ghosts, setup);
-    tile.push_statics(setup);
+    tile.push_statics(setup, step);
 }
 
 /// Leaves a tile with its own bodies alone. Arrivals take the places of those that left; those that are left over come after the

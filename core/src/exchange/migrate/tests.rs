@@ -9,9 +9,9 @@ use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
 use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, KindId, TileId};
+use crate::model::kind::Kind;
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
-use crate::model::shape::Kind;
 use crate::testing::{any_kind, any_rotation, cases, circle, rectangle};
 use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::partition::Partition;
@@ -85,6 +85,7 @@ fn any_scene(bodies: usize, gravity: f32) -> impl Strategy<Value = Scene> {
                 position: DVec2::new(0.5 * domain.x, -1.0),
                 rotation: Rot::IDENTITY,
                 kind: rectangle(2.0 * domain.x as f32, 2.0),
+                path: None,
             };
             // Names in no relation to places.
             let count = bodies.len() as u64;

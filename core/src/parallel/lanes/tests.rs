@@ -237,6 +237,7 @@ fn heap(solver: Solver, exchange: Exchange, instructions: Instructions) -> World
         position: DVec2::new(x, y),
         rotation: Rot::from_angle(0.02),
         kind: rectangle(width, height),
+        path: None,
     };
     let statics = vec![wall(0, 4.0, 0.0, 9.0, 0.4), wall(1, 0.0, 4.0, 0.4, 9.0), wall(2, 8.0, 4.0, 0.4, 9.0)];
     let params =

@@ -62,8 +62,9 @@ fn closing_speed(source: Source<'_>, sides: Pair, contact: &Contact, point: usiz
     let anchor = contact.points[point].anchor;
     let motion = |body: u32, arm: Vec2| {
         let i = body as usize;
-        let falls = setup.kind(bodies.kind[i]).inv_mass > 0.0;
-        let gravity = if falls { setup.params.gravity } else { Vec2::ZERO };
+        let kind = setup.kind(bodies.kind[i]);
+        let falls = kind.inv_mass > 0.0;
+        let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
         (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm), gravity)
     };
     let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =

@@ -9,7 +9,7 @@ use crate::parallel::lanes::{Kernel, Lanes, Quad, WIDE, Wide, WideRow};
 use crate::parallel::team::Team;
 use crate::parallel::vectors::Vectors;
 use crate::solver::batches::{Batch, Batches};
-use crate::solver::bodies::SolverBodies;
+use crate::solver::bodies::{LIGHTEST, SolverBodies};
 use crate::solver::index::SolverIndex;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -145,6 +145,7 @@ impl Inputs {
             not_round_b: ZERO,
         };
         let Source { tile, contacts, bodies, setup } = source;
+        let carried = bodies.have_carriers();
         for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
             let contact = contact as usize;
             let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
@@ -154,7 +155,10 @@ impl Inputs {
             let separation = contacts.separation[contact];
             (inputs.separation[0][lane], inputs.separation[1][lane]) = (separation[0], separation[1]);
             let [a, b] = contacts.bodies[contact];
-            let (place_a, place_b) = (bodies.place_of(a), bodies.place_of(b));
+            let (mut place_a, mut place_b) = (bodies.place_of(a), bodies.place_of(b));
+            if carried {
+                [place_a, place_b] = bodies.carried_in(contact as u32, [place_a, place_b]);
+            }
             (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
             inputs.weight_a[lane] = bodies.weight[place_a.get()];
             inputs.weight_b[lane] = bodies.weight[place_b.get()];
@@ -188,8 +192,9 @@ fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     on_b.x.store(&mut sides.normal_bx);
     on_b.y.store(&mut sides.normal_by);
     V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut sides.friction);
-    // The roots of a static's inverse masses are zero.
-    root_mass_a.if_positive(root_mass_b.if_positive(zero, one), one).store(&mut sides.fixed);
+    // The roots of a static's inverse masses are zero, or next to it.
+    let moves = |root: V| root.sub(V::splat(LIGHTEST));
+    moves(root_mass_a).if_positive(moves(root_mass_b).if_positive(zero, one), one).store(&mut sides.fixed);
     let linear = on_a.dot(on_a).add(on_b.dot(on_b));
     // Where there is no contact nothing may come of it, not even the inverse of zero.
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);

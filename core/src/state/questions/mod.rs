@@ -4,6 +4,8 @@
 //! everything, to the last bit.
 
 mod outline;
+mod pieces;
+mod sensors;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -47,9 +49,9 @@ pub(crate) struct Index {
 }
 
 impl Index {
-    fn new(bodies: impl Iterator<Item = Body>, setup: &Setup) -> Self {
-        let outline = |body: Body| Outline::new(&body, setup.kind(body.kind).shape);
-        let statics = setup.statics.iter().copied().map(outline).collect();
+    fn new(bodies: impl Iterator<Item = Body>, setup: &Setup, step: u64) -> Self {
+        let outline = |body: Body| Outline::new(&body, setup.kind(body.kind));
+        let statics = (0..setup.statics.len() as u32).map(|row| outline(setup.static_at(row, step))).collect();
         Self { bodies: Tree::new(bodies.map(outline).collect()), statics: Tree::new(statics) }
     }
 
@@ -100,11 +102,12 @@ impl World {
             None if self.is_static(id) => self.views().flat_map(|tile| tile.contacts().filter(is_of)).collect(),
             None => Vec::new(),
         };
-        found.sort_unstable_by_key(|contact| contact.bodies);
+        // Contacts of one pair stay in their order.
+        found.sort_by_key(|contact| contact.bodies);
         found
     }
 
     fn index(&self) -> &Index {
-        self.questions(|| Index::new(self.bodies(), &self.setup))
+        self.questions(|| Index::new(self.bodies(), &self.setup, self.step))
     }
 }

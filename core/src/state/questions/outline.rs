@@ -1,26 +1,42 @@
 //! What is asked of a single body: does a ray meet it, does it hold a point, does it meet a rectangle. In double precision.
 
 use super::RayHit;
+use super::pieces;
 use super::tree::Bounds;
 use crate::model::body::Body;
 use crate::model::id::GlobalId;
+use crate::model::kind::{Form, KindRow};
 use crate::model::math::Rot;
-use crate::model::shape::Shape;
-use glam::DVec2;
+use crate::model::piece::Piece;
+use glam::{DVec2, Vec2};
+use std::sync::Arc;
 
 /// A shape at its place, in a line of the cache.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Outline {
     pub(super) id: GlobalId,
     center: DVec2,
     rotation: Rot,
-    shape: Shape,
+    figure: Figure,
+}
+
+/// What a shape is made of.
+#[derive(Clone, Debug)]
+enum Figure {
+    Circle { radius: f32 },
+    Box { half: Vec2 },
+    Pieces(Arc<[Piece]>),
 }
 
 impl Outline {
-    pub(super) fn new(body: &Body, shape: Shape) -> Self {
-        Self { id: body.id, center: body.position, rotation: body.rotation, shape }
+    pub(super) fn new(body: &Body, kind: &KindRow) -> Self {
+        let figure = match kind.form {
+            Form::Round => Figure::Circle { radius: kind.radius },
+            Form::Box => Figure::Box { half: kind.extent },
+            Form::Pieces => Figure::Pieces(kind.pieces.clone()),
+        };
+        Self { id: body.id, center: body.position, rotation: body.rotation, figure }
     }
 
     /// Cosine and sine.
@@ -35,15 +51,22 @@ impl Outline {
     /// A rectangle around it, a little larger than it need be, so that rounding leaves nothing out.
     pub(super) fn bounds(&self) -> Bounds {
         let (c, s) = (self.turned().x.abs(), self.turned().y.abs());
-        let half = match self.shape {
-            Shape::Circle { radius } => DVec2::splat(f64::from(radius)),
-            Shape::Box { half } => {
+        let half = match self.figure {
+            Figure::Circle { radius } => DVec2::splat(f64::from(radius)),
+            Figure::Box { half } => {
                 let half = half.as_dvec2();
                 DVec2::new(c * half.x + s * half.y, s * half.x + c * half.y)
             }
+            Figure::Pieces(ref all) => all.iter().map(|piece| self.extent(piece)).fold(DVec2::ZERO, DVec2::max),
         };
         let half = half * (1.0 + 1e-6) + self.center.abs() * 1e-14;
         Bounds { low: self.center - half, high: self.center + half }
+    }
+
+    /// Half extents of an upright rectangle around the center of the body that holds a piece of it.
+    fn extent(&self, piece: &Piece) -> DVec2 {
+        let corners = piece.corners().iter().map(|corner| self.rotate(corner.as_dvec2()).abs());
+        corners.fold(DVec2::ZERO, DVec2::max) + f64::from(piece.radius)
     }
 
     /// A vector as it is seen from the body.
@@ -60,20 +83,24 @@ impl Outline {
     /// Whether a point is in it or on it.
     pub(super) fn holds(&self, point: DVec2) -> bool {
         let offset = point - self.center;
-        match self.shape {
-            Shape::Circle { radius } => offset.length_squared() <= f64::from(radius) * f64::from(radius),
-            Shape::Box { half } => self.unrotate(offset).abs().cmple(half.as_dvec2()).all(),
+        match self.figure {
+            Figure::Circle { radius } => offset.length_squared() <= f64::from(radius) * f64::from(radius),
+            Figure::Box { half } => self.unrotate(offset).abs().cmple(half.as_dvec2()).all(),
+            Figure::Pieces(ref all) => {
+                let point = self.unrotate(offset);
+                all.iter().any(|piece| pieces::holds(piece, point))
+            }
         }
     }
 
     /// Whether it has a point in common with a rectangle. By separating axes: those of the rectangle and its own.
     pub(super) fn meets_rectangle(&self, low: DVec2, high: DVec2) -> bool {
-        match self.shape {
-            Shape::Circle { radius } => {
+        match self.figure {
+            Figure::Circle { radius } => {
                 let nearest = self.center.max(low).min(high);
                 (nearest - self.center).length_squared() <= f64::from(radius) * f64::from(radius)
             }
-            Shape::Box { half } => {
+            Figure::Box { half } => {
                 let half = half.as_dvec2();
                 let (middle, other) = ((low + high) * 0.5, (high - low) * 0.5);
                 let offset = middle - self.center;
@@ -81,6 +108,11 @@ impl Outline {
                 let reach = DVec2::new(c * half.x + s * half.y, s * half.x + c * half.y) + other;
                 let own = half + DVec2::new(c * other.x + s * other.y, s * other.x + c * other.y);
                 offset.abs().cmple(reach).all() && self.unrotate(offset).abs().cmple(own).all()
+            }
+            Figure::Pieces(ref all) => {
+                let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
+                let corners = corners.map(|corner| self.unrotate(corner - self.center));
+                all.iter().any(|piece| pieces::meets(piece, &corners))
             }
         }
     }
@@ -91,8 +123,8 @@ impl Outline {
         if self.holds(from) {
             return Some(RayHit { id: self.id, fraction: 0.0, point: from, normal: DVec2::ZERO });
         }
-        let (fraction, normal) = match self.shape {
-            Shape::Circle { radius } => {
+        let (fraction, normal) = match self.figure {
+            Figure::Circle { radius } => {
                 let (radius, offset) = (f64::from(radius), from - self.center);
                 let (a, b) = (way.length_squared(), offset.dot(way));
                 // As the distance of the center from the line, so that little is lost far away.
@@ -104,9 +136,15 @@ impl Outline {
                 let fraction = -b / a - (rest / a).sqrt();
                 (fraction, (offset + way * fraction) / radius)
             }
-            Shape::Box { half } => {
+            Figure::Box { half } => {
                 let (start, along) = (self.unrotate(from - self.center), self.unrotate(way));
                 let (fraction, normal) = enter(start, along, half.as_dvec2())?;
+                (fraction, self.rotate(normal))
+            }
+            Figure::Pieces(ref all) => {
+                let (start, along) = (self.unrotate(from - self.center), self.unrotate(way));
+                let hits = all.iter().filter_map(|piece| pieces::enter(piece, start, along));
+                let (fraction, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
                 (fraction, self.rotate(normal))
             }
         };

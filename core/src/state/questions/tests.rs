@@ -49,7 +49,7 @@ fn fill(world: &mut World, any: &mut Any, far: DVec2) {
 /// All that there is to be met, one by one.
 fn outlines(world: &World) -> Vec<Outline> {
     let all = world.bodies().chain(world.setup.statics.iter().copied());
-    all.map(|body| Outline::new(&body, world.setup.kind(body.kind).shape)).collect()
+    all.map(|body| Outline::new(&body, world.setup.kind(body.kind))).collect()
 }
 
 #[test]

@@ -115,7 +115,7 @@ impl Tree {
         let mut order: Vec<(u64, u32)> =
             outlines.par_iter().zip(0..outlines.len() as u32).map(|(outline, i)| (key(outline), i)).collect();
         order.par_sort_unstable();
-        let outlines: Vec<Outline> = order.par_iter().map(|&(_, i)| outlines[i as usize]).collect();
+        let outlines: Vec<Outline> = order.par_iter().map(|&(_, i)| outlines[i as usize].clone()).collect();
         let origin = if outlines.is_empty() { DVec2::ZERO } else { (all.low + all.high) * 0.5 };
         let mut levels: Vec<Vec<Node>> =
             vec![outlines.par_chunks(FAN).map(|few| Node::around_outlines(few, origin)).collect()];

@@ -313,7 +313,8 @@ fn check(tile: &Tile, setup: &Setup) -> Result<(), RestoreError> {
         };
         let moves = !matches!(key.low().kind(), SlotKind::Static(_)) && (key.is_own() || setup.overlap.is_some());
         let slots = moves && exists(key.low()) && exists(key.high()) && key.low() < key.high();
-        let ascends = last.replace(key) < Some(key);
+        let name = (key, contact.pieces());
+        let ascends = last.replace(name) < Some(name);
         !(slots && ascends && contact.is_finite())
     });
     match bad_contact {

@@ -23,8 +23,7 @@ const FLOOR: GlobalId = GlobalId(0);
 fn blueprint(columns: u32, sleep: bool) -> Blueprint {
     let params = Params { gravity: Vec2::new(0.0, -10.0), sleep, ..Params::default() };
     let partition = Partition::uniform(DVec2::new(-4.0, -1.0), DVec2::new(4.0, 4.0), columns, 1).unwrap();
-    let floor =
-        StaticBody { id: FLOOR, position: DVec2::new(0.0, -1.0), rotation: Rot::IDENTITY, kind: rectangle(20.0, 2.0) };
+    let floor = StaticBody::new(FLOOR, rectangle(20.0, 2.0), DVec2::new(0.0, -1.0));
     Blueprint { params, partition, kinds: vec![circle(0.25), rectangle(0.5, 0.5)], statics: vec![floor] }
 }
 

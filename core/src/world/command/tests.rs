@@ -1,8 +1,9 @@
 use super::*;
 use crate::Loopback;
 use crate::model::body::StaticBody;
+use crate::model::kind::Material;
 use crate::model::params::{Exchange, Params};
-use crate::model::shape::{Material, Shape};
+use crate::model::shape::Shape;
 use crate::step::{finish, step};
 use crate::testing::{circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
@@ -60,7 +61,7 @@ fn commands(number: u64) -> Vec<Command> {
     all.push(Command::Add(Body { id: id(9), ..body(3) }));
     match number {
         9 => all.push(Command::SetGravity(Vec2::new(5.0, -8.0))),
-        14 => all.push(Command::AddKind(Kind { shape: Shape::circle(0.9), material: Material::default() })),
+        14 => all.push(Command::AddKind(Kind::new(Shape::circle(0.9), Material::default()))),
         15..20 => all.push(Command::Add(Body { id: GlobalId(5000 + number), kind: KindId(2), ..body(4) })),
         _ => {}
     }
@@ -96,7 +97,7 @@ fn follow(table: &mut BTreeMap<GlobalId, Body>, command: &Command) -> bool {
         }
         Command::Impulse { id, impulse, at, angular } => {
             let change = |body: &mut Body| {
-                let kind = [circle(0.25), rectangle(0.5, 0.5), circle(0.9)][body.kind.0 as usize];
+                let kind = &[circle(0.25), rectangle(0.5, 0.5), circle(0.9)][body.kind.0 as usize];
                 let mass = kind.material.density * kind.shape.area();
                 body.velocity += impulse * (1.0 / mass);
                 let arm = (at.unwrap() - body.position).as_vec2();
@@ -217,10 +218,7 @@ fn what_cannot_be_done_changes_nothing() {
         (Command::Impulse { id, impulse: nan, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: nan, torque: 0.0, steps: 1 }, SetupError::NotFinite { id }),
         (Command::SetKind { id, kind: KindId(2) }, SetupError::NoKind { id, kind: KindId(2) }),
-        (
-            Command::AddKind(Kind { shape: Shape::circle(0.0), material: Material::default() }),
-            SetupError::BadKind { kind: KindId(2) },
-        ),
+        (Command::AddKind(Kind::new(Shape::circle(0.0), Material::default())), SetupError::BadKind { kind: KindId(2) }),
     ] {
         assert_eq!(world.command(&command), Err(expected));
     }

@@ -23,6 +23,7 @@ fn stuffed(bodies: &[Body], owned: usize) -> Stuffed {
         position: DVec2::splat(1.5 * SIZE),
         rotation: Rot::IDENTITY,
         kind: rectangle(0.5 * SIZE as f32, 0.3),
+        path: None,
     };
     let kinds = vec![circle(0.2), rectangle(0.3, 0.5), circle(4.0)];
     Stuffed::named(Vec2::splat(SIZE as f32), kinds, bodies, owned, vec![wall])

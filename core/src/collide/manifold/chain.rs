@@ -1,0 +1,90 @@
+//! A segment that is solid from one side, and a convex piece.
+//!
+//! Normals at its ends lie between its own and those of its neighbours, so that nothing meets an edge where there is only a joint.
+//! Source: one-sided chains with ghost vertices as in Box2D (E. Catto); here a joint that juts out belongs to one of its two segments.
+
+use super::Manifold;
+use super::convex::{Outline, clip};
+use crate::model::math::dot;
+use crate::model::piece::{Joint, Side};
+use glam::Vec2;
+
+/// Normals of faces that differ by less count as one.
+const SAME: f32 = 1e-5;
+
+/// What is further makes no contact yet, in m.
+const FAR: f32 = 0.05;
+
+/// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
+const BEYOND: f32 = 1e-5;
+
+/// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
+/// the piece. What is far may have any normal: it only tells how far it is.
+pub(super) fn collide(own: &Outline, side: Side, other: &Outline, radius: f32, center: Vec2) -> Manifold {
+    let &[to, from, ..] = own.corners() else { return Manifold::EMPTY };
+    let along = to - from;
+    let length = dot(along, along).sqrt();
+    let along = along / length;
+    let n = Vec2::new(-along.y, along.x);
+    let heights = other.corners().iter().map(|&corner| (dot(corner - from, n), dot(corner - from, along)));
+    let (lowest, place) = heights.fold((f32::INFINITY, 0.0), |least, at| if at.0 < least.0 { at } else { least });
+    let is_before = dot(center - from, n) >= 0.0;
+    let over = is_before.then(|| against_face(own, n, other, radius)).flatten();
+    // What lies over the segment with its nearest point is nearest there.
+    if let Some(over) = over
+        && lowest > 0.0
+        && (0.0..=length).contains(&place)
+    {
+        return over;
+    }
+    let mut best: Option<(f32, Manifold)> = None;
+    for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
+        let (outward, distance, _) = other.nearest(end);
+        let normal = -outward;
+        let may = match joint {
+            Joint::Open(limit) => {
+                let other_side = is_before || dot(center - end, limit) >= 0.0;
+                other_side && is_between(normal, [n, limit], if other.corners().len() == 1 { 0.0 } else { SAME })
+            }
+            Joint::Closed => false,
+        };
+        // Whoever is on the solid side, but for a joint, is let through.
+        let is_far = distance - radius > FAR && is_before;
+        if (may || is_far) && best.is_none_or(|(least, _)| distance < least) {
+            let separation = distance - radius;
+            let anchor = end + normal * (0.5 * separation);
+            let feature = if other.corners().len() == 1 { 0 } else { 1 << 8 | number };
+            best = Some((distance, Manifold::single(normal, anchor, separation, feature)));
+        }
+    }
+    match (over, best) {
+        // Both are ways out, or one of them is how far it is.
+        (Some(over), Some((distance, at_end))) => {
+            let is_over = lowest <= 0.0 && distance <= lowest;
+            if is_over || distance - radius > FAR { over } else { at_end }
+        }
+        (Some(over), None) => over,
+        (None, Some((_, at_end))) => at_end,
+        (None, None) => Manifold::EMPTY,
+    }
+}
+
+/// Along the segment's own normal, as far as the piece is over it.
+fn against_face(own: &Outline, n: Vec2, other: &Outline, radius: f32) -> Option<Manifold> {
+    let &[to, from, ..] = own.corners() else { return None };
+    if let [point] = *other.corners() {
+        let (along, height) = (dot(point - from, to - from), dot(point - from, n));
+        let square = dot(to - from, to - from);
+        let is_over = (-BEYOND * square..=(1.0 + BEYOND) * square).contains(&along);
+        let separation = height - radius;
+        return is_over.then(|| Manifold::single(n, point - n * (height - 0.5 * separation), separation, 0));
+    }
+    let edge = other.against(n);
+    clip([to, from], n, other.edge(edge), [0.0, radius], (edge as u32) << 1)
+}
+
+/// Whether a unit vector lies between two others, nearer to each other than half a turn, and so far from both.
+fn is_between(v: Vec2, [one, other]: [Vec2; 2], far: f32) -> bool {
+    let way = if one.perp_dot(other) < 0.0 { -1.0 } else { 1.0 };
+    way * one.perp_dot(v) >= far && way * v.perp_dot(other) >= far
+}

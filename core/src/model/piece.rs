@@ -1,0 +1,145 @@
+//! The convex pieces that contacts of all shapes but circles and boxes are found by.
+
+use crate::model::math::{dot, max};
+use crate::model::shape::{MOST_CORNERS, Polygon, Segment, Shape};
+use glam::Vec2;
+use std::sync::Arc;
+
+/// A convex polygon and what is within a radius of it, in the frame of its body. One corner makes a disc.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    corners: [Vec2; MOST_CORNERS],
+    /// Out of the face from each corner to the next.
+    normals: [Vec2; MOST_CORNERS],
+    count: usize,
+    pub(crate) radius: f32,
+    /// A circle around it.
+    pub(crate) center: Vec2,
+    pub(crate) reach: f32,
+    /// Of a segment that is solid from one side.
+    pub(crate) side: Option<Side>,
+}
+
+/// How a segment goes on: unit vectors that its normals may turn to at its ends. A joint of a chain that juts out belongs to the segment
+/// that it ends.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Side {
+    pub(crate) start: Joint,
+    pub(crate) end: Joint,
+}
+
+/// An end of a segment.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Joint {
+    /// Contacts here may have any normal between the segment's and this one.
+    Open(Vec2),
+    /// Nothing touches it here but along the segment's normal.
+    Closed,
+}
+
+impl Piece {
+    fn new(corners: &[Vec2], radius: f32) -> Self {
+        let mut piece = Self {
+            corners: [Vec2::ZERO; MOST_CORNERS],
+            normals: [Vec2::ZERO; MOST_CORNERS],
+            count: corners.len(),
+            radius,
+            center: Vec2::ZERO,
+            reach: 0.0,
+            side: None,
+        };
+        piece.corners[..corners.len()].copy_from_slice(corners);
+        piece.normals = piece.outward();
+        piece.center = corners.iter().sum::<Vec2>() / corners.len() as f32;
+        let far = |&corner: &Vec2| dot(corner - piece.center, corner - piece.center).sqrt();
+        piece.reach = corners.iter().map(far).fold(0.0, max) + radius;
+        piece
+    }
+
+    fn outward(&self) -> [Vec2; MOST_CORNERS] {
+        let mut normals = [Vec2::ZERO; MOST_CORNERS];
+        for (i, normal) in normals.iter_mut().enumerate().take(self.count) {
+            let along = (self.corners[(i + 1) % self.count] - self.corners[i]).as_dvec2();
+            // In double precision, rounded once.
+            *normal = (-along.perp()).normalize_or_zero().as_vec2();
+        }
+        normals
+    }
+
+    fn of_polygon(polygon: &Polygon) -> Self {
+        match *polygon.corners() {
+            [from, to] => Self::of_line(from, to, polygon.radius()),
+            ref corners => Self::new(corners, polygon.radius()),
+        }
+    }
+
+    /// A line is a box without height: four corners, and faces at its ends.
+    fn of_line(from: Vec2, to: Vec2, radius: f32) -> Self {
+        let mut piece = Self::new(&[from, to, to, from], radius);
+        let out = piece.normals[0];
+        let along = Vec2::new(-out.y, out.x);
+        piece.normals[..4].copy_from_slice(&[out, along, -out, -along]);
+        piece
+    }
+
+    fn of_segment(segment: &Segment) -> Self {
+        let [from, to] = segment.ends();
+        // Its free side is on its left, its solid one on its right: the face from its end to its start.
+        let mut piece = Self::new(&[to, from], 0.0);
+        let out = piece.normals[0];
+        let along = -(out.perp());
+        let joint = |other: Option<Vec2>, end: Vec2, is_end: bool| {
+            let Some(other) = other else { return Joint::Open(if is_end { along } else { -along }) };
+            let way = (if is_end { other - end } else { end - other }).as_dvec2();
+            let normal = way.perp().normalize_or_zero().as_vec2();
+            let juts_out = dot(normal, along) * if is_end { 1.0 } else { -1.0 } > 1e-4;
+            if is_end && juts_out { Joint::Open(normal) } else { Joint::Closed }
+        };
+        piece.side = Some(Side { start: joint(segment.before(), from, false), end: joint(segment.after(), to, true) });
+        piece
+    }
+
+    pub(crate) fn corners(&self) -> &[Vec2] {
+        &self.corners[..self.count]
+    }
+
+    pub(crate) fn normals(&self) -> &[Vec2] {
+        &self.normals[..self.count]
+    }
+
+    /// Half extents of an upright rectangle around the center of the body that holds it.
+    pub(crate) fn half_extents(&self) -> Vec2 {
+        self.corners().iter().fold(Vec2::ZERO, |most, corner| most.max(corner.abs())) + self.radius
+    }
+}
+
+/// The convex pieces of a shape.
+pub(crate) fn pieces(shape: &Shape) -> Arc<[Piece]> {
+    match shape {
+        Shape::Circle { radius } => [Piece::new(&[Vec2::ZERO], *radius)].into(),
+        Shape::Box { half } => {
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            [Piece::new(&corners.map(|(x, y)| *half * Vec2::new(x, y)), 0.0)].into()
+        }
+        Shape::Polygon(polygon) => [Piece::of_polygon(polygon)].into(),
+        Shape::Segment(segment) => [Piece::of_segment(segment)].into(),
+        Shape::Compound(compound) => {
+            let placed = compound.parts().iter().flat_map(|part| {
+                let place = |corner: Vec2| part.position + part.rotation.rotate(corner);
+                let own: Vec<Piece> = pieces(&part.shape).iter().map(|piece| piece.placed(place)).collect();
+                own
+            });
+            placed.collect()
+        }
+    }
+}
+
+impl Piece {
+    fn placed(&self, place: impl Fn(Vec2) -> Vec2) -> Self {
+        let corners: Vec<Vec2> = self.corners().iter().map(|&corner| place(corner)).collect();
+        match corners[..] {
+            [from, to, again, _] if to == again => Self::of_line(from, to, self.radius),
+            _ => Self::new(&corners, self.radius),
+        }
+    }
+}

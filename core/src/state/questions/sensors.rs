@@ -1,0 +1,47 @@
+//! Who is inside the sensors of a world.
+
+use super::tree::Bounds;
+use crate::collide::manifold::nearest;
+use crate::model::body::Body;
+use crate::model::id::GlobalId;
+use crate::world::World;
+
+impl World {
+    /// The sensors among this world's bodies. Those among statics every world knows.
+    pub fn sensors(&self) -> Vec<Body> {
+        if !self.setup.kinds[..self.setup.dynamic_kinds].iter().any(|kind| kind.sensor) {
+            return Vec::new();
+        }
+        self.bodies().filter(|body| self.setup.kind(body.kind).sensor).collect()
+    }
+
+    /// Who of this world's bodies is inside a sensor, between two steps: pairs of the sensor and the body, ascending. The sensors are
+    /// all that are statics, and those given: with several ranks, [the sensors](Self::sensors) of all of them together; then the
+    /// answers of all ranks, joined, are those of one rank that holds everything. No sensor is inside another; masks and groups hold
+    /// as for contacts.
+    pub fn inside_sensors(&self, moving: &[Body]) -> Vec<(GlobalId, GlobalId)> {
+        let setup = &self.setup;
+        let fixed = (0..setup.statics.len() as u32).map(|row| setup.static_at(row, self.step));
+        let fixed = fixed.filter(|body| setup.kind(body.kind).sensor);
+        let mut found = Vec::new();
+        for sensor in fixed.chain(moving.iter().copied()) {
+            let kind = setup.kind(sensor.kind);
+            let half = kind.half_extents(sensor.rotation).as_dvec2() * (1.0 + 1e-6);
+            let bounds = Bounds { low: sensor.position - half, high: sensor.position + half };
+            self.index().bodies.visit(bounds, |outline| {
+                let body = self.get(outline.id).expect("the index is of this world's bodies");
+                let other = setup.kind(body.kind);
+                if other.sensor || !kind.filter.admits(&other.filter) {
+                    return;
+                }
+                let offset = (body.position - sensor.position).as_vec2();
+                let manifold = nearest(kind, sensor.rotation, other, body.rotation, offset, 0.0);
+                if manifold.nearest().is_some_and(|point| point.separation <= 0.0) {
+                    found.push((sensor.id, body.id));
+                }
+            });
+        }
+        found.sort_unstable();
+        found
+    }
+}
