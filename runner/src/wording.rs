@@ -1,5 +1,7 @@
 //! Words of others in a line of ours: harmless to a terminal, and what they may have meant. Numbers as people write them.
 
+use atoll_core::Shape;
+use glam::Vec2;
 use std::fmt::{self, Write as _};
 
 /// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
@@ -37,6 +39,36 @@ pub(crate) fn nearest_by<'a>(words: impl Iterator<Item = &'a str>, likeness: imp
 /// What to add to a refusal of a word, if another is like it.
 pub(crate) fn did_you_mean(suggestion: &Option<String>) -> String {
     suggestion.as_ref().map(|word| format!("; did you mean {word}?")).unwrap_or_default()
+}
+
+/// A number with as few digits as it takes, up to four behind the point.
+pub(crate) fn short(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// What a shape is, and how large, in meters.
+pub(crate) fn shape(shape: &Shape) -> String {
+    let size = |width: f32, height: f32| format!("{} × {} m", short(width.into()), short(height.into()));
+    let reach = |(low, high): (Vec2, Vec2), (corners, radius): (Vec<Vec2>, f32)| {
+        corners.into_iter().fold((low, high), |(low, high), at| (low.min(at - radius), high.max(at + radius)))
+    };
+    let (low, high) = shape.outlines().into_iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), reach);
+    let whole = size(high.x - low.x, high.y - low.y);
+    match shape {
+        Shape::Circle { radius } => format!("circle, {} m", short(f64::from(2.0 * radius))),
+        Shape::Box { .. } => format!("box, {whole}"),
+        Shape::Polygon(polygon) => match (polygon.corners().len(), polygon.radius() > 0.0) {
+            (2, _) => {
+                let (length, width) = (2.0 * (shape.bounding_radius()), 2.0 * polygon.radius());
+                format!("capsule, {}", size(length, width))
+            }
+            (corners, false) => format!("polygon of {corners} corners, {whole}"),
+            (corners, true) => format!("polygon of {corners} round corners, {whole}"),
+        },
+        Shape::Segment(_) => format!("segment, {} m", short(f64::from(2.0 * shape.bounding_radius()))),
+        Shape::Compound(compound) => format!("compound of {} parts, {whole}", compound.parts().len()),
+    }
 }
 
 /// A number that is written as the shortest decimal which files lead back to the same bits of 32.

@@ -1,6 +1,6 @@
 //! Answers: the part of each rank, and all of them joined, as a line of JSON.
 
-use super::text::Question;
+use super::text::{Event, Question};
 use atoll_core::{Body, GlobalId, RayHit, World};
 use serde::{Deserialize, Serialize};
 
@@ -65,12 +65,16 @@ fn names(ids: Vec<GlobalId>) -> Vec<u64> {
 }
 
 impl Part {
-    /// What a rank has to say.
-    pub(crate) fn of(question: &Question, world: &World) -> Self {
+    /// What a rank has to say. `sensors` are those among the bodies of all ranks, where somebody asks who is inside.
+    pub(crate) fn of(question: &Question, world: &World, sensors: &[Body]) -> Self {
         match question {
             Question::Ray { from, to } => Self::Ray(world.cast_ray(*from, *to).map(Hit::new)),
             Question::Rectangle { low, high } => Self::Names(names(world.in_rectangle(*low, *high))),
             Question::Point(point) => Self::Names(names(world.at_point(*point))),
+            Question::Inside(sensor) => {
+                let pairs = world.inside_sensors(sensors).into_iter();
+                Self::Names(pairs.filter(|(other, _)| other == sensor).map(|(_, body)| body.0).collect())
+            }
             Question::Touching(id) => {
                 let contact = |contact: atoll_core::ContactView| {
                     let [a, b] = contact.bodies;
@@ -132,8 +136,8 @@ pub(crate) enum Answer<'a> {
     To(&'a Question, &'a Part),
     /// Names that were given to bodies which had none.
     Added(&'a [u64]),
-    /// Contacts that began and ended in the last step.
-    Contacts { began: &'a [[u64; 2]], ended: &'a [[u64; 2]] },
+    /// What began and ended in the last step: contacts, or that a body is inside a sensor.
+    Events { event: Event, began: &'a [[u64; 2]], ended: &'a [[u64; 2]] },
     /// Why a command was not done.
     Refused(&'a str),
     /// The run waits to be told more.
@@ -147,7 +151,13 @@ impl Answer<'_> {
         let rest = match self {
             Self::To(question, part) => format!("\"{}\":{}", key(question), value(question, part)),
             Self::Added(ids) => format!("\"added\":{}", json(&ids)),
-            Self::Contacts { began, ended } => format!("\"began\":{},\"ended\":{}", json(&began), json(&ended)),
+            Self::Events { event, began, ended } => {
+                let [first, last] = match event {
+                    Event::Contacts => ["began", "ended"],
+                    Event::Sensors => ["entered", "left"],
+                };
+                format!("\"{first}\":{},\"{last}\":{}", json(&began), json(&ended))
+            }
             Self::Refused(reason) => format!("\"refused\":{}", json(&reason)),
             Self::Waits => "\"waits\":true".to_owned(),
         };
@@ -166,6 +176,7 @@ fn key(question: &Question) -> &'static str {
         Question::Rectangle { .. } => "rectangle",
         Question::Point(_) => "point",
         Question::Touching(_) => "touching",
+        Question::Inside(_) => "inside",
         Question::Bodies(_) => "body",
     }
 }

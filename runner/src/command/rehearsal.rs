@@ -21,10 +21,10 @@ pub fn rehearse(text: &str, world: &mut World) -> Result<[usize; 2], ScriptError
             }),
             Action::Do(commands) => commands.iter().for_each(|command| count(world.command(command) == Ok(true))),
             Action::Ask(question) => {
-                let answer = serde_json::to_string(&Part::of(question, world));
+                let answer = serde_json::to_string(&Part::of(question, world, &world.sensors()));
                 count(answer.is_ok());
             }
-            Action::TellContacts(_) => count(true),
+            Action::Tell(..) => count(true),
         }
     }
     Ok(counts)

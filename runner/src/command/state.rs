@@ -1,6 +1,8 @@
 //! What the commands of a run add up to beside its tiles: part of a snapshot, so that a run goes on without the commands that were.
 
-use atoll_core::{Command, GlobalId, Kind, Material, SetupError, Shape, World};
+use super::text::Event;
+use crate::scene::record::KindText;
+use atoll_core::{Command, GlobalId, SetupError, World};
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
@@ -16,13 +18,16 @@ pub(crate) struct State {
     gravity: Option<[f32; 2]>,
     /// Rows that were added to the table of kinds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    kinds: Vec<KindRow>,
+    kinds: Vec<KindText>,
     /// Forces that push still.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     forces: Vec<Push>,
     /// Whether contacts that begin and end are told.
     #[serde(default)]
-    pub(crate) tells_contacts: bool,
+    tells_contacts: bool,
+    /// Whether bodies that enter and leave sensors are told.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    tells_sensors: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
@@ -34,33 +39,38 @@ struct Push {
     until: u64,
 }
 
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-struct KindRow {
-    #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
-    half: Option<[f32; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    circle: Option<f32>,
-    density: f32,
-    friction: f32,
-    restitution: f32,
-}
-
 impl State {
     /// Before any command, where bodies have names below this one.
     pub(crate) fn new(next: u64) -> Self {
         Self { next, ..Self::default() }
     }
 
+    /// Whether some events are told.
+    pub(crate) fn tells(&self, event: Event) -> bool {
+        match event {
+            Event::Contacts => self.tells_contacts,
+            Event::Sensors => self.tells_sensors,
+        }
+    }
+
+    /// Has some events told from now on, or no more.
+    pub(crate) fn tell(&mut self, event: Event, is_told: bool) {
+        match event {
+            Event::Contacts => self.tells_contacts = is_told,
+            Event::Sensors => self.tells_sensors = is_told,
+        }
+    }
+
     /// Notes a command that was done after `step` steps.
     pub(crate) fn note(&mut self, command: &Command, step: u64) {
         match *command {
-            Command::Add(body) => {
+            Command::Add(ref body) => {
                 self.added += 1;
                 self.next = self.next.max(body.id.0.saturating_add(1));
             }
             Command::Remove(_) => self.added -= 1,
             Command::SetGravity(gravity) => self.gravity = Some(gravity.to_array()),
-            Command::AddKind(kind) => self.kinds.push(KindRow::new(&kind)),
+            Command::AddKind(ref kind) => self.kinds.push(KindText::new(kind)),
             Command::Force { id, force, torque, steps } => {
                 self.forces.retain(|push| push.until > step);
                 let until = step.saturating_add(steps);
@@ -95,26 +105,5 @@ impl State {
             world.command(&Command::Force { id: GlobalId(id), force: force.into(), torque, steps })?;
         }
         Ok(())
-    }
-}
-
-impl KindRow {
-    fn new(kind: &Kind) -> Self {
-        let Kind { shape, material: Material { density, friction, restitution } } = *kind;
-        let (half, circle) = match shape {
-            Shape::Box { half } => (Some(half.to_array()), None),
-            Shape::Circle { radius } => (None, Some(radius)),
-        };
-        Self { half, circle, density, friction, restitution }
-    }
-
-    fn read(&self) -> Option<Kind> {
-        let shape = match (self.half, self.circle) {
-            (Some(half), None) => Shape::Box { half: half.into() },
-            (None, Some(radius)) => Shape::Circle { radius },
-            _ => return None,
-        };
-        let Self { density, friction, restitution, .. } = *self;
-        Some(Kind { shape, material: Material { density, friction, restitution } })
     }
 }

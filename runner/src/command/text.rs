@@ -1,6 +1,7 @@
 //! A line of a file of commands, and what it may say.
 
-use atoll_core::{Body, Command, GlobalId, Kind, KindId, Material, Rot, Shape};
+use crate::scene::kind_of_command;
+use atoll_core::{Body, Command, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer};
@@ -26,8 +27,21 @@ pub(crate) enum Action {
     /// All of these are done, or none.
     Do(Vec<Command>),
     Ask(Question),
-    /// From here on contacts that begin and end are told, or not.
-    TellContacts(bool),
+    /// From here on such events are told, or not.
+    Tell(Event, bool),
+}
+
+/// What may be told after each step.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Event {
+    /// Contacts begin and end.
+    Contacts,
+    /// Bodies enter and leave sensors.
+    Sensors,
+}
+
+impl Event {
+    pub(crate) const ALL: [Self; 2] = [Self::Contacts, Self::Sensors];
 }
 
 /// A body to be added.
@@ -41,10 +55,18 @@ pub(crate) struct NewBody {
 /// What may be asked.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Question {
-    Ray { from: DVec2, to: DVec2 },
-    Rectangle { low: DVec2, high: DVec2 },
+    Ray {
+        from: DVec2,
+        to: DVec2,
+    },
+    Rectangle {
+        low: DVec2,
+        high: DVec2,
+    },
     Point(DVec2),
     Touching(GlobalId),
+    /// Who is inside a sensor.
+    Inside(GlobalId),
     Bodies(Vec<GlobalId>),
 }
 
@@ -69,15 +91,18 @@ struct Raw {
     impulse: Option<Several<ImpulseText>>,
     force: Option<Several<ForceText>>,
     kind: Option<Several<KindOfText>>,
-    add_kind: Option<KindText>,
+    /// As in a scene, whose values those of JSON are.
+    add_kind: Option<toml::Table>,
     gravity: Option<[f32; 2]>,
     wake: Option<Several<u64>>,
     ray: Option<RayText>,
     rectangle: Option<RectangleText>,
     point: Option<[f64; 2]>,
     touching: Option<u64>,
+    inside: Option<u64>,
     body: Option<Several<u64>>,
     contacts: Option<bool>,
+    sensors: Option<bool>,
     until: Option<u64>,
 }
 
@@ -154,25 +179,6 @@ struct KindOfText {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct KindText {
-    shape: ShapeText,
-    width: Option<f32>,
-    height: Option<f32>,
-    radius: Option<f32>,
-    density: Option<f32>,
-    friction: Option<f32>,
-    restitution: Option<f32>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum ShapeText {
-    Box,
-    Circle,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct RayText {
     from: [f64; 2],
     to: [f64; 2],
@@ -187,7 +193,7 @@ struct RectangleText {
 
 /// What may stand in a line beside step and name.
 const ACTIONS: &str = "add, remove, velocity, impulse, force, kind, add_kind, gravity, wake, ray, rectangle, point, \
-                       touching, body or contacts";
+                       touching, inside, body, contacts or sensors";
 
 /// Reads a line of a file. The error is what is wrong with it.
 pub(crate) fn parse(number: u64, text: &str) -> Result<Line, String> {
@@ -265,7 +271,7 @@ fn action(raw: Raw) -> Result<Action, String> {
         each(all.into_iter().map(set).collect());
     }
     if let Some(kind) = raw.add_kind {
-        each(vec![Command::AddKind(kind.read()?)]);
+        each(vec![Command::AddKind(kind_of_command(&kind)?)]);
     }
     if let Some(gravity) = raw.gravity {
         each(vec![Command::SetGravity(gravity.into())]);
@@ -292,7 +298,9 @@ fn action(raw: Raw) -> Result<Action, String> {
     if let Some(Several(ids)) = raw.body {
         actions.push(Action::Ask(Question::Bodies(ids.into_iter().map(GlobalId).collect())));
     }
-    actions.extend(raw.contacts.map(Action::TellContacts));
+    actions.extend(raw.inside.map(|id| Action::Ask(Question::Inside(GlobalId(id)))));
+    actions.extend(raw.contacts.map(|is_told| Action::Tell(Event::Contacts, is_told)));
+    actions.extend(raw.sensors.map(|is_told| Action::Tell(Event::Sensors, is_told)));
     match (actions.pop(), actions.len()) {
         (Some(action), 0) => Ok(action),
         (Some(_), _) => Err(format!("it asks for several things; give each a line: {ACTIONS}")),
@@ -316,26 +324,6 @@ fn new_body(text: &BodyText) -> Result<NewBody, String> {
         kind: KindId(text.kind),
     };
     Ok(NewBody { is_named: text.id.is_some(), body })
-}
-
-impl KindText {
-    fn read(&self) -> Result<Kind, String> {
-        let usual = Material::default();
-        let material = Material {
-            density: self.density.unwrap_or(usual.density),
-            friction: self.friction.unwrap_or(usual.friction),
-            restitution: self.restitution.unwrap_or(usual.restitution),
-        };
-        let shape = match (&self.shape, self.width, self.height, self.radius) {
-            (ShapeText::Box, Some(width), Some(height), None) => Shape::rectangle(width, height),
-            (ShapeText::Circle, None, None, Some(radius)) => Shape::circle(radius),
-            (ShapeText::Box, ..) => return Err("a box has width and height".to_owned()),
-            (ShapeText::Circle, ..) => return Err("a circle has a radius".to_owned()),
-        };
-        let kind = Kind { shape, material };
-        let must = "sizes and density must be positive, friction at least 0, restitution within 0 to 1";
-        if kind.is_valid() { Ok(kind) } else { Err(must.to_owned()) }
-    }
 }
 
 #[cfg(test)]

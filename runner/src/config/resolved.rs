@@ -91,7 +91,7 @@ mod tests {
     use std::time::Duration;
 
     const TILES: [u32; 2] = [3, 2];
-    const KINDS: [&str; 8] = ["rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "slope"];
+    const KINDS: [&str; 9] = ["rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "zoo", "slope"];
 
     fn scene(kind: &str, overrides: &[(&str, &str)]) -> Config {
         Config::from_toml_str("test", &format!("[scene]\nkind = \"{kind}\"\n"), overrides).unwrap()

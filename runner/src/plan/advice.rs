@@ -78,11 +78,9 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
             heaviest / lightest
         ));
     }
-    let width = |kind: &Kind| match kind.shape {
-        Shape::Circle { radius } => 2.0 * radius,
-        Shape::Box { half } => 2.0 * half.min_element(),
-    };
-    let narrowest = kinds().map(width).fold(f32::INFINITY, f32::min);
+    let width = |kind: &Kind| kind.shape.width();
+    let narrowest =
+        kinds().filter(|kind| !matches!(kind.shape, Shape::Segment(_))).map(width).fold(f32::INFINITY, f32::min);
     if narrowest < params.speculative_distance {
         notes.push(format!(
             "the narrowest body is {narrowest} m wide, and contacts are made from {} m on: scale lengths up, or \

@@ -80,9 +80,10 @@ fn in_words(scene: &SceneFile, found: &Found) -> String {
     for (number, (kind, bodies)) in scene.kinds().iter().zip(&found.by_kind).enumerate() {
         let name = scene.kind_names()[number].as_deref();
         let name = name.map(|name| format!(" ({})", OneLine(name))).unwrap_or_default();
-        let shape = match kind.shape {
+        let shape = match &kind.shape {
             Shape::Box { half } => format!("boxes of {} x {} m", 2.0 * half.x, 2.0 * half.y),
             Shape::Circle { radius } => format!("circles of {radius} m around their center"),
+            other => format!("of a {}", crate::wording::shape(other)),
         };
         row(&mut text, "kind", &format!("{number}{name}: {bodies} {shape}"));
     }

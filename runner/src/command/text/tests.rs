@@ -1,4 +1,5 @@
 use super::*;
+use atoll_core::{Kind, Material, Shape};
 
 #[test]
 fn every_action_is_read() {
@@ -18,9 +19,16 @@ fn every_action_is_read() {
     assert_eq!(did(text), [impulse]);
     let set = Command::SetVelocity { id, velocity: Vec2::Y, angular_velocity: 0.0 };
     assert_eq!(did(r#"{"step": 1, "velocity": [{"id": 7, "vx": 0, "vy": 1}]}"#), [set]);
-    let kind = Kind { shape: Shape::circle(0.5), material: Material { density: 3.0, ..Material::default() } };
+    let kind = Kind::new(Shape::circle(0.5), Material { density: 3.0, ..Material::default() });
     let text = r#"{"step": 1, "add_kind": {"shape": "circle", "radius": 0.5, "density": 3}}"#;
     assert_eq!(did(text), [Command::AddKind(kind)]);
+    let capsule = Kind { sensor: true, ..Kind::new(Shape::capsule(1.0, 0.25).unwrap(), Material::default()) };
+    assert_eq!(did(r#"{"step": 1, "add_kind": {"capsule": [1, 0.25], "sensor": true}}"#), [Command::AddKind(capsule)]);
+    let parts = r#"{"step": 1, "add_kind": {"parts": [{"circle": 0.5}, {"box": [1, 1], "at": [2, 0]}], "group": -1}}"#;
+    let [Command::AddKind(Kind { shape: Shape::Compound(pair), filter, .. })] = &did(parts)[..] else {
+        panic!("a compound")
+    };
+    assert_eq!((pair.parts().len(), filter.group), (2, -1));
     let line = parse(9, r#"{"step": 4, "name": "up", "ray": {"from": [0, 1], "to": [2, 3]}}"#).unwrap();
     let question = Question::Ray { from: DVec2::new(0.0, 1.0), to: DVec2::new(2.0, 3.0) };
     assert_eq!((line.step, line.number, line.name.as_deref()), (4, 9, Some("up")));
@@ -54,9 +62,25 @@ fn what_cannot_be_read_is_told_in_one_line() {
         (r#"{"step": 1, "add": {"x": 1}}"#, "missing field `y`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "z": 3}}"#, "unknown field `z`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "cos": 1}}"#, "a body is turned by an angle, or by cos and sin"),
-        (r#"{"step": 1, "add_kind": {"shape": "star", "radius": 1}}"#, "unknown variant `star`"),
-        (r#"{"step": 1, "add_kind": {"shape": "box", "radius": 1}}"#, "a box has width and height"),
-        (r#"{"step": 1, "add_kind": {"shape": "circle", "radius": -1}}"#, "sizes and density must be positive"),
+        (
+            r#"{"step": 1, "add_kind": {"shape": "star", "radius": 1}}"#,
+            "add_kind, shape = \"star\": must be \"box\" or \"circle\"; or give",
+        ),
+        (
+            r#"{"step": 1, "add_kind": {"shape": "box", "radius": 1}}"#,
+            "add_kind, width: is missing: must be a positive number, in meters",
+        ),
+        (
+            r#"{"step": 1, "add_kind": {"shape": "circle", "radius": -1}}"#,
+            "add_kind, radius = -1: must be a positive number",
+        ),
+        (r#"{"step": 1, "add_kind": {"circle": 1, "box": [1, 1]}}"#, "add_kind, circle = 1: there is box already"),
+        (r#"{"step": 1, "add_kind": {"segment": {}}}"#, "add_kind, segment = {...}: is for [[statics]] alone"),
+        (r#"{"step": 1, "add_kind": {"parts": [{"circle": null}]}}"#, "invalid type: null"),
+        (
+            r#"{"step": 1, "add_kind": {"circle": 1, "sensors": true}}"#,
+            "add_kind, sensors = true: unknown key; did you",
+        ),
         (r#"{"step": 1, "force": {"id": 1, "x": 1, "y": 2, "steps": 0}}"#, "a force must push for one step"),
         (r#"{"step": 1, "rectangle": {"low": [0, 0], "high": [1, -1]}}"#, "the high corner of a rectangle"),
         (r#"{"step": 1, "until": 3}"#, "until is for whoever drives a run"),

@@ -1,11 +1,11 @@
 //! What every record refers to and none holds: the table of kinds, and what never moves. As JSON in the metadata of every
 //! file, so that a recording can be drawn by itself.
 //!
-//! Numbers are the shortest decimals that lead back to the same bits. A shape is known by its key, and whatever other keys
-//! a newer program may write are passed over.
+//! Numbers are the shortest decimals that lead back to the same bits, as `scene/record.rs` tells.
 
-use atoll_core::{GlobalId, Kind, Material, Rot, Shape, StaticBody};
-use glam::{DVec2, Vec2};
+use crate::scene::record::{KindText, PathText};
+use atoll_core::{GlobalId, Kind, Rot, StaticBody};
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -25,20 +25,6 @@ pub struct StageText {
     pub(super) statics: String,
 }
 
-/// A [`Kind`]. It has one shape.
-#[derive(Serialize, Deserialize)]
-struct KindText {
-    /// Half the width and half the height.
-    #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
-    half: Option<[f32; 2]>,
-    /// Radius.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    circle: Option<f32>,
-    density: f32,
-    friction: f32,
-    restitution: f32,
-}
-
 /// All statics, a column for each field.
 #[derive(Default, Serialize, Deserialize)]
 struct StaticsText {
@@ -55,6 +41,9 @@ struct StaticsText {
     cos: Vec<f32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     sin: Vec<f32>,
+    /// Places in the columns, and the paths of those that have one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    paths: Vec<(usize, PathText)>,
 }
 
 impl StageText {
@@ -96,31 +85,9 @@ fn from_json<'a, T: Deserialize<'a>>(name: &str, text: &'a str) -> Result<T, Str
     serde_json::from_str(text).map_err(|error| format!("{name} is unreadable: {error}"))
 }
 
-impl KindText {
-    fn new(kind: &Kind) -> Self {
-        let Kind { shape, material: Material { density, friction, restitution } } = *kind;
-        let (half, circle) = match shape {
-            Shape::Box { half } => (Some(half.to_array()), None),
-            Shape::Circle { radius } => (None, Some(radius)),
-        };
-        Self { half, circle, density, friction, restitution }
-    }
-
-    /// None if it has no shape that is known, or several.
-    fn read(&self) -> Option<Kind> {
-        let Self { half, circle, density, friction, restitution } = *self;
-        let shape = match (half, circle) {
-            (Some(half), None) => Shape::Box { half: Vec2::from_array(half) },
-            (None, Some(radius)) => Shape::Circle { radius },
-            _ => return None,
-        };
-        Some(Kind { shape, material: Material { density, friction, restitution } })
-    }
-}
-
 fn read_kinds(name: &str, texts: &[KindText]) -> Result<Vec<Kind>, String> {
     let read = |(number, text): (usize, &KindText)| {
-        let kind = text.read().ok_or_else(|| format!("kind {number} of {name} is neither a box nor a circle"))?;
+        let kind = text.read().ok_or_else(|| format!("kind {number} of {name} has no shape that is known"))?;
         let valid = Some(kind).filter(Kind::is_valid);
         valid.ok_or_else(|| format!("kind {number} of {name} has a number that cannot be"))
     };
@@ -131,7 +98,7 @@ impl StaticsText {
     fn new(statics: &[StaticBody]) -> Self {
         let (kinds, kind) = distinct_kinds(statics);
         let mut text = Self { kinds: kinds.iter().map(KindText::new).collect(), kind, ..Self::default() };
-        for StaticBody { id, position, rotation: _, kind: _ } in statics {
+        for StaticBody { id, position, .. } in statics {
             text.x.push(position.x);
             text.y.push(position.y);
             match text.ids.last_mut() {
@@ -144,6 +111,8 @@ impl StaticsText {
             text.cos = statics.iter().map(|fixed| fixed.rotation.c).collect();
             text.sin = statics.iter().map(|fixed| fixed.rotation.s).collect();
         }
+        let path = |(i, fixed): (usize, &StaticBody)| Some((i, PathText::new(fixed.path.as_ref()?)));
+        text.paths = statics.iter().enumerate().filter_map(path).collect();
         text
     }
 
@@ -168,14 +137,18 @@ impl StaticsText {
         let body = |(i, id): (usize, GlobalId)| {
             let position = DVec2::new(self.x[i], self.y[i]);
             let rotation = if turned { Rot { c: self.cos[i], s: self.sin[i] } } else { Rot::IDENTITY };
-            let kind =
-                *kinds.get(self.kind[i] as usize).ok_or_else(|| bad("has a body of a kind that is not there"))?;
+            let kind = kinds.get(self.kind[i] as usize).ok_or_else(|| bad("has a body of a kind that is not there"))?;
             if !(position.is_finite() && rotation.c.is_finite() && rotation.s.is_finite()) {
                 return Err(bad("has a body that is nowhere"));
             }
-            Ok(StaticBody { id, position, rotation, kind })
+            Ok(StaticBody { rotation, ..StaticBody::new(id, kind.clone(), position) })
         };
-        ids.enumerate().map(body).collect()
+        let mut statics = ids.enumerate().map(body).collect::<Result<Vec<_>, _>>()?;
+        for (at, path) in &self.paths {
+            let fixed = statics.get_mut(*at).ok_or_else(|| bad("has a path of a body that is not there"))?;
+            fixed.path = Some(path.read().ok_or_else(|| bad("has a path that cannot be"))?);
+        }
+        Ok(statics)
     }
 }
 
@@ -184,7 +157,7 @@ pub(crate) fn distinct_kinds(statics: &[StaticBody]) -> (Vec<Kind>, Vec<u32>) {
     let (mut kinds, mut rows) = (Vec::new(), HashMap::new());
     let row = |fixed: &StaticBody| {
         *rows.entry(bits(&fixed.kind)).or_insert_with(|| {
-            kinds.push(fixed.kind);
+            kinds.push(fixed.kind.clone());
             kinds.len() as u32 - 1
         })
     };
@@ -192,23 +165,21 @@ pub(crate) fn distinct_kinds(statics: &[StaticBody]) -> (Vec<Kind>, Vec<u32>) {
     (kinds, numbers)
 }
 
-/// What tells one kind from another.
-fn bits(kind: &Kind) -> [u32; 6] {
-    let (tag, x, y) = match kind.shape {
-        Shape::Box { half } => (0, half.x, half.y),
-        Shape::Circle { radius } => (1, radius, 0.0),
-    };
-    let Material { density, friction, restitution } = kind.material;
-    [tag, x.to_bits(), y.to_bits(), density.to_bits(), friction.to_bits(), restitution.to_bits()]
+/// What tells one kind from another, to the bit.
+fn bits(kind: &Kind) -> String {
+    to_json(&KindText::new(kind))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::shape_tests::{every_kind, every_static};
     use crate::scene::{Scene, SceneKind, SceneSpec, SplitMix64};
+    use atoll_core::{Material, Shape};
+    use glam::Vec2;
 
     fn kind(shape: Shape) -> Kind {
-        Kind { shape, material: Material::default() }
+        Kind::new(shape, Material::default())
     }
 
     /// By its bits, which tells zeros of either sign apart.
@@ -217,7 +188,7 @@ mod tests {
         let place = |fixed: &StaticBody| {
             let (position, rotation) = (fixed.position, fixed.rotation);
             let at = [position.x.to_bits(), position.y.to_bits()];
-            (fixed.id, at, [rotation.c.to_bits(), rotation.s.to_bits()], bits(&fixed.kind))
+            (fixed.id, at, [rotation.c.to_bits(), rotation.s.to_bits()], bits(&fixed.kind), fixed.path)
         };
         assert!(read.kinds.iter().map(bits).eq(kinds.iter().map(bits)), "{kinds:?} and {:?}", read.kinds);
         assert!(read.statics.iter().map(place).eq(statics.iter().map(place)), "{statics:?} and {:?}", read.statics);
@@ -234,27 +205,51 @@ mod tests {
     }
 
     #[test]
+    fn every_shape_and_path_comes_back_bit_for_bit() {
+        let (kinds, statics) = (every_kind(), every_static());
+        assert_comes_back(&kinds, &statics);
+        let read = StageText::new(&kinds, &statics).read().unwrap();
+        assert_eq!(
+            (format!("{:?}", read.kinds), format!("{:?}", read.statics)),
+            (format!("{kinds:?}"), format!("{statics:?}"))
+        );
+        let text = StageText::new(&kinds, &statics);
+        for (from, to, expected) in [
+            ("\"period\":-4.0", "\"period\":0.0", "atoll.statics has a path that cannot be"),
+            ("\"period\":-4.0,", "", "atoll.statics has a path that cannot be"),
+            ("\"line\":[", "\"circle\":1.0,\"line\":[", "atoll.statics has a path that cannot be"),
+            ("\"paths\":[[1,", "\"paths\":[[7,", "atoll.statics has a path of a body that is not there"),
+        ] {
+            let statics = text.statics.replace(from, to);
+            assert_ne!(statics, text.statics, "{from}");
+            let error = StageText { statics, ..text.clone() }.read().unwrap_err();
+            assert!(error.contains(expected), "{to}: {error}");
+        }
+    }
+
+    #[test]
     fn any_numbers_come_back_bit_for_bit() {
         let mut random = SplitMix64::after(11, 0);
         let mut size = || f32::from_bits((random.bits() as u32 & 0x7fff_ffff).clamp(1, 0x7f7f_ffff));
-        let material = |a: f32, b: f32| Material { density: a, friction: b, restitution: -0.0 };
+        let material = |a: f32, b: f32| Material { density: a, friction: b, restitution: -0.0, surface_speed: -a };
         let any = |i: u64| {
             let half = Vec2::new(size(), size());
             let shape = if i.is_multiple_of(2) { Shape::Box { half } } else { Shape::circle(size()) };
-            Kind { shape, material: material(size(), size()) }
+            Kind::new(shape, material(size(), size()))
         };
         let kinds: Vec<Kind> = (0..2000).map(any).collect();
-        let fixed = |(i, &kind): (usize, &Kind)| {
+        let fixed = |(i, kind): (usize, &Kind)| {
             let mut finite = || f64::from_bits(random.bits() & !(1 << 62));
             let position = DVec2::new(finite(), finite());
             let rotation = Rot::from_angle(i as f32);
             // Some of the names follow each other.
-            StaticBody { id: GlobalId(i as u64 * (1 + i as u64 / 1000)), position, rotation, kind }
+            let id = GlobalId(i as u64 * (1 + i as u64 / 1000));
+            StaticBody { rotation, ..StaticBody::new(id, kind.clone(), position) }
         };
         let statics: Vec<StaticBody> = kinds.iter().enumerate().map(fixed).collect();
         assert_comes_back(&kinds, &statics);
-        let last = StaticBody { id: GlobalId(u64::MAX), position: DVec2::new(-0.0, 5e-324), ..statics[0] };
-        assert_comes_back(&kinds, &[statics[0], last]);
+        let last = StaticBody { id: GlobalId(u64::MAX), position: DVec2::new(-0.0, 5e-324), ..statics[0].clone() };
+        assert_comes_back(&kinds, &[statics[0].clone(), last]);
     }
 
     #[test]
@@ -300,11 +295,11 @@ mod tests {
             ("0.2", "-0.2", "kind 0 of atoll.kinds has a number that cannot be"),
             ("0.2", "1e39", "atoll.kinds is unreadable: number out of range"),
             ("0.2", "NaN", "atoll.kinds is unreadable: expected value at line 1"),
-            ("0.2", "null", "kind 0 of atoll.kinds is neither a box nor a circle"),
+            ("0.2", "null", "kind 0 of atoll.kinds has no shape that is known"),
             ("[0.5,0.5]", "[0.5,0.0]", "kind 1 of atoll.kinds has a number that cannot be"),
             ("[0.5,0.5]", "[0.5]", "atoll.kinds is unreadable: invalid length 1"),
-            ("\"box\"", "\"capsule\"", "kind 1 of atoll.kinds is neither a box nor a circle"),
-            ("\"box\"", "\"circle\":1.0,\"box\"", "kind 1 of atoll.kinds is neither a box nor a circle"),
+            ("\"box\"", "\"capsule\"", "kind 1 of atoll.kinds has no shape that is known"),
+            ("\"box\"", "\"circle\":1.0,\"box\"", "kind 1 of atoll.kinds has no shape that is known"),
             ("\"restitution\":0.0", "\"restitution\":1.5", "has a number that cannot be"),
             ("\"density\":1.0,", "", "atoll.kinds is unreadable: missing field `density`"),
         ] {

@@ -21,7 +21,7 @@ pub(crate) fn facts(record_every: u64) -> RunFacts {
 
 /// A box of 2 m x 1 m, a disc of 1 m, and two walls, one of them turned.
 pub(crate) fn stage() -> (Vec<Kind>, Vec<StaticBody>) {
-    let kind = |shape| Kind { shape, material: Material::default() };
+    let kind = |shape| Kind::new(shape, Material::default());
     let wall = |id, x| StaticBody::new(GlobalId(id), kind(Shape::rectangle(1.0, 20.0)), DVec2::new(x, 10.0));
     let turned = StaticBody { rotation: Rot::from_angle(0.1), ..wall(1, 20.0) };
     (vec![kind(Shape::rectangle(2.0, 1.0)), kind(Shape::circle(1.0))], vec![wall(0, -20.0), turned])

@@ -1,13 +1,13 @@
 //! What is done to a world between two steps, and asked of it: all ranks take the same lines in the same order, and whether one can
 //! be done depends on the whole world, of which they tell each other beforehand.
 
-mod contacts;
+mod events;
 mod presence;
 
 use super::halo::RankHalo;
 use super::trouble::all_well;
 use super::{Observer, RankError, unreadable};
-use crate::command::{Action, Answer, Line, NewBody, Part, Question, State, parse};
+use crate::command::{Action, Answer, Event, Line, NewBody, Part, Question, State, parse};
 use crate::error::{Exit, RunError};
 use crate::folder::AnswersFile;
 use crate::folder::durable::write_durably;
@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::wording::OneLine;
 use atoll_core::{Command, GlobalId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
-use contacts::Contacts;
+use events::Followed;
 use presence::{check, find, next_name};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
@@ -44,8 +44,8 @@ pub(super) struct Commander {
     /// Where what is done is kept, by one rank of a run that has a folder; opened when there is something.
     kept_in: Option<PathBuf>,
     record: Option<File>,
-    /// Contacts after the last step, where they are told.
-    contacts: Contacts,
+    /// What there was after the last step of what is told.
+    followed: Followed,
     failure: Option<RunError>,
     /// After how many steps it was last said that the run waits.
     waits_after: Option<u64>,
@@ -91,14 +91,14 @@ impl Commander {
             answers: None,
             kept_in: plan.output.as_ref().map(|output| output.folder.commands()).filter(|_| rank == Rank(0)),
             record: None,
-            contacts: Contacts::default(),
+            followed: Followed::default(),
             failure: None,
             waits_after: None,
             time: Duration::ZERO,
             sent: Stats::default(),
         };
-        if commander.state.tells_contacts {
-            commander.contacts = Contacts::of(world);
+        for event in Event::ALL {
+            commander.followed.set(event, commander.state.tells(event), world, transport)?;
         }
         let opened = if rank == Rank(0) { commander.open(plan, from) } else { Ok(()) };
         all_well(transport, opened.as_ref().err())?;
@@ -277,9 +277,9 @@ impl Commander {
             let commands = match &line.action {
                 Action::Add(bodies) => self.name(bodies),
                 Action::Do(commands) => commands.clone(),
-                Action::TellContacts(told) => {
-                    self.state.tells_contacts = *told;
-                    self.contacts = if *told { Contacts::of(world) } else { Contacts::default() };
+                Action::Tell(event, is_told) => {
+                    self.state.tell(*event, *is_told);
+                    self.followed.set(*event, *is_told, world, transport)?;
                     self.is_used = true;
                     continue;
                 }
@@ -347,7 +347,9 @@ impl Commander {
         if asked.is_empty() {
             return Ok(());
         }
-        let own: Vec<Part> = asked.iter().map(|(_, question)| Part::of(question, world)).collect();
+        let is_inside = |(_, question): &(&Line, &Question)| matches!(question, Question::Inside(_));
+        let sensors = if asked.iter().any(is_inside) { events::sensors(world, transport)? } else { Vec::new() };
+        let own: Vec<Part> = asked.iter().map(|(_, question)| Part::of(question, world, &sensors)).collect();
         let own = serde_json::to_vec(&own).expect("numbers, under names");
         let Some(parts) = transport.gather(Rank(0), &own).map_err(RankError::Transport)? else { return Ok(()) };
         let mut joined: Option<Vec<Part>> = None;
@@ -365,7 +367,7 @@ impl Commander {
         Ok(())
     }
 
-    /// Tells which contacts began and ended in the last step, where somebody wants to know.
+    /// Tells which contacts began and ended in the last step, and who entered and left sensors, where somebody wants to know.
     ///
     /// # Errors
     /// If a rank is lost.
@@ -374,14 +376,16 @@ impl Commander {
         world: &World,
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
-        if !self.state.tells_contacts {
+        if !Event::ALL.iter().any(|&event| self.state.tells(event)) {
             return Ok(());
         }
         let (begun, sent) = (Instant::now(), halo.transport().stats());
-        if let Some([began, ended]) = self.contacts.follow(world, halo.transport())?
-            && !(began.is_empty() && ended.is_empty())
-        {
-            self.tell(world.step_count(), None, Answer::Contacts { began: &began, ended: &ended });
+        for event in Event::ALL {
+            if let Some([began, ended]) = self.followed.follow(event, world, halo.transport())?
+                && !(began.is_empty() && ended.is_empty())
+            {
+                self.tell(world.step_count(), None, Answer::Events { event, began: &began, ended: &ended });
+            }
         }
         self.time += begun.elapsed();
         self.sent += halo.transport().stats().since(&sent);

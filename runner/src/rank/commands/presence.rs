@@ -30,7 +30,7 @@ pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport
         match &line.action {
             Action::Add(bodies) => ids.extend(bodies.iter().filter(|new| new.is_named).map(|new| new.body.id)),
             Action::Do(commands) => ids.extend(commands.iter().filter_map(subject)),
-            Action::Ask(_) | Action::TellContacts(_) => {}
+            Action::Ask(_) | Action::Tell(..) => {}
         }
     }
     if ids.is_empty() {

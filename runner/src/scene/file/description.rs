@@ -1,11 +1,12 @@
 //! What the text of a scene says, and where its bodies are.
 
 use super::super::{Place, SceneError};
-use super::entries::{Entries, number};
-use super::row::{FARTHEST, is_turn};
-use atoll_core::{GlobalId, Kind, Material, Rot, Shape, StaticBody};
+use super::entries::{Entries, place};
+use super::kinds::kinds;
+use super::row::FARTHEST;
+use super::statics::statics;
+use atoll_core::{Kind, StaticBody};
 use glam::DVec2;
-use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -102,13 +103,9 @@ fn in_file(file: &Path, table: &Table) -> Result<Bodies, SceneError> {
 
 fn domain(entries: &mut Entries<'_>) -> Result<(DVec2, DVec2), SceneError> {
     let must = "low and high corner in meters, such as [[0.0, 0.0], [100.0, 50.0]]";
-    let corner = |value: &Value| match value.as_array()?.as_slice() {
-        [x, y] => Some(DVec2::new(number(x)?, number(y)?)),
-        _ => None,
-    };
     let value = entries.value("domain").ok_or_else(|| entries.missing("domain", must))?;
     let corners = value.as_array().and_then(|corners| match corners.as_slice() {
-        [low, high] => Some((corner(low)?, corner(high)?)),
+        [low, high] => Some((place(low)?, place(high)?)),
         _ => None,
     });
     let (low, high) = corners.ok_or_else(|| entries.refuse("domain", format!("must be {must}")))?;
@@ -122,105 +119,6 @@ fn domain(entries: &mut Entries<'_>) -> Result<(DVec2, DVec2), SceneError> {
         );
     }
     Ok((low, high))
-}
-
-fn kinds(file: &Path, tables: &[&Table]) -> Result<(Vec<Kind>, Vec<Option<String>>), SceneError> {
-    let mut kinds = Vec::with_capacity(tables.len());
-    let mut names = Vec::with_capacity(tables.len());
-    let mut taken = BTreeSet::new();
-    for (number, table) in tables.iter().enumerate() {
-        let mut entries = Entries::new(file, format!("[[kinds]] {number}"), table);
-        let name = entries.text("name", "a text")?;
-        if let Some(name) = name {
-            if !taken.insert(name) {
-                return Err(entries.refuse("name", "another kind has this name; give each its own"));
-            }
-            if name.trim() != name || name.is_empty() || name.parse::<u64>().is_ok() {
-                return Err(entries.refuse("name", "must be a word that is no number, without spaces around it"));
-            }
-        }
-        kinds.push(kind(&mut entries)?);
-        names.push(name.map(str::to_owned));
-        entries.finish()?;
-    }
-    Ok((kinds, names))
-}
-
-/// Shape and material, as both kinds and statics have them.
-fn kind(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
-    const SHAPES: &str = "\"box\" or \"circle\"";
-    const SIZE: &str = "a positive number, in meters";
-    let size = |entries: &mut Entries<'_>, key| {
-        let size = entries.float(key, SIZE)?.ok_or_else(|| entries.missing(key, SIZE))?;
-        // Half of it is what is kept.
-        if size > 0.0 && 0.5 * size > 0.0 { Ok(size) } else { Err(entries.refuse(key, format!("must be {SIZE}"))) }
-    };
-    let shape = match entries.text("shape", SHAPES)? {
-        Some("box") => Shape::rectangle(size(entries, "width")?, size(entries, "height")?),
-        Some("circle") => Shape::circle(size(entries, "radius")?),
-        Some(_) => return Err(entries.refuse("shape", format!("must be {SHAPES}"))),
-        None => return Err(entries.missing("shape", SHAPES)),
-    };
-    let mut material = Material::default();
-    let mut part = |key, must: &str, field: &mut f32, holds: fn(f32) -> bool| {
-        if let Some(number) = entries.float(key, must)? {
-            *field = number;
-            if !holds(number) {
-                return Err(entries.refuse(key, format!("must be {must}")));
-            }
-        }
-        Ok(())
-    };
-    part("density", "a positive number, in kg/m^2", &mut material.density, |number| number > 0.0)?;
-    part("friction", "a number, at least 0", &mut material.friction, |number| number >= 0.0)?;
-    part("restitution", "a number within 0 to 1", &mut material.restitution, |number| (0.0..=1.0).contains(&number))?;
-    Ok(Kind { shape, material })
-}
-
-fn statics(file: &Path, tables: &[&Table]) -> Result<(Vec<StaticBody>, bool), SceneError> {
-    const PLACE: &str = "a number within -1e9 to 1e9, in meters";
-    let mut statics = Vec::with_capacity(tables.len());
-    let mut taken = BTreeSet::new();
-    let are_named = tables.first().is_some_and(|first| first.contains_key("id"));
-    for (number, table) in tables.iter().enumerate() {
-        let mut entries = Entries::new(file, format!("[[statics]] {number}"), table);
-        let id = entries.whole("id")?;
-        if id.is_some() != are_named {
-            return Err(
-                entries.refuse("id", "either every static has an id or none; give all of them one, or leave all out")
-            );
-        }
-        let id = id.unwrap_or(number as u64);
-        if !taken.insert(id) {
-            return Err(entries.refuse("id", "another static has that id; give each its own"));
-        }
-        let kind = kind(&mut entries)?;
-        let mut place = |key| match entries.number(key, PLACE)? {
-            Some(number) if number.abs() <= FARTHEST => Ok(number),
-            Some(_) => Err(entries.refuse(key, format!("must be {PLACE}"))),
-            None => Err(entries.missing(key, PLACE)),
-        };
-        let position = DVec2::new(place("x")?, place("y")?);
-        let rotation = turn(&mut entries)?;
-        entries.finish()?;
-        statics.push(StaticBody { id: GlobalId(id), position, rotation, kind });
-    }
-    Ok((statics, are_named))
-}
-
-/// An angle, or cosine and sine, or neither.
-fn turn(entries: &mut Entries<'_>) -> Result<Rot, SceneError> {
-    let angle = entries.float("angle", "an angle in radians")?;
-    let [cos, sin] = [entries.float("cos", "the cosine of an angle")?, entries.float("sin", "the sine of an angle")?];
-    match (angle, cos, sin) {
-        (None, None, None) => Ok(Rot::IDENTITY),
-        (Some(angle), None, None) => Ok(Rot::from_angle(angle)),
-        (None, Some(c), Some(s)) if is_turn(Rot { c, s }) => Ok(Rot { c, s }),
-        (None, Some(_), Some(_)) => {
-            Err(entries.refuse("cos", "cos and sin must be those of one angle: the sum of their squares is not 1"))
-        }
-        _ => Err(entries.refuse("angle", "give either angle, or both cos and sin")),
-    }
 }
 
 fn syntax_error(file: &Path, text: &str, error: &toml::de::Error) -> SceneError {

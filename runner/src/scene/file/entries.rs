@@ -2,6 +2,7 @@
 
 use super::super::{Place, SceneError};
 use crate::wording::{did_you_mean, nearest};
+use glam::{DVec2, Vec2};
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -20,6 +21,16 @@ impl<'a> Entries<'a> {
         Self { file, name, table, known: Vec::new() }
     }
 
+    /// A table within this one, or within a list in it.
+    pub(super) fn within(&self, name: &str, table: &'a Table) -> Self {
+        Self::new(self.file, format!("{}, {name}", self.name), table)
+    }
+
+    /// Whether a key is there.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
     /// That something is wrong with a key, which may have a value.
     pub(super) fn refuse(&self, key: &str, reason: impl Into<String>) -> SceneError {
         let written = self.table.get(key).map(|value| format!(" = {}", short(value))).unwrap_or_default();
@@ -34,7 +45,8 @@ impl<'a> Entries<'a> {
         self.table.get(key)
     }
 
-    fn get<T>(
+    /// The value of a key, if it is there, read.
+    pub(super) fn get<T>(
         &mut self,
         key: &'static str,
         must: &str,
@@ -64,8 +76,17 @@ impl<'a> Entries<'a> {
 
     /// A finite number of 32 bits.
     pub(super) fn float(&mut self, key: &'static str, must: &str) -> Result<Option<f32>, SceneError> {
-        let float = |value: &Value| number(value).map(|number| number as f32).filter(|number| number.is_finite());
         self.get(key, must, float)
+    }
+
+    /// True or false.
+    pub(super) fn truth(&mut self, key: &'static str) -> Result<Option<bool>, SceneError> {
+        self.get(key, "true or false", Value::as_bool)
+    }
+
+    /// A whole number of some type.
+    pub(super) fn integer<T: TryFrom<i64>>(&mut self, key: &'static str, must: &str) -> Result<Option<T>, SceneError> {
+        self.get(key, must, |value| value.as_integer()?.try_into().ok())
     }
 
     /// A table.
@@ -97,6 +118,27 @@ impl<'a> Entries<'a> {
 /// A number as TOML has it, whole or not.
 pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+/// A finite number of 32 bits.
+pub(super) fn float(value: &Value) -> Option<f32> {
+    number(value).map(|number| number as f32).filter(|number| number.is_finite())
+}
+
+/// Two finite numbers of 32 bits.
+pub(super) fn pair(value: &Value) -> Option<Vec2> {
+    match value.as_array()?.as_slice() {
+        [x, y] => Some(Vec2::new(float(x)?, float(y)?)),
+        _ => None,
+    }
+}
+
+/// Two numbers of 64 bits.
+pub(super) fn place(value: &Value) -> Option<DVec2> {
+    match value.as_array()?.as_slice() {
+        [x, y] => Some(DVec2::new(number(x)?, number(y)?)),
+        _ => None,
+    }
 }
 
 /// A value on one line, the beginning of a long one.

@@ -10,11 +10,16 @@ mod digest;
 mod entries;
 mod footer;
 mod inline;
+mod kinds;
+mod lines;
 mod parquet_file;
 mod parquet_rows;
 #[cfg(test)]
 mod parquet_tests;
 mod row;
+#[cfg(test)]
+pub(crate) mod shape_tests;
+mod statics;
 #[cfg(test)]
 mod tests;
 pub(crate) mod write;
@@ -22,7 +27,9 @@ pub(crate) mod write;
 pub(crate) use check::Found;
 pub(crate) use description::is_scene;
 pub(crate) use digest::of_file as digest_of_file;
+pub(crate) use kinds::of_command as kind_of_command;
 pub(super) use row::{FARTHEST, is_turn};
+pub(super) use statics::chain_of;
 
 use super::{Place, SceneError};
 use atoll_core::{Body, GlobalId, Kind, StaticBody};

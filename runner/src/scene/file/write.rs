@@ -1,9 +1,9 @@
 //! Writes a world as the files of a scene. What is read again has the same bits.
 
 use super::description::FORMAT;
+use super::lines::{angle, kind_lines, static_lines};
 use super::row::Column;
-use crate::wording::shortest;
-use atoll_core::{Body, Kind, Material, Rot, Shape, StaticBody};
+use atoll_core::{Body, Kind, StaticBody};
 use glam::{DVec2, Vec2};
 use parquet::basic::{Compression, Encoding};
 use parquet::data_type::{DoubleType, FloatType, Int32Type, Int64Type};
@@ -63,50 +63,15 @@ pub(crate) fn text(world: &World<'_>, bodies: &BodiesFile<'_>) -> String {
         if let Some(Some(name)) = world.names.get(number) {
             line(&format!("name = {}", Value::from(name.as_str())));
         }
-        kind_lines(kind, &mut line);
+        kind_lines(kind).iter().for_each(|of_kind| line(of_kind));
     }
-    for StaticBody { id, position, rotation, kind } in world.statics {
+    for fixed in world.statics {
         line("\n[[statics]]");
-        line(&format!("id = {id}"));
-        kind_lines(kind, &mut line);
-        line(&format!("x = {}\ny = {}", Value::from(position.x), Value::from(position.y)));
-        if !is_same(*rotation, Rot::IDENTITY) {
-            line(&match angle(*rotation) {
-                Some(angle) => format!("angle = {}", float(angle)),
-                None => format!("cos = {}\nsin = {}", float(rotation.c), float(rotation.s)),
-            });
-        }
+        static_lines(fixed).iter().for_each(|of_static| line(of_static));
     }
     let BodiesFile { name, xxh3, count } = *bodies;
     line(&format!("\n[bodies]\npath = {}\nxxh3 = \"{xxh3}\"\ncount = {count}", Value::from(name)));
     text
-}
-
-fn kind_lines(kind: &Kind, line: &mut impl FnMut(&str)) {
-    let Kind { shape, material: Material { density, friction, restitution } } = *kind;
-    line(&match shape {
-        // Twice a half is exact, and so is half of that.
-        Shape::Box { half } => {
-            format!("shape = \"box\"\nwidth = {}\nheight = {}", float(2.0 * half.x), float(2.0 * half.y))
-        }
-        Shape::Circle { radius } => format!("shape = \"circle\"\nradius = {}", float(radius)),
-    });
-    let material = format!("density = {}\nfriction = {}", float(density), float(friction));
-    line(&format!("{material}\nrestitution = {}", float(restitution)));
-}
-
-fn float(number: f32) -> Value {
-    Value::Float(shortest(number))
-}
-
-/// The angle that leads back to the same rotation, bit for bit, if there is one.
-fn angle(rotation: Rot) -> Option<f32> {
-    let angle = rotation.angle();
-    is_same(Rot::from_angle(angle), rotation).then_some(angle)
-}
-
-fn is_same(a: Rot, b: Rot) -> bool {
-    bytemuck::bytes_of(&a) == bytemuck::bytes_of(&b)
 }
 
 /// Brings bodies in the order of a Hilbert curve over the domain, so that those of a group of rows are near each other.

@@ -176,7 +176,7 @@ fn add(imported: &mut Imported, atoms: Vec<Atom>, velocities: &HashMap<u64, [f64
             imported.leave_out("atoms without a diameter", 1);
             continue;
         }
-        let kind = Kind { shape: Shape::circle(0.5 * diameter), material: Material { density, ..Material::default() } };
+        let kind = Kind::new(Shape::circle(0.5 * diameter), Material { density, ..Material::default() });
         let row = imported.row(kind, group, || Some(format!("type-{group}")));
         let [vx, vy, vz, wx, wy, wz] = velocities.get(&id).copied().unwrap_or_default();
         imported.leave_out("motions out of the plane", u64::from([vz, wx, wy].iter().any(|number| *number != 0.0)));

@@ -6,7 +6,8 @@ mod rube;
 use super::SceneError;
 use super::file::write::World;
 use super::file::{FARTHEST, is_turn};
-use atoll_core::{Body, GlobalId, Kind, Material, Rot, Shape, StaticBody};
+use crate::scene::record::KindText;
+use atoll_core::{Body, GlobalId, Kind, Rot, StaticBody};
 use glam::DVec2;
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
@@ -25,7 +26,7 @@ pub(crate) struct Imported {
     names: Vec<Option<String>>,
     statics: Vec<StaticBody>,
     pub(crate) bodies: Vec<Body>,
-    rows: HashMap<[u32; 7], u32>,
+    rows: HashMap<(String, u32), u32>,
     left_out: BTreeMap<&'static str, u64>,
 }
 
@@ -81,13 +82,7 @@ impl Imported {
 
     /// The row of a kind in the table; those of different groups stay apart, so that their materials can be told apart later.
     fn row(&mut self, kind: Kind, group: u32, name: impl FnOnce() -> Option<String>) -> u32 {
-        let (tag, x, y) = match kind.shape {
-            Shape::Box { half } => (0, half.x, half.y),
-            Shape::Circle { radius } => (1, radius, 0.0),
-        };
-        let Material { density, friction, restitution } = kind.material;
-        let numbers = [x, y, density, friction, restitution].map(f32::to_bits);
-        let key = [tag, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], group];
+        let key = (serde_json::to_string(&KindText::new(&kind)).expect("numbers, under names"), group);
         *self.rows.entry(key).or_insert_with(|| {
             let name = name().filter(|name| !self.names.iter().any(|other| other.as_ref() == Some(name)));
             self.kinds.push(kind);

@@ -1,6 +1,7 @@
 //! Worlds of other programs.
 
 use super::*;
+use atoll_core::{Filter, Material, Path as Course, Shape, Travel};
 use tempfile::tempdir;
 
 const RUBE: &str = r#"{
@@ -35,12 +36,15 @@ fn a_world_of_box2d_is_understood() {
     assert_eq!((world.left_out(), world.kinds.len(), world.statics.len(), world.bodies.len()), (None, 2, 2, 3));
     assert_eq!(world.names, [Some("crate".to_owned()), Some("ball".to_owned())]);
     assert_eq!(world.kinds[0].shape, Shape::rectangle(2.0, 1.0));
-    assert_eq!(world.kinds[1].material, Material { density: 3.0, friction: 0.0, restitution: 0.0 });
+    assert_eq!(world.kinds[1].material, Material { density: 3.0, friction: 0.0, ..Material::default() });
     assert_eq!(
-        (world.statics[0].kind.shape, world.statics[0].position),
+        (world.statics[0].kind.shape.clone(), world.statics[0].position),
         (Shape::rectangle(10.0, 2.0), DVec2::new(1.0, -1.0))
     );
-    assert_eq!((world.statics[1].kind.shape, world.statics[1].position), (Shape::circle(0.5), DVec2::new(1.0, 0.0)));
+    assert_eq!(
+        (world.statics[1].kind.shape.clone(), world.statics[1].position),
+        (Shape::circle(0.5), DVec2::new(1.0, 0.0))
+    );
     let body = world.bodies[0];
     assert_eq!((body.id, body.rotation, body.angular_velocity), (GlobalId(2), Rot::from_angle(0.25), 0.5));
     assert_eq!((body.velocity.to_array(), world.bodies[2].position), ([1.0, -2.0], DVec2::ZERO));
@@ -50,34 +54,150 @@ fn a_world_of_box2d_is_understood() {
 
 #[test]
 fn what_box2d_has_and_nobody_here_is_counted() {
+    let another = "\"fixture\": [{\"density\": 3, \"circle\": {\"radius\": 0.5}}, \n   {\"density\": 3";
+    let with = |from: &str, to: &str| another.replacen(from, to, 1);
     for (from, to, expected) in [
         (" \"body\": [", " \"joint\": [{}, {}], \"image\": [{}], \"body\": [", "1 images, 2 joints"),
-        ("\"type\": 2, \"name\": \"ball\"", "\"type\": 1, \"name\": \"ball\"", "1 kinematic bodies"),
-        ("\"density\": 3, ", "\"density\": 3, \"sensor\": true, ", "1 sensors"),
         ("\"density\": 3, ", "", "1 bodies without a density"),
-        ("\"density\": 3, ", "\"density\": 3, \"filter-maskBits\": 3, ", "1 filters of collisions"),
         (
-            "\"center\": 0, \"radius\": 0.75",
-            "\"center\": {\"x\": 1}, \"radius\": 0.75",
-            "1 fixtures off the center of their body",
+            "\"circle\": {\"center\": 0, \"radius\": 0.75}",
+            "\"chain\": {\"vertices\": {\"x\": [0, 1], \"y\": [0, 1]}}",
+            "1 chains and edges on bodies that move",
         ),
-        ("\"circle\": {\"center\": 0, \"radius\": 0.75}", "\"chain\": {}", "1 chains and edges"),
-        ("\"x\": [1, 1, -1, -1]", "\"x\": [1, 2, -1, -1]", "1 polygons that are no rectangles"),
-        ("\"x\": [1, 1, -1, -1]", "\"x\": [1, 1, -1]", "1 polygons that are no rectangles"),
+        (
+            "\"circle\": {\"center\": 0, \"radius\": 0.75}",
+            "\"chain\": {}",
+            "1 bodies without a fixture, 1 chains and edges that cannot be",
+        ),
+        (
+            "\"x\": [1, 1, -1, -1]",
+            "\"x\": [1, 1, -1]",
+            "1 bodies without a fixture, 1 polygons that cannot be, or have too many corners",
+        ),
+        (
+            "\"x\": [1, 1, -1, -1]",
+            "\"x\": [1, 1, 1, 1]",
+            "1 bodies without a fixture, 1 polygons that cannot be, or have too many corners",
+        ),
         ("\"massData-mass\": 2", "\"massData-mass\": 3", "1 masses of their own"),
-        ("\"massData-mass\": 2", "\"linearDamping\": 3", "1 dampings of one body"),
-        ("\"massData-mass\": 2", "\"fixedRotation\": true", "1 bodies that must not turn"),
         ("\"massData-mass\": 2", "\"active\": false", "1 bodies that are not active"),
-        ("\"massData-mass\": 2", "\"gravityScale\": 0", "1 gravities of one body"),
+        ("\"fixture\": [\n   {\"density\": 3", "\"fixture\": [{}, \n   {\"density\": 3", "1 fixtures without a shape"),
         (
             "\"fixture\": [\n   {\"density\": 3",
-            "\"fixture\": [{}, \n   {\"density\": 3",
-            "1 bodies of several fixtures",
+            &with("\"density\": 3", "\"sensor\": true"),
+            "1 sensors on bodies of other fixtures",
+        ),
+        (
+            "\"fixture\": [\n   {\"density\": 3",
+            &with("\"density\": 3", "\"density\": 1"),
+            "1 densities that differ within a body",
+        ),
+        (
+            "\"fixture\": [\n   {\"density\": 3",
+            &with("\"density\": 3", "\"density\": 3, \"friction\": 1"),
+            "1 materials or filters that differ within a body",
+        ),
+        (
+            "\"type\": 2, \"name\": \"ball\", \"position\": 0, \"linearVelocity\": 0, \"fixture\": [\n   {\"density\": 3, \"circle\": {\"center\": 0",
+            "\"type\": 1, \"linearVelocity\": 1, \"angularVelocity\": 1, \"fixture\": [{\"circle\": {\"center\": 1",
+            "1 kinematic bodies that turn, off their center, as they go",
         ),
     ] {
         assert!(RUBE.contains(from), "{from}");
-        assert_eq!(read_text(&RUBE.replacen(from, to, 1)).unwrap().left_out().as_deref(), Some(expected));
+        assert_eq!(read_text(&RUBE.replacen(from, to, 1)).unwrap().left_out().as_deref(), Some(expected), "{to}");
     }
+}
+
+/// The ball of the world as something else.
+fn instead_of_ball(body: &str) -> Imported {
+    let ball = RUBE.rfind("  {\"type\": 2, \"name\": \"ball\"").unwrap();
+    let world = read_text(&format!("{}{body}]}}", &RUBE[..ball])).unwrap();
+    assert_eq!(world.left_out(), None);
+    world
+}
+
+#[test]
+fn polygons_and_bodies_of_several_fixtures_are_understood() {
+    // A triangle is around its center of mass, which is where its body is put.
+    let world = instead_of_ball(
+        r#"{"type": 2, "position": {"x": 1, "y": 2}, "angle": 0, "fixture": [
+            {"density": 2, "polygon": {"vertices": {"x": [0, 3, 0], "y": [0, 0, 3]}}}]}"#,
+    );
+    assert_eq!(world.bodies[2].position, DVec2::new(2.0, 3.0));
+    assert!((world.kinds[1].shape.area() - 4.5).abs() < 1e-5 && matches!(world.kinds[1].shape, Shape::Polygon(_)));
+    // Turned by a quarter, what was right of the body is above it. Two discs, of which one has three times the mass.
+    let world = instead_of_ball(
+        r#"{"type": 2, "position": {"x": 1, "y": 2}, "angle": 1.5707963267948966, "linearVelocity": {"x": 0, "y": 1}, "fixture": [
+            {"density": 2, "circle": {"center": {"x": 4, "y": 0}, "radius": 1}},
+            {"density": 2, "circle": {"center": 0, "radius": 1.7320508}}]}"#,
+    );
+    let (body, Shape::Compound(compound)) = (world.bodies[2], &world.kinds[1].shape) else { panic!("a compound") };
+    assert!((body.position - DVec2::new(1.0, 3.0)).length() < 1e-5, "{}", body.position);
+    assert!((compound.parts()[0].position.x - 3.0).abs() < 1e-5 && (compound.parts()[1].position.x + 1.0).abs() < 1e-5);
+    // One disc alone is one, wherever its body says that it is.
+    let world = instead_of_ball(
+        r#"{"type": 2, "position": {"x": 1, "y": 2}, "fixture": [{"density": 2, "circle": {"center": {"x": 4, "y": 0}, "radius": 1}}]}"#,
+    );
+    assert_eq!((world.bodies[2].position, world.kinds[1].shape.clone()), (DVec2::new(5.0, 2.0), Shape::circle(1.0)));
+}
+
+#[test]
+fn how_a_body_moves_and_whom_it_touches_is_understood() {
+    let world = instead_of_ball(
+        r#"{"type": 2, "position": 0, "gravityScale": 0.5, "linearDamping": 2, "angularDamping": 3, "fixedRotation": true,
+            "fixture": [{"density": 2, "sensor": true, "filter-categoryBits": 4, "filter-maskBits": 3, "filter-groupIndex": -2,
+            "circle": {"radius": 1}}]}"#,
+    );
+    let kind = &world.kinds[1];
+    assert_eq!((kind.filter, kind.sensor), (Filter { categories: 4, mask: 3, group: -2 }, true));
+    let dynamics = kind.dynamics;
+    assert_eq!((dynamics.gravity_scale, dynamics.linear_damping), (0.5, 2.0));
+    assert_eq!((dynamics.angular_damping, dynamics.fixed_rotation), (3.0, true));
+    let all = instead_of_ball(
+        r#"{"type": 2, "position": 0, "fixture": [{"density": 2, "filter-maskBits": 65535, "circle": {"radius": 1}}]}"#,
+    );
+    assert_eq!(all.kinds[1].filter, Filter::default());
+}
+
+#[test]
+fn chains_edges_and_what_is_kinematic_are_understood() {
+    // Three segments, and as many the other way round; a closed one ends where it began.
+    let world = instead_of_ball(
+        r#"{"type": 0, "position": {"x": 1, "y": 0}, "fixture": [
+            {"chain": {"vertices": {"x": [0, 2, 4, 4], "y": [0, 0, 0, 5]}}},
+            {"chain": {"vertices": {"x": [0, 2, 4, 0], "y": [0, 0, 3, 0]}}},
+            {"edge": {"vertex1": {"x": 0, "y": 0}, "vertex2": {"x": 6, "y": 0}}}]}"#,
+    );
+    let segments: Vec<_> = world.statics[2..]
+        .iter()
+        .map(|fixed| match &fixed.kind.shape {
+            Shape::Segment(segment) => (fixed.position, segment.ends()[1], segment.before(), segment.after()),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(segments.len(), 2 * (3 + 3 + 1));
+    assert_eq!(segments[0].0, DVec2::new(2.0, 0.0));
+    assert!(segments[0].2.is_none() && segments[0].3.is_some(), "a chain that is open begins somewhere");
+    assert!(segments[6..12].iter().all(|(.., before, after)| before.is_some() && after.is_some()));
+    assert_eq!(segments[12].1, -segments[13].1, "both sides of an edge");
+
+    let path = |body: &str| {
+        let world = instead_of_ball(body);
+        let fixed = world.statics.last().unwrap().clone();
+        (fixed.position, fixed.path.unwrap())
+    };
+    let lift = path(
+        r#"{"type": 1, "position": {"x": 1, "y": 2}, "linearVelocity": {"x": 0, "y": 3}, "fixture": [{"circle": {"center": {"x": 1, "y": 0}, "radius": 1}}]}"#,
+    );
+    let up = Travel::Line { velocity: DVec2::new(0.0, 3.0) };
+    assert_eq!(lift, (DVec2::new(2.0, 2.0), Course { travel: up, turning: 0.0 }));
+    let (around, wheel) = path(
+        r#"{"type": 1, "position": {"x": 1, "y": 2}, "angularVelocity": -2, "fixture": [{"circle": {"center": {"x": 0, "y": 3}, "radius": 1}}]}"#,
+    );
+    assert_eq!((around, wheel.turning), (DVec2::new(1.0, 2.0), -2.0));
+    // At first it is where its body has it, and then it goes round clockwise.
+    let at = |step| wheel.pose(around, Rot::IDENTITY, step, 1.0 / 64.0).0;
+    assert!((at(0) - DVec2::new(1.0, 5.0)).length() < 1e-9 && at(1).x > 1.0, "{} {}", at(0), at(1));
 }
 
 #[test]
@@ -85,7 +205,7 @@ fn discs_of_lammps_are_understood() {
     let world = read_text(LAMMPS).unwrap();
     assert_eq!((world.left_out(), world.domain), (None, (DVec2::new(-1.0, 0.0), DVec2::new(3.5, 2.0))));
     let ids: Vec<u64> = world.bodies.iter().map(|body| body.id.0).collect();
-    assert_eq!((ids, world.kinds.len(), world.kinds[0].shape), (vec![7, 2, 5], 2, Shape::circle(0.25)));
+    assert_eq!((ids, world.kinds.len(), world.kinds[0].shape.clone()), (vec![7, 2, 5], 2, Shape::circle(0.25)));
     assert_eq!(world.names[1].as_deref(), Some("type-2"));
     let body = world.bodies[1];
     assert_eq!(

@@ -1,0 +1,100 @@
+//! Contacts that begin and end, and bodies that enter and leave sensors, of which each rank tells for its bodies.
+
+use super::super::{RankError, records};
+use crate::command::Event;
+use atoll_core::{Body, World};
+use atoll_transport::{Collective, Rank, Transport};
+
+/// A contact by the names of its bodies, the lower first; or a sensor and who is inside.
+pub(super) type Pair = [u64; 2];
+
+/// The pairs of this rank, ascending, as they were after the last step, of those that are followed.
+#[derive(Default)]
+pub(super) struct Followed {
+    contacts: Option<Vec<Pair>>,
+    insides: Option<Vec<Pair>>,
+}
+
+impl Followed {
+    /// Follows some events from now on, or no more.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn set(
+        &mut self,
+        event: Event,
+        is_told: bool,
+        world: &World,
+        transport: &mut impl Transport,
+    ) -> Result<(), RankError> {
+        let pairs = if is_told { Some(now(event, world, transport)?) } else { None };
+        *self.of(event) = pairs;
+        Ok(())
+    }
+
+    fn of(&mut self, event: Event) -> &mut Option<Vec<Pair>> {
+        match event {
+            Event::Contacts => &mut self.contacts,
+            Event::Sensors => &mut self.insides,
+        }
+    }
+
+    /// Goes on to the pairs that there are now, and tells rank 0 which began and which ended since then, of all ranks; nothing where
+    /// nobody follows them.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn follow(
+        &mut self,
+        event: Event,
+        world: &World,
+        transport: &mut impl Transport,
+    ) -> Result<Option<[Vec<Pair>; 2]>, RankError> {
+        let Some(before) = self.of(event).take() else { return Ok(None) };
+        let pairs = now(event, world, transport)?;
+        let began = gather(transport, &not_in(&pairs, &before))?;
+        let ended = gather(transport, &not_in(&before, &pairs))?;
+        *self.of(event) = Some(pairs);
+        // Of a pair that another rank tells of from now on both are said.
+        Ok(began.zip(ended).map(|(began, ended)| [not_in(&began, &ended), not_in(&ended, &began)]))
+    }
+}
+
+/// The pairs that there are.
+fn now(event: Event, world: &World, transport: &mut impl Transport) -> Result<Vec<Pair>, RankError> {
+    if event == Event::Sensors {
+        let moving = sensors(world, transport)?;
+        return Ok(world.inside_sensors(&moving).into_iter().map(|(sensor, body)| [sensor.0, body.0]).collect());
+    }
+    let contacts = world.views().flat_map(|tile| tile.contacts());
+    // Of one between two tiles the owner of body A tells.
+    let own = contacts.filter(|contact| !contact.is_border || contact.owned[0].is_some());
+    let mut pairs: Vec<Pair> = own.map(|contact| contact.bodies.map(|id| id.0)).collect();
+    pairs.sort_unstable();
+    // Two bodies of several pieces may have several.
+    pairs.dedup();
+    Ok(pairs)
+}
+
+/// The sensors among the bodies of all ranks.
+pub(super) fn sensors(world: &World, transport: &mut impl Transport) -> Result<Vec<Body>, RankError> {
+    let own = world.sensors();
+    if transport.size() == 1 {
+        return Ok(own);
+    }
+    let told = transport.all_gather(bytemuck::cast_slice(&own)).map_err(RankError::Transport)?;
+    records(&told).map_err(RankError::Transport)
+}
+
+fn not_in(all: &[Pair], others: &[Pair]) -> Vec<Pair> {
+    all.iter().filter(|pair| others.binary_search(pair).is_err()).copied().collect()
+}
+
+/// What all ranks have to say, ascending, on rank 0.
+fn gather(transport: &mut impl Transport, pairs: &[Pair]) -> Result<Option<Vec<Pair>>, RankError> {
+    let parts = transport.gather(Rank(0), bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?;
+    let Some(parts) = parts else { return Ok(None) };
+    let mut pairs: Vec<Pair> = records(&parts).map_err(RankError::Transport)?;
+    pairs.sort_unstable();
+    Ok(Some(pairs))
+}

@@ -1,0 +1,223 @@
+//! Kinds as scenes and commands say them: a shape, what it is made of, how it moves, and whom it touches.
+
+use super::super::SceneError;
+use super::entries::{Entries, float, pair};
+use super::row::is_turn;
+use atoll_core::{Dynamics, Filter, Kind, Material, Part, Rot, Shape};
+use glam::Vec2;
+use std::collections::BTreeSet;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Of more points no polygon is made: finding those that are its corners takes long.
+const MOST_POINTS: usize = 1000;
+
+/// What a shape may be.
+const SHAPES: &str = "\"box\" or \"circle\"; or give polygon, capsule or parts in its place";
+
+/// What the size of something is.
+const SIZE: &str = "a positive number, in meters";
+
+/// What a pair of sizes is.
+const POINTS: &str = "points in meters, such as [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]";
+
+/// The shapes of statics alone.
+pub(super) const OF_STATICS: [&str; 2] = ["segment", "chain"];
+
+/// Reads all kinds, and what they are called.
+///
+/// # Errors
+/// If one of them cannot be.
+pub(super) fn kinds(file: &Path, tables: &[&Table]) -> Result<(Vec<Kind>, Vec<Option<String>>), SceneError> {
+    let mut kinds = Vec::with_capacity(tables.len());
+    let mut names = Vec::with_capacity(tables.len());
+    let mut taken = BTreeSet::new();
+    for (number, table) in tables.iter().enumerate() {
+        let mut entries = Entries::new(file, format!("[[kinds]] {number}"), table);
+        let name = entries.text("name", "a text")?;
+        if let Some(name) = name {
+            if !taken.insert(name) {
+                return Err(entries.refuse("name", "another kind has this name; give each its own"));
+            }
+            if name.trim() != name || name.is_empty() || name.parse::<u64>().is_ok() {
+                return Err(entries.refuse("name", "must be a word that is no number, without spaces around it"));
+            }
+        }
+        kinds.push(of_bodies(&mut entries)?);
+        names.push(name.map(str::to_owned));
+        entries.finish()?;
+    }
+    Ok((kinds, names))
+}
+
+/// Reads a kind that comes while a run goes on. The error is what is wrong with it.
+pub(crate) fn of_command(table: &Table) -> Result<Kind, String> {
+    let mut entries = Entries::new(Path::new(""), "add_kind".to_owned(), table);
+    let kind = of_bodies(&mut entries).and_then(|kind| entries.finish().map(|()| kind));
+    kind.map_err(|error| error.without_file())
+}
+
+/// A kind of bodies that move.
+fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
+    if let Some(key) = OF_STATICS.into_iter().find(|key| entries.has(key)) {
+        return Err(entries.refuse(key, "is for [[statics]] alone; here, give a capsule or parts"));
+    }
+    let shape = shape(entries)?;
+    let kind = of_shape(entries, shape)?;
+    if kind.material.surface_speed != 0.0 {
+        return Err(entries.refuse("surface_speed", "is for [[statics]] alone; leave it out"));
+    }
+    Ok(kind)
+}
+
+/// The one shape of a kind, but none of those that only statics have.
+///
+/// # Errors
+/// If there is none, several, or one that cannot be.
+pub(super) fn shape(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
+    check_one(entries)?;
+    if entries.has("parts") {
+        return parts(entries);
+    }
+    if let Some(shape) = convex(entries)? {
+        return Ok(shape);
+    }
+    match entries.text("shape", SHAPES)? {
+        Some("box") => Ok(Shape::rectangle(size(entries, "width")?, size(entries, "height")?)),
+        Some("circle") => Ok(Shape::circle(size(entries, "radius")?)),
+        Some(_) => Err(entries.refuse("shape", format!("must be {SHAPES}"))),
+        None => Err(entries.missing("shape", SHAPES)),
+    }
+}
+
+/// That there are not two shapes.
+///
+/// # Errors
+/// If there are.
+pub(super) fn check_one(entries: &Entries<'_>) -> Result<(), SceneError> {
+    let all = ["shape", "box", "circle", "polygon", "capsule", "parts"].into_iter().chain(OF_STATICS);
+    let given: Vec<&str> = all.filter(|key| entries.has(key)).collect();
+    match given[..] {
+        [first, second, ..] => Err(entries.refuse(second, format!("there is {first} already; leave one out"))),
+        _ => Ok(()),
+    }
+}
+
+/// Whether there is a number of meters, and it is positive, and so is half of it, which is what is kept.
+fn is_size(size: f32) -> bool {
+    size > 0.0 && 0.5 * size > 0.0
+}
+
+fn size(entries: &mut Entries<'_>, key: &'static str) -> Result<f32, SceneError> {
+    let size = entries.float(key, SIZE)?.ok_or_else(|| entries.missing(key, SIZE))?;
+    if is_size(size) { Ok(size) } else { Err(entries.refuse(key, format!("must be {SIZE}"))) }
+}
+
+/// Box, circle, polygon or capsule by that key, as parts have it as well. None if none is there.
+fn convex(entries: &mut Entries<'_>) -> Result<Option<Shape>, SceneError> {
+    let sizes = |value: &Value| pair(value).filter(|sizes| is_size(sizes.x) && is_size(sizes.y));
+    if let Some(Vec2 { x, y }) = entries.get("box", "[width, height], both positive, in meters", sizes)? {
+        return Ok(Some(Shape::rectangle(x, y)));
+    }
+    let is_radius = |value: &Value| float(value).filter(|radius| is_size(*radius));
+    if let Some(radius) = entries.get("circle", "its radius, a positive number, in meters", is_radius)? {
+        return Ok(Some(Shape::circle(radius)));
+    }
+    if let Some(Vec2 { x, y }) = entries.get("capsule", "[length, radius], both positive, in meters", sizes)? {
+        let capsule = Shape::capsule(x, y);
+        return capsule.map(Some).map_err(|error| entries.refuse("capsule", error.to_string()));
+    }
+    let points = |value: &Value| value.as_array()?.iter().map(pair).collect::<Option<Vec<Vec2>>>();
+    let Some(points) = entries.get("polygon", POINTS, points)? else { return Ok(None) };
+    if points.len() > MOST_POINTS {
+        return Err(entries.refuse("polygon", format!("it has {} points; give its corners alone", points.len())));
+    }
+    let radius = amount(entries, "radius", "a number, at least 0, in meters", 0.0)?;
+    Shape::polygon(&points, radius).map(Some).map_err(|error| entries.refuse("polygon", error.to_string()))
+}
+
+/// A compound.
+fn parts(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
+    const FORM: &str = "a list such as [{ circle = 0.5, at = [1.0, 0.0] }, { box = [2.0, 1.0], angle = 0.5 }]";
+    let tables = |value| Value::as_array(value)?.iter().map(Value::as_table).collect::<Option<Vec<_>>>();
+    let tables = entries.get("parts", FORM, tables)?.unwrap_or_default();
+    let mut parts = Vec::with_capacity(tables.len());
+    for (number, table) in tables.into_iter().enumerate() {
+        let mut part = entries.within(&format!("parts {number}"), table);
+        let given = ["box", "circle", "polygon", "capsule"].into_iter().filter(|key| part.has(key)).count();
+        let shape = if given == 1 { convex(&mut part)? } else { None };
+        let shape = shape.ok_or_else(|| {
+            entries.refuse("parts", format!("part {number} must have one of box, circle, polygon and capsule"))
+        })?;
+        let position = part.get("at", "[x, y], in meters", pair)?.unwrap_or_default();
+        let rotation = turn(&mut part)?;
+        part.finish()?;
+        parts.push(Part { shape, position, rotation });
+    }
+    Shape::compound(parts).map_err(|error| entries.refuse("parts", error.to_string()))
+}
+
+/// A number that is at least zero.
+fn amount(entries: &mut Entries<'_>, key: &'static str, must: &str, usual: f32) -> Result<f32, SceneError> {
+    within(entries, key, must, usual, |number| number >= 0.0)
+}
+
+/// A number in a range.
+fn within(
+    entries: &mut Entries<'_>,
+    key: &'static str,
+    must: &str,
+    usual: f32,
+    holds: fn(f32) -> bool,
+) -> Result<f32, SceneError> {
+    let number = entries.float(key, must)?.unwrap_or(usual);
+    if holds(number) { Ok(number) } else { Err(entries.refuse(key, format!("must be {must}"))) }
+}
+
+/// All of a kind but its shape.
+///
+/// # Errors
+/// If something of it cannot be.
+pub(super) fn of_shape(entries: &mut Entries<'_>, shape: Shape) -> Result<Kind, SceneError> {
+    let Kind { material, dynamics, filter, .. } = Kind::new(shape.clone(), Material::default());
+    let restitution = |number| (0.0..=1.0).contains(&number);
+    let material = Material {
+        density: within(entries, "density", "a positive number, in kg/m^2", material.density, |number| number > 0.0)?,
+        friction: amount(entries, "friction", "a number, at least 0", material.friction)?,
+        restitution: within(entries, "restitution", "a number within 0 to 1", material.restitution, restitution)?,
+        surface_speed: entries.float("surface_speed", "a number, in m/s")?.unwrap_or(material.surface_speed),
+    };
+    const RATE: &str = "a number, at least 0, in 1/s";
+    let dynamics = Dynamics {
+        gravity_scale: entries.float("gravity_scale", "a number")?.unwrap_or(dynamics.gravity_scale),
+        linear_damping: amount(entries, "linear_damping", RATE, dynamics.linear_damping)?,
+        angular_damping: amount(entries, "angular_damping", RATE, dynamics.angular_damping)?,
+        fixed_rotation: entries.truth("fixed_rotation")?.unwrap_or(dynamics.fixed_rotation),
+    };
+    const BITS: &str = "a whole number from 0 to 4294967295, a bit for each category";
+    let filter = Filter {
+        categories: entries.integer("categories", BITS)?.unwrap_or(filter.categories),
+        mask: entries.integer("mask", BITS)?.unwrap_or(filter.mask),
+        group: entries.integer("group", "a whole number within 32 bits")?.unwrap_or(filter.group),
+    };
+    let sensor = entries.truth("sensor")?.unwrap_or(false);
+    Ok(Kind { shape, material, dynamics, filter, sensor })
+}
+
+/// An angle, or cosine and sine, or neither.
+///
+/// # Errors
+/// If it is none.
+pub(super) fn turn(entries: &mut Entries<'_>) -> Result<Rot, SceneError> {
+    let angle = entries.float("angle", "an angle in radians")?;
+    let [cos, sin] = [entries.float("cos", "the cosine of an angle")?, entries.float("sin", "the sine of an angle")?];
+    match (angle, cos, sin) {
+        (None, None, None) => Ok(Rot::IDENTITY),
+        (Some(angle), None, None) => Ok(Rot::from_angle(angle)),
+        (None, Some(c), Some(s)) if is_turn(Rot { c, s }) => Ok(Rot { c, s }),
+        (None, Some(_), Some(_)) => {
+            Err(entries.refuse("cos", "cos and sin must be those of one angle: the sum of their squares is not 1"))
+        }
+        _ => Err(entries.refuse("angle", "give either angle, or both cos and sin")),
+    }
+}

@@ -1,0 +1,151 @@
+//! Statics as scenes say them: kinds at a place, pieces of ground, and what moves as its path has it.
+
+use super::super::SceneError;
+use super::entries::{Entries, pair, place};
+use super::kinds::{check_one, of_shape, shape, turn};
+use super::row::FARTHEST;
+use atoll_core::{GlobalId, Kind, Path as Course, Rot, Segment, Shape, StaticBody, Travel};
+use glam::{DVec2, Vec2};
+use std::collections::BTreeSet;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// What a coordinate of a center is.
+const PLACE: &str = "a number within -1e9 to 1e9, in meters";
+
+/// Reads all statics, and whether they have ids of their own. Those of a chain have ids that follow each other.
+///
+/// # Errors
+/// If one of them cannot be.
+pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<(Vec<StaticBody>, bool), SceneError> {
+    let mut statics: Vec<StaticBody> = Vec::with_capacity(tables.len());
+    let mut taken = BTreeSet::new();
+    let are_named = tables.first().is_some_and(|first| first.contains_key("id"));
+    for (number, table) in tables.iter().enumerate() {
+        let mut entries = Entries::new(file, format!("[[statics]] {number}"), table);
+        let id = entries.whole("id")?;
+        if id.is_some() != are_named {
+            return Err(
+                entries.refuse("id", "either every static has an id or none; give all of them one, or leave all out")
+            );
+        }
+        let first = id.unwrap_or(statics.len() as u64);
+        check_one(&entries)?;
+        let placed = if entries.has("chain") { chain(&mut entries)? } else { vec![alone(&mut entries)?] };
+        let path = path(&mut entries)?;
+        if path.is_some_and(|path| path.turning != 0.0) && entries.has("chain") {
+            return Err(entries.refuse("path", "a chain cannot turn; leave turning out, or give parts"));
+        }
+        // Of a chain, every segment is of the same stuff.
+        let like = of_shape(&mut entries, Shape::circle(1.0))?;
+        entries.finish()?;
+        for (id, (shape, position, rotation)) in (first..).zip(placed) {
+            if !taken.insert(id) {
+                return Err(entries.refuse("id", "another static has that id; give each its own"));
+            }
+            statics.push(StaticBody {
+                rotation,
+                path,
+                ..StaticBody::new(GlobalId(id), Kind { shape, ..like.clone() }, position)
+            });
+        }
+    }
+    Ok((statics, are_named))
+}
+
+/// A shape, where its center is, and how it is turned.
+type Placed = (Shape, DVec2, Rot);
+
+/// A static with a place of its own.
+fn alone(entries: &mut Entries<'_>) -> Result<Placed, SceneError> {
+    let (shape, middle) = match entries.table("segment")? {
+        Some(table) => segment(entries, table)?,
+        None => (shape(entries)?, Vec2::ZERO),
+    };
+    let mut place = |key| match entries.number(key, PLACE)? {
+        Some(number) if number.abs() <= FARTHEST => Ok(number),
+        Some(_) => Err(entries.refuse(key, format!("must be {PLACE}"))),
+        None => Err(entries.missing(key, PLACE)),
+    };
+    let position = DVec2::new(place("x")?, place("y")?);
+    let rotation = turn(entries)?;
+    // Nothing is added to what must keep its bits.
+    let position = if middle == Vec2::ZERO { position } else { position + rotation.rotate(middle).as_dvec2() };
+    Ok((shape, position, rotation))
+}
+
+/// A segment, and its middle.
+fn segment(entries: &Entries<'_>, table: &Table) -> Result<(Shape, Vec2), SceneError> {
+    const POINT: &str = "[x, y] in meters, seen from x and y of the static";
+    let mut own = entries.within("segment", table);
+    let mut point = |key| own.get(key, POINT, pair);
+    let [before, from, to, after] = [point("before")?, point("from")?, point("to")?, point("after")?];
+    let from = from.ok_or_else(|| own.missing("from", POINT))?;
+    let to = to.ok_or_else(|| own.missing("to", POINT))?;
+    own.finish()?;
+    let segment = Segment::new(before, from, to, after);
+    let (segment, middle) = segment.map_err(|error| entries.refuse("segment", error.to_string()))?;
+    Ok((Shape::Segment(segment), middle))
+}
+
+/// The segments of a chain.
+fn chain(entries: &mut Entries<'_>) -> Result<Vec<Placed>, SceneError> {
+    const POINTS: &str = "two points or more within 1e9 m, such as [[0.0, 0.0], [10.0, 1.0], [20.0, 0.0]]";
+    let point = |value: &Value| place(value).filter(|at| at.abs().cmple(DVec2::splat(FARTHEST)).all());
+    let points = |value: &Value| value.as_array()?.iter().map(point).collect::<Option<Vec<DVec2>>>();
+    let points = entries.get("chain", POINTS, points)?.unwrap_or_default();
+    let is_loop = entries.truth("loop")?.unwrap_or(false);
+    let least = if is_loop { 3 } else { 2 };
+    if points.len() < least {
+        return Err(entries.refuse("chain", format!("it has {} points, and needs {least} at least", points.len())));
+    }
+    chain_of(&points, is_loop).map_err(|error| entries.refuse("chain", error))
+}
+
+/// The segments along some points, each aware of its neighbours. The error is what is wrong with the points.
+pub(in crate::scene) fn chain_of(points: &[DVec2], is_loop: bool) -> Result<Vec<Placed>, String> {
+    let count = points.len();
+    let at = |i: usize| if is_loop { Some(points[i % count]) } else { points.get(i).copied() };
+    let segment = |i: usize| {
+        let before = if i == 0 && !is_loop { None } else { at((i + count - 1) % count) };
+        let (from, to, after) = (points[i], points[(i + 1) % count], at(i + 2));
+        let seen = |point: DVec2| (point - from).as_vec2();
+        let segment = Segment::new(before.map(seen), Vec2::ZERO, seen(to), after.map(seen));
+        let (segment, middle) = segment.map_err(|error| error.to_string())?;
+        Ok((Shape::Segment(segment), from + middle.as_dvec2(), Rot::IDENTITY))
+    };
+    (0..if is_loop { count } else { count - 1 }).map(segment).collect()
+}
+
+/// How a static moves, if it does.
+fn path(entries: &mut Entries<'_>) -> Result<Option<Course>, SceneError> {
+    const FORM: &str = "a table such as { line = [1.0, 0.0] } or { sine = [0.0, 2.0], period = 4.0 }";
+    const PERIOD: &str = "a number of seconds other than 0";
+    let Some(table) = entries.get("path", FORM, Value::as_table)? else { return Ok(None) };
+    let mut own = entries.within("path", table);
+    let given: Vec<&str> = ["line", "sine", "circle"].into_iter().filter(|key| own.has(key)).collect();
+    if let [first, second, ..] = given[..] {
+        return Err(own.refuse(second, format!("there is {first} already; leave one out")));
+    }
+    let finite = |value: &Value| place(value).filter(|at| at.is_finite());
+    let turning = own.number("turning", "a number, in rad/s")?.unwrap_or(0.0);
+    let velocity = own.get("line", "a velocity, [x, y] in m/s", finite)?;
+    let amplitude = own.get("sine", "how far it goes, [x, y] in meters", finite)?;
+    let radius = own.number("circle", "a radius, in meters")?;
+    let travel = if let Some(velocity) = velocity {
+        Travel::Line { velocity }
+    } else if amplitude.is_some() || radius.is_some() {
+        let period = own.number("period", PERIOD)?.ok_or_else(|| own.missing("period", PERIOD))?;
+        let phase = own.number("phase", "a number, as a part of a whole turn")?.unwrap_or(0.0);
+        match (amplitude, radius) {
+            (Some(amplitude), _) => Travel::Sine { amplitude, period, phase },
+            (_, radius) => Travel::Circle { radius: radius.unwrap_or_default(), period, phase },
+        }
+    } else {
+        Travel::Rest
+    };
+    own.finish()?;
+    let path = Course { travel, turning };
+    // All else is finite already.
+    if path.is_valid() { Ok(Some(path)) } else { Err(own.refuse("period", format!("must be {PERIOD}"))) }
+}
