@@ -4,6 +4,7 @@
 use crate::folder::recording::Row;
 use atoll_core::{Kind, Partition, StaticBody};
 use glam::DVec2;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// What stays as it is throughout a run.
@@ -13,10 +14,22 @@ pub(crate) struct Setting {
     pub partition: Partition,
     /// Shapes and materials, which bodies refer to by number.
     pub kinds: Vec<Kind>,
-    /// What never moves.
+    /// What never moves, or as its path has it.
     pub statics: Vec<StaticBody>,
     /// Steps in a second.
     pub hertz: f64,
+}
+
+impl Setting {
+    /// Statics where they are after so many steps, for those that have a path move.
+    pub(crate) fn statics_at(&self, step: u64) -> impl Iterator<Item = Cow<'_, StaticBody>> {
+        let dt = (1.0 / self.hertz) as f32;
+        self.statics.iter().map(move |fixed| {
+            let Some(path) = &fixed.path else { return Cow::Borrowed(fixed) };
+            let (position, rotation) = path.pose(fixed.position, fixed.rotation, step, dt);
+            Cow::Owned(StaticBody { position, rotation, ..fixed.clone() })
+        })
+    }
 }
 
 /// What is there after a step. Used again, it allocates nothing.

@@ -29,7 +29,7 @@ pub fn overhear(bytes: &[u8]) -> [bool; 2] {
     let (is_request, gaze) = server::overhear(bytes);
     if let Some(gaze) = gaze.filter(|gaze| gaze.size[0] * gaze.size[1] <= 1 << 12) {
         let shapes = [Shape::Circle { radius: 0.5 }, Shape::Box { half: Vec2::new(0.01, 3.0) }];
-        let kinds = shapes.map(|shape| Kind { shape, material: Material::default() }).to_vec();
+        let kinds = shapes.map(|shape| Kind::new(shape, Material::default())).to_vec();
         let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 2, 2).expect("it is one");
         let setting = Setting { partition, kinds, statics: Vec::new(), hertz: 60.0 };
         let row =

@@ -19,6 +19,7 @@
 use super::super::picture::{ColorBy, View};
 use crate::command::{Word, word};
 use crate::folder::in_letters;
+use crate::scene::record::PathText;
 use atoll_core::Partition;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
@@ -146,7 +147,7 @@ pub(crate) enum Say {
     /// There are more kinds than before, in all of these shapes.
     Shapes {
         /// As [`Source::shapes`].
-        shapes: Vec<[f32; 3]>,
+        shapes: Vec<Outline>,
     },
     /// The first record in which two worlds differ, or that there is none.
     Difference {
@@ -186,10 +187,37 @@ pub(crate) struct Source {
     /// Those that it has when the page comes.
     #[serde(flatten)]
     pub held: Tiles,
-    /// Half width, half height and radius of each kind, in m.
-    pub shapes: Vec<[f32; 3]>,
-    /// What never moves: x, y in m, cosine and sine of how it is turned, half width, half height and radius in m.
-    pub statics: Vec<[f64; 7]>,
+    /// Of each kind.
+    pub shapes: Vec<Outline>,
+    /// Those that statics have, each once.
+    pub static_shapes: Vec<Outline>,
+    /// What never moves, or as its path has it.
+    pub statics: Vec<Fixed>,
+}
+
+/// The outline of a kind, in m.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Outline {
+    /// What it is, and how large.
+    pub name: String,
+    /// Half width, half height and radius: of a circle the last, of a box the first two; of any other how far it reaches along its axes,
+    /// and half of how wide it is where it is narrowest.
+    pub size: [f32; 3],
+    /// Of any other its convex parts: x and y of each corner, counter-clockwise, and how far it reaches around them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<(Vec<[f32; 2]>, f32)>,
+}
+
+/// A static.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(crate) struct Fixed {
+    /// x, y in m, cosine and sine of how it is turned: of one that moves, where it begins.
+    pub at: [f64; 4],
+    /// Row of [`Source::static_shapes`].
+    pub shape: u32,
+    /// How it moves, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathText>,
 }
 
 /// The tiles of a world.

@@ -3,12 +3,13 @@
 use super::figures::Part;
 use super::protocol::{Dot, Gaze};
 use super::sketch::{Paper, Pixels, Sketch, turn};
+use crate::look::convex::to_convex;
 use crate::look::frame::Setting;
 use crate::look::picture::{ColorBy, Range, Rgb, Tint};
 use crate::rank::Held;
 use atoll_core::{Body, GlobalId, Shape, TileView, World};
 use bytemuck::{Pod, Zeroable};
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
@@ -207,12 +208,50 @@ impl Found {
 /// From a place to the outline of a body, in m; negative within.
 pub(super) fn distance(shape: &Shape, body: &Body, place: DVec2) -> f64 {
     let from = place - body.position;
-    match *shape {
-        Shape::Circle { radius } => from.length() - f64::from(radius),
+    let (c, s) = (f64::from(body.rotation.c), f64::from(body.rotation.s));
+    let own = DVec2::new(c * from.x + s * from.y, c * from.y - s * from.x);
+    match shape {
+        Shape::Circle { radius } => from.length() - f64::from(*radius),
         Shape::Box { half } => {
-            let (c, s) = (f64::from(body.rotation.c), f64::from(body.rotation.s));
-            let own = DVec2::new(c * from.x + s * from.y, c * from.y - s * from.x).abs() - half.as_dvec2();
-            own.max(DVec2::ZERO).length() + own.max_element().min(0.0)
+            let beyond = own.abs() - half.as_dvec2();
+            beyond.max(DVec2::ZERO).length() + beyond.max_element().min(0.0)
+        }
+        other => {
+            let to_part = |(corners, radius): (Vec<Vec2>, f32)| {
+                let corners: Vec<DVec2> = corners.into_iter().map(Vec2::as_dvec2).collect();
+                to_convex(&corners, own) - f64::from(radius)
+            };
+            other.outlines().into_iter().map(to_part).fold(f64::INFINITY, f64::min)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use atoll_core::{KindId, Part, Rot};
+
+    #[test]
+    fn distances_are_to_the_outline() {
+        let body = Body {
+            rotation: Rot::from_angle(std::f32::consts::FRAC_PI_2),
+            ..Body::at_rest(GlobalId(1), KindId(0), DVec2::new(10.0, 10.0))
+        };
+        let part = |x| Part { shape: Shape::circle(1.0), position: Vec2::new(x, 0.0), rotation: Rot::IDENTITY };
+        let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec2::new(x, y));
+        let capsule = Shape::capsule(4.0, 0.5).unwrap();
+        // All of them stand upright now.
+        for (shape, x, y, expected) in [
+            (Shape::rectangle(4.0, 1.0), 10.0, 13.0, 1.0),
+            (Shape::polygon(&square, 0.0).unwrap(), 10.0, 10.25, -0.75),
+            (Shape::polygon(&square, 0.5).unwrap(), 12.0, 10.0, 0.5),
+            (capsule.clone(), 10.0, 13.0, 0.5),
+            (capsule, 10.0, 11.0, -0.5),
+            (Shape::compound(vec![part(-3.0), part(3.0)]).unwrap(), 10.0, 10.0, 2.0),
+            (Shape::compound(vec![part(-3.0), part(3.0)]).unwrap(), 10.0, 13.5, -0.5),
+        ] {
+            let found = distance(&shape, &body, DVec2::new(x, y));
+            assert!((found - expected).abs() < 1e-5, "{shape:?} from {x}, {y}: {found}");
         }
     }
 }

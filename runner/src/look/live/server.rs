@@ -33,11 +33,13 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(50);
 
 /// What there is to get, with its type.
-const FILES: [(&str, &str, &str); 5] = [
+const FILES: [(&str, &str, &str); 7] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("page/app.js")),
     ("/draw.js", "text/javascript; charset=utf-8", include_str!("page/draw.js")),
+    ("/shaders.js", "text/javascript; charset=utf-8", include_str!("page/shaders.js")),
+    ("/shapes.js", "text/javascript; charset=utf-8", include_str!("page/shapes.js")),
     ("/frame.js", "text/javascript; charset=utf-8", include_str!("page/frame.js")),
 ];
 

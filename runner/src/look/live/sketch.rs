@@ -98,10 +98,7 @@ impl<'a> Sketch<'a> {
         let width = |radius: f32| f64::from(radius) * 2.0 * scale;
         let mut widest = 0.0_f64;
         let mut size = |shape: &atoll_core::Shape| {
-            let longest = match *shape {
-                atoll_core::Shape::Circle { radius } => width(radius),
-                atoll_core::Shape::Box { half } => width(half.max_element()),
-            };
+            let longest = width(shape.half_extents(Rot::IDENTITY).max_element());
             if longest > drawn {
                 return Size::Large;
             }
@@ -269,10 +266,7 @@ mod tests {
     fn coarse_densities_lie_where_fine_ones_do() {
         let setting = Setting {
             partition: atoll_core::Partition::uniform(DVec2::ZERO, DVec2::splat(100.0), 1, 1).unwrap(),
-            kinds: vec![atoll_core::Kind {
-                shape: atoll_core::Shape::Circle { radius: 0.05 },
-                material: atoll_core::Material::default(),
-            }],
+            kinds: vec![atoll_core::Kind::new(atoll_core::Shape::circle(0.05), atoll_core::Material::default())],
             statics: Vec::new(),
             hertz: 60.0,
         };

@@ -5,8 +5,8 @@ use super::colors;
 use super::view::Fit;
 use crate::folder::recording::Row;
 use crate::look::frame::Live;
-use atoll_core::{Rot, Shape, StaticBody};
-use glam::DVec2;
+use atoll_core::{MOST_CORNERS, Rot, Shape, StaticBody};
+use glam::{DVec2, Vec2};
 
 /// What is wider than this, in pixels, is drawn as what it is.
 pub(crate) const DRAWN: f64 = 2.0;
@@ -20,69 +20,101 @@ const THINNEST: f64 = 1.0;
 pub(super) struct Bodies {
     fit: Fit,
     /// For each kind.
-    shapes: Vec<Shape>,
+    kinds: Vec<Drawn>,
+}
+
+/// A kind as it is drawn.
+#[derive(Debug)]
+struct Drawn {
+    shape: Shape,
+    /// Its longest side, or its diameter, in pixels.
+    width: f64,
+    /// How wide it is where it is narrowest, in pixels.
+    narrowest: f64,
+    /// In pixels.
+    area: f64,
+    /// Of a circle around it, in pixels.
+    reach: f64,
+    /// Its parts, unless it is a circle or a box.
+    outlines: Vec<(Vec<Vec2>, f32)>,
+}
+
+impl Drawn {
+    fn new(shape: &Shape, scale: f64) -> Self {
+        let narrowest = match shape {
+            Shape::Circle { radius } => 2.0 * radius,
+            Shape::Box { half } => 2.0 * half.min_element(),
+            other => other.width(),
+        };
+        Self {
+            shape: shape.clone(),
+            width: f64::from(2.0 * shape.half_extents(Rot::IDENTITY).max_element()) * scale,
+            narrowest: f64::from(narrowest) * scale,
+            area: f64::from(shape.area()) * scale * scale,
+            reach: f64::from(shape.bounding_radius()) * scale,
+            outlines: outlines(shape),
+        }
+    }
 }
 
 impl Bodies {
-    pub(super) fn new(fit: Fit, shapes: impl Iterator<Item = Shape>) -> Self {
-        Self { fit, shapes: shapes.collect() }
+    pub(super) fn new<'a>(fit: Fit, shapes: impl Iterator<Item = &'a Shape>) -> Self {
+        Self { fit, kinds: shapes.map(|shape| Drawn::new(shape, fit.scale)).collect() }
     }
 
     /// How wide the widest kind is, in pixels.
     pub(super) fn widest(&self) -> f64 {
-        self.shapes.iter().map(|shape| self.width(shape)).fold(0.0, f64::max)
+        self.kinds.iter().map(|kind| kind.width).fold(0.0, f64::max)
     }
 
     /// Whether some kinds are too small to be drawn, and whether some are not.
     pub(super) fn has(&self) -> [bool; 2] {
-        let is_small = |shape: &Shape| self.width(shape) <= DRAWN;
-        [self.shapes.iter().any(is_small), !self.shapes.iter().all(is_small)]
+        let is_small = |kind: &Drawn| kind.width <= DRAWN;
+        [self.kinds.iter().any(is_small), !self.kinds.iter().all(is_small)]
     }
 
     /// How strongly densities are drawn: the smaller the bodies, the more a few of them would else be lost. Where they are
     /// nearly large enough to be drawn, as they are.
     pub(super) fn tone(&self) -> Tone {
-        let small = self.shapes.iter().map(|shape| self.width(shape)).filter(|width| *width <= DRAWN);
+        let small = self.kinds.iter().map(|kind| kind.width).filter(|width| *width <= DRAWN);
         Tone::new(0.5 + 0.25 * small.fold(0.0, f64::max))
     }
 
-    /// The longest side of a shape, or its diameter, in pixels.
-    fn width(&self, shape: &Shape) -> f64 {
-        let width = match shape {
-            Shape::Circle { radius } => 2.0 * radius,
-            Shape::Box { half } => 2.0 * half.max_element(),
-        };
-        f64::from(width) * self.fit.scale
-    }
-
-    /// The shape of a body, unless it has a kind that is not in the table.
-    fn shape(&self, row: &Row) -> Option<&Shape> {
-        self.shapes.get(row.kind as usize)
+    /// The kind of a body, unless it is not in the table.
+    fn kind(&self, row: &Row) -> Option<&Drawn> {
+        self.kinds.get(row.kind as usize)
     }
 
     /// Adds a body to the densities, if it is too small to be drawn.
     #[inline]
     pub(super) fn splat(&self, field: &mut Field, row: &Row, color: impl FnOnce() -> Rgb) {
-        let Some(shape) = self.shape(row).filter(|shape| self.width(shape) <= DRAWN) else { return };
-        let area = f64::from(shape.area()) * self.fit.scale * self.fit.scale;
-        field.splat(self.fit.place(DVec2::new(row.x, row.y)), area, color());
+        let Some(kind) = self.kind(row).filter(|kind| kind.width <= DRAWN) else { return };
+        field.splat(self.fit.place(DVec2::new(row.x, row.y)), kind.area, color());
     }
 
     /// Draws a body, if it is not too small.
     pub(super) fn draw(&self, canvas: &mut Canvas, row: &Row, color: impl FnOnce() -> Rgb) {
-        let Some((form, axis)) = self.form(canvas, row) else { return };
-        let width = narrowest(&form);
+        let Some((kind, center)) = self.seen(canvas, row) else { return };
+        let (forms, axis) = self.forms(kind, center, row);
+        let width = kind.narrowest;
         let detail = ((width - DETAILED) / DETAILED).clamp(0.0, 1.0);
         let color = color();
         let edge = color.mix(color.darker(), detail as f32);
-        if detail == 0.0 {
-            return canvas.draw(&form, color, 1.0);
+        let border = (0.05 * width).clamp(0.8, 3.0);
+        match &forms[..] {
+            forms if detail == 0.0 => return forms.iter().for_each(|form| canvas.draw(form, color, 1.0)),
+            [form] => canvas.draw_edged(form, color, edge, border),
+            // What is within another part has no edge there.
+            forms => {
+                forms.iter().for_each(|form| canvas.draw(form, edge, 1.0));
+                forms.iter().for_each(|form| canvas.draw(&form.grown(-border), color, 1.0));
+            }
         }
-        canvas.draw_edged(&form, color, edge, (0.05 * width).clamp(0.8, 3.0));
-        let (center, length) = match form {
-            Form::Box { center, half, .. } => (center, half[0]),
-            Form::Disc { center, radius } => (center, radius),
-            Form::Plate { .. } => return,
+        let length = match kind.shape {
+            Shape::Box { half } => f64::from(half.x) * self.fit.scale,
+            // Where the center of a compound is, there may be nothing of it.
+            Shape::Compound(_) => return,
+            _ => 0.5 * width,
         };
         let mark = Form::line(center, axis, length, (0.07 * width).clamp(1.0, 6.0));
         canvas.draw(&mark, color.darker(), 0.9 * detail);
@@ -91,9 +123,11 @@ impl Bodies {
     /// Draws the outline of a copy around the body that it copies, or adds it to the densities if it is too small.
     pub(super) fn draw_ghost(&self, canvas: &mut Canvas, field: &mut Field, row: &Row) {
         self.splat(field, row, || colors::GHOST);
-        if let Some((form, _)) = self.form(canvas, row) {
-            let width = (0.14 * narrowest(&form)).clamp(1.0, 4.0);
-            canvas.draw_ring(&form.grown(0.5 * width), width, colors::GHOST, 0.75);
+        if let Some((kind, center)) = self.seen(canvas, row) {
+            let width = (0.14 * kind.narrowest).clamp(1.0, 4.0);
+            for form in self.forms(kind, center, row).0 {
+                canvas.draw_ring(&form.grown(0.5 * width), width, colors::GHOST, 0.75);
+            }
         }
     }
 
@@ -102,49 +136,74 @@ impl Bodies {
         self.seen(canvas, row).is_some()
     }
 
-    /// A body's shape on the image and the direction of its first axis, unless it is too small or elsewhere.
-    fn form(&self, canvas: &Canvas, row: &Row) -> Option<(Form, [f64; 2])> {
-        let (shape, center) = self.seen(canvas, row)?;
-        Some(form(shape, center, Rot::from_angle(row.angle), self.fit.scale))
+    /// A body's parts on the image, and the direction of its first axis.
+    fn forms(&self, kind: &Drawn, center: [f64; 2], row: &Row) -> (Vec<Form>, [f64; 2]) {
+        forms(&kind.shape, &kind.outlines, center, Rot::from_angle(row.angle), self.fit.scale)
     }
 
-    /// A body's shape and where it is on the image, unless it is too small or elsewhere.
-    fn seen(&self, canvas: &Canvas, row: &Row) -> Option<(&Shape, [f64; 2])> {
-        let shape = self.shape(row).filter(|shape| self.width(shape) > DRAWN)?;
+    /// A body's kind and where it is on the image, unless it is too small or elsewhere.
+    fn seen(&self, canvas: &Canvas, row: &Row) -> Option<(&Drawn, [f64; 2])> {
+        let kind = self.kind(row).filter(|kind| kind.width > DRAWN)?;
         let center = self.fit.place(DVec2::new(row.x, row.y));
-        let reach = f64::from(shape.bounding_radius()) * self.fit.scale + 4.0;
+        let reach = kind.reach + 4.0;
         let is_seen = |axis: usize| !canvas.span(axis, center[axis] - reach, center[axis] + reach).is_empty();
-        (is_seen(0) && is_seen(1)).then_some((shape, center))
+        (is_seen(0) && is_seen(1)).then_some((kind, center))
     }
 }
 
-/// A shape on the image, and the direction of its first axis.
-fn form(shape: &Shape, center: [f64; 2], rotation: Rot, scale: f64) -> (Form, [f64; 2]) {
+/// The parts of a shape that is neither a circle nor a box.
+fn outlines(shape: &Shape) -> Vec<(Vec<Vec2>, f32)> {
+    match shape {
+        Shape::Circle { .. } | Shape::Box { .. } => Vec::new(),
+        other => other.outlines(),
+    }
+}
+
+/// The parts of a shape on the image, and the direction of its first axis.
+fn forms(
+    shape: &Shape,
+    outlines: &[(Vec<Vec2>, f32)],
+    center: [f64; 2],
+    rotation: Rot,
+    scale: f64,
+) -> (Vec<Form>, [f64; 2]) {
     let axis = [f64::from(rotation.c), -f64::from(rotation.s)];
-    let form = match *shape {
-        Shape::Circle { radius } => Form::Disc { center, radius: f64::from(radius) * scale },
-        Shape::Box { half } => Form::Box { center, axis, half: half.to_array().map(|half| f64::from(half) * scale) },
+    let hull = |(outline, radius): &(Vec<Vec2>, f32)| {
+        let mut corners = [DVec2::ZERO; MOST_CORNERS];
+        // Downwards is up there, and so what goes round one way goes round the other.
+        for (to, &from) in corners.iter_mut().zip(outline.iter().rev()) {
+            let from = from.as_dvec2() * scale;
+            let turned = [axis[0] * from.x + axis[1] * from.y, axis[1] * from.x - axis[0] * from.y];
+            *to = DVec2::from(center) + DVec2::from(turned);
+        }
+        Form::Hull { corners, count: outline.len(), radius: f64::from(*radius) * scale }
     };
-    (form, axis)
-}
-
-/// The shortest side, or the diameter.
-fn narrowest(form: &Form) -> f64 {
-    match form {
-        Form::Disc { radius, .. } => 2.0 * radius,
-        Form::Box { half, .. } => 2.0 * half[0].min(half[1]),
-        Form::Plate { .. } => 0.0,
-    }
+    let forms = match *shape {
+        Shape::Circle { radius } => vec![Form::Disc { center, radius: f64::from(radius) * scale }],
+        Shape::Box { half } => {
+            vec![Form::Box { center, axis, half: half.to_array().map(|half| f64::from(half) * scale) }]
+        }
+        _ => outlines.iter().map(hull).collect(),
+    };
+    (forms, axis)
 }
 
 /// Adds what never moves to the densities, wide enough to be seen: so there is no seam between what adjoins.
 pub(super) fn draw_static(canvas: &Canvas, field: &mut Field, fit: &Fit, fixed: &StaticBody) {
-    let form = match form(&fixed.kind.shape, fit.place(fixed.position), fixed.rotation, fit.scale).0 {
-        Form::Disc { center, radius } => Form::Disc { center, radius: radius.max(THINNEST) },
-        Form::Box { center, axis, half } => Form::Box { center, axis, half: half.map(|half| half.max(0.5 * THINNEST)) },
-        plate @ Form::Plate { .. } => plate,
-    };
-    field.cover(canvas, &form, colors::STATIC);
+    let shape = &fixed.kind.shape;
+    for form in forms(shape, &outlines(shape), fit.place(fixed.position), fixed.rotation, fit.scale).0 {
+        let form = match form {
+            Form::Disc { center, radius } => Form::Disc { center, radius: radius.max(THINNEST) },
+            Form::Box { center, axis, half } => {
+                Form::Box { center, axis, half: half.map(|half| half.max(0.5 * THINNEST)) }
+            }
+            Form::Hull { corners, count, radius } if count < 3 => {
+                Form::Hull { corners, count, radius: radius.max(0.5 * THINNEST) }
+            }
+            other => other,
+        };
+        field.cover(canvas, &form, colors::STATIC);
+    }
 }
 
 /// Draws where contacts are: dots whose area grows with the impulse; where bodies are too small, how many there are.

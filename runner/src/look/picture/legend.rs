@@ -5,6 +5,7 @@ use super::colors::{self, Scale};
 use super::paint::{self, ColorBy, MOST_CONTACTS};
 use super::{Layers, bodies};
 use crate::look::frame::Setting;
+use crate::wording::{self, short};
 use atoll_core::Shape;
 
 /// The meaning of one color or sign.
@@ -91,19 +92,10 @@ impl Legend {
 /// A kind, told by its shape.
 fn shape(number: u32, shape: &Shape) -> (Sign, String) {
     let color = colors::distinct(number);
-    let meters = |length: f32| short(f64::from(length));
     match shape {
-        Shape::Circle { radius } => (Sign::Disc(color), format!("circle, {} m wide", meters(2.0 * radius))),
-        Shape::Box { half } => {
-            (Sign::Square(color), format!("box, {} × {} m", meters(2.0 * half.x), meters(2.0 * half.y)))
-        }
+        Shape::Circle { .. } => (Sign::Disc(color), format!("{} wide", wording::shape(shape))),
+        _ => (Sign::Square(color), wording::shape(shape)),
     }
-}
-
-/// A number with as few digits as it takes, up to four behind the point.
-pub(crate) fn short(value: f64) -> String {
-    let text = format!("{value:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// A length in the unit that suits it.

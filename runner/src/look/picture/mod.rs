@@ -16,7 +16,7 @@ mod view;
 pub(crate) use bodies::DRAWN;
 pub(crate) use canvas::{Field, Image, Rgb, Tone};
 pub(crate) use colors::STATIC;
-pub(crate) use legend::{Legend, Sign, grouped, short};
+pub(crate) use legend::{Legend, Sign, grouped};
 pub(crate) use paint::{ColorBy, Range, Tint};
 pub(crate) use view::{View, whole_view};
 
@@ -90,7 +90,7 @@ impl Painter {
         let ([left, bottom], [right, top]) = (fit.place(view.low), fit.place(view.high));
         self.canvas.clip([left, top], [right, bottom]);
         self.canvas.fill(colors::PAPER);
-        self.draw_statics(&fit);
+        self.draw_statics(frame.step, &fit);
         self.draw_bodies(frame, fit);
         if self.look.layers.tiles {
             self.draw_tiles(frame, &fit);
@@ -102,17 +102,17 @@ impl Painter {
         &self.canvas.image
     }
 
-    fn draw_statics(&mut self, fit: &Fit) {
+    fn draw_statics(&mut self, step: u64, fit: &Fit) {
         let Self { setting, canvas, field, .. } = self;
         field.reset(canvas.image.size);
-        setting.statics.iter().for_each(|fixed| bodies::draw_static(canvas, field, fit, fixed));
+        setting.statics_at(step).for_each(|fixed| bodies::draw_static(canvas, field, fit, &fixed));
         field.draw(canvas, &Tone::new(1.0));
     }
 
     /// Draws bodies, then ghosts, then contacts.
     fn draw_bodies(&mut self, frame: &Frame, fit: Fit) {
         let Self { setting, look, canvas, field, order, .. } = self;
-        let bodies = Bodies::new(fit, setting.kinds.iter().map(|kind| kind.shape));
+        let bodies = Bodies::new(fit, setting.kinds.iter().map(|kind| &kind.shape));
         let [has_small, has_large] = bodies.has();
         let tone = bodies.tone();
         if has_small {

@@ -7,24 +7,24 @@ use super::paint::round_up;
 use super::*;
 use crate::folder::recording::Row;
 use crate::look::frame::Live;
-use atoll_core::{GlobalId, Kind, Material, Partition, Rot, Shape, StaticBody};
+use atoll_core::{GlobalId, Kind, Material, Part, Partition, Path, Rot, Segment, Shape, StaticBody, Travel};
 use glam::DVec2;
 
 /// One pixel is a meter wide: a domain as large as the image, and its view.
 const SIZE: u32 = 400;
 
 fn kind(shape: Shape) -> Kind {
-    Kind { shape, material: Material::default() }
+    Kind::new(shape, Material::default())
 }
 
 fn setting(kinds: &[Shape], statics: &[(Shape, f32, DVec2)]) -> Setting {
-    let fixed = |(id, &(shape, angle, position)): (u64, &(Shape, f32, DVec2))| StaticBody {
-        rotation: Rot::from_angle(angle),
-        ..StaticBody::new(GlobalId(id), kind(shape), position)
+    let fixed = |(id, (shape, angle, position)): (u64, &(Shape, f32, DVec2))| StaticBody {
+        rotation: Rot::from_angle(*angle),
+        ..StaticBody::new(GlobalId(id), kind(shape.clone()), *position)
     };
     Setting {
         partition: Partition::uniform(DVec2::ZERO, DVec2::splat(f64::from(SIZE)), 4, 4).unwrap(),
-        kinds: kinds.iter().map(|shape| kind(*shape)).collect(),
+        kinds: kinds.iter().map(|shape| kind(shape.clone())).collect(),
         statics: (0..).zip(statics).map(fixed).collect(),
         hertz: 60.0,
     }
@@ -103,7 +103,7 @@ fn bodies_have_their_areas_and_colors() {
         (Shape::rectangle(60.0, 40.0), 1.0),
         (Shape::circle(50.0), 0.0),
     ] {
-        let world = setting(&[shape], &[]);
+        let world = setting(std::slice::from_ref(&shape), &[]);
         let pixels = right_of_labels(&world, &frame(vec![row(0, 280.3, 200.6, angle)]), look(ColorBy::Kind));
         let color = colors::distinct(0);
         let covered: f64 = pixels.iter().map(|pixel| area(&[*pixel], color).min(1.0)).sum();
@@ -112,6 +112,62 @@ fn bodies_have_their_areas_and_colors() {
         let dark = pixels.contains(&color.darker().0);
         assert_eq!(dark, shape.area() > 1000.0, "{shape:?} has an outline if it is large");
     }
+}
+
+fn polygon(points: &[(f32, f32)], radius: f32) -> Shape {
+    Shape::polygon(&points.iter().map(|&(x, y)| glam::Vec2::new(x, y)).collect::<Vec<_>>(), radius).unwrap()
+}
+
+#[test]
+fn every_shape_is_drawn_as_what_it_is() {
+    let part = |shape, x: f32, y: f32| Part { shape, position: glam::Vec2::new(x, y), rotation: Rot::from_angle(0.3) };
+    let apart =
+        Shape::compound(vec![part(Shape::circle(12.0), -30.0, 0.0), part(Shape::rectangle(30.0, 20.0), 25.0, 5.0)]);
+    for shape in [
+        polygon(&[(0.0, 0.0), (40.0, 0.0), (10.0, 30.0)], 0.0),
+        polygon(&[(0.0, 0.0), (8.0, 0.0), (2.0, 6.0)], 0.0),
+        polygon(&[(0.0, 0.0), (40.0, 0.0), (10.0, 30.0)], 6.0),
+        Shape::capsule(50.0, 8.0).unwrap(),
+        Shape::capsule(6.0, 1.5).unwrap(),
+        apart.unwrap(),
+    ] {
+        for angle in [0.0, 0.7, 2.5] {
+            let world = setting(std::slice::from_ref(&shape), &[]);
+            let row = row(0, 280.3, 200.6, angle);
+            // What kinds are is too long a label.
+            let pixels = right_of_labels(&world, &frame(vec![row]), look(ColorBy::Rank));
+            let color = colors::distinct(0);
+            let covered: f64 = pixels.iter().map(|pixel| area(&[*pixel], color).min(1.0)).sum();
+            assert_near(covered, f64::from(shape.area()), &format!("{shape:?} turned by {angle}"));
+            // The pixels lie where the shape does: their mean is its center of mass.
+            let (mut sum, width) = ([0.0; 2], SIZE as usize - 150);
+            for (i, pixel) in pixels.iter().enumerate() {
+                let part = area(&[*pixel], color).min(1.0) / covered;
+                sum[0] += part * ((i % width) as f64 + 150.5);
+                sum[1] += part * (f64::from(SIZE) - (i / width) as f64 - 0.5);
+            }
+            let off = (DVec2::from(sum) - DVec2::new(row.x, row.y)).length();
+            assert!(off < 0.3, "{shape:?} turned by {angle} is {off} pixels off");
+        }
+    }
+}
+
+#[test]
+fn segments_and_what_moves_are_where_they_are() {
+    let (segment, _) = Segment::new(None, glam::Vec2::ZERO, glam::Vec2::new(100.0, 0.0), None).unwrap();
+    let mut world = setting(&[], &[(Shape::Segment(segment), 0.2, DVec2::new(275.0, 200.0))]);
+    let drawn = |world: &Setting, step| {
+        let pixels = right_of_labels(world, &Frame { step, ..frame(Vec::new()) }, look(ColorBy::Kind));
+        (area(&pixels, colors::STATIC), pixels)
+    };
+    let (covered, _) = drawn(&world, 0);
+    assert!((100.0..103.0).contains(&covered), "a pixel wide: {covered}");
+    let box_at = |x| [(Shape::rectangle(20.0, 20.0), 0.0, DVec2::new(x, 200.0))];
+    world = setting(&[], &box_at(200.0));
+    world.statics[0].path = Some(Path { travel: Travel::Line { velocity: DVec2::new(60.0, 0.0) }, turning: 0.0 });
+    // A second at 60 steps in it.
+    assert_eq!(drawn(&world, 60).1, drawn(&setting(&[], &box_at(260.0)), 60).1);
+    assert_ne!(drawn(&world, 0).1, drawn(&world, 60).1);
 }
 
 #[test]
@@ -133,11 +189,11 @@ fn what_never_moves_is_seen_however_thin() {
 fn densities_are_what_bodies_cover() {
     // A quarter of each pixel, wherever within pixels bodies lie.
     let shape = Shape::rectangle(0.5, 0.5);
-    let world = setting(&[shape], &[]);
+    let world = setting(std::slice::from_ref(&shape), &[]);
     let places = (0..SIZE * SIZE).map(|i| (f64::from(i % SIZE) + 0.37, f64::from(i / SIZE) + 0.81));
     let bodies: Vec<Row> = places.map(|(x, y)| row(0, x, y, 0.3)).collect();
     let fit = Fit::new(&view(), [f64::from(SIZE); 2]);
-    let drawn = Bodies::new(fit, [shape].into_iter());
+    let drawn = Bodies::new(fit, [&shape].into_iter());
     let mut field = Field::default();
     field.reset([SIZE; 2]);
     bodies.iter().for_each(|row| drawn.splat(&mut field, row, || Rgb::hex(0)));
@@ -230,7 +286,7 @@ fn ranks_are_found_by_where_their_bodies_are() {
 
 #[test]
 fn labels_have_room_of_their_own() {
-    let kinds = [Shape::circle(1.0); 40];
+    let kinds = vec![Shape::circle(1.0); 40];
     let world = setting(&kinds, &[]);
     let letters = Letters::new();
     for size in [[320, 180], [320, 320], [500, 900], [1920, 1080], [3840, 2160], [64, 64]] {

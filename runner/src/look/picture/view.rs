@@ -1,7 +1,7 @@
 //! What is looked at, and where it is on an image.
 
 use crate::look::frame::Setting;
-use atoll_core::{Shape, StaticBody};
+use atoll_core::StaticBody;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -56,14 +56,7 @@ pub(crate) fn whole_view(setting: &Setting) -> View {
 
 /// Low and high corner of a static.
 fn extent(fixed: &StaticBody) -> (DVec2, DVec2) {
-    let half = match fixed.kind.shape {
-        Shape::Circle { radius } => DVec2::splat(f64::from(radius)),
-        Shape::Box { half } => {
-            let (c, s) = (f64::from(fixed.rotation.c).abs(), f64::from(fixed.rotation.s).abs());
-            let (x, y) = (f64::from(half.x), f64::from(half.y));
-            DVec2::new(c * x + s * y, s * x + c * y)
-        }
-    };
+    let half = fixed.kind.shape.half_extents(fixed.rotation).as_dvec2();
     (fixed.position - half, fixed.position + half)
 }
 

@@ -4,7 +4,7 @@
 //! OUT/run.pvd                              what to open: every step with its time, and the statics with each
 //! OUT/bodies-0000000010.pvtu               a step, of all ranks
 //! OUT/bodies-0000000010/rank-00000.vtu     what one rank recorded of it
-//! OUT/statics.vtu
+//! OUT/statics.vtu                          or, where some move, one for each step: statics-0000000010.vtu
 //! ```
 //!
 //! Numbers are raw bytes behind the XML, with lengths of 64 bits, so that a file may be of any size; names of files have no
@@ -30,8 +30,14 @@ use target::Target;
 /// What ParaView is to open.
 const COLLECTION: &str = "run.pvd";
 
-/// What never moves.
-const STATICS: &str = "statics.vtu";
+/// The file of the statics at a step: one for all, if none of them moves.
+fn statics_of(setting: &Setting, step: u64) -> String {
+    if setting.statics.iter().any(|fixed| fixed.path.is_some()) {
+        format!("statics-{step:010}.vtu")
+    } else {
+        "statics.vtu".to_owned()
+    }
+}
 
 /// What was written.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -59,15 +65,20 @@ pub(crate) fn export(
 ) -> Result<Written, RunError> {
     let mut target = Target::new(out)?;
     let setting = recorded.setting();
-    target.write(STATICS, |file| write_statics(setting, file))?;
     let steps: Vec<u64> = shown.steps().collect();
+    let mut fixed = None;
     let mut frame = Frame::default();
     for (done, &step) in (1..).zip(&steps) {
         recorded.read(step, &mut frame)?;
         write_frame(setting, &frame, &mut target)?;
+        let name = statics_of(setting, step);
+        if fixed.as_ref() != Some(&name) {
+            target.write(&name, |file| write_statics(setting, step, file))?;
+            fixed = Some(name);
+        }
         written(done, steps.len());
     }
-    let text = collection(setting.hertz, &steps);
+    let text = collection(setting, &steps);
     target.write(COLLECTION, |file| file.write_all(text.as_bytes()))?;
     Ok(Written { collection: out.join(COLLECTION), steps, bodies: frame.bodies.len(), bytes: target.finish() })
 }
@@ -111,12 +122,12 @@ fn parallel(pieces: &[String]) -> String {
 }
 
 /// What names all steps, with their times in s. The statics are a second part of each.
-fn collection(hertz: f64, steps: &[u64]) -> String {
+fn collection(setting: &Setting, steps: &[u64]) -> String {
     let mut text = piece::heading("Collection");
     text += " <Collection>\n";
     for &step in steps {
-        let (time, name) = (step as f64 / hertz, name_of(step));
-        for (part, of, file) in [(0, "bodies", format!("{name}.pvtu")), (1, "statics", STATICS.to_owned())] {
+        let (time, name) = (step as f64 / setting.hertz, name_of(step));
+        for (part, of, file) in [(0, "bodies", format!("{name}.pvtu")), (1, "statics", statics_of(setting, step))] {
             writeln!(text, "  <DataSet timestep=\"{time}\" group=\"\" part=\"{part}\" name=\"{of}\" file=\"{file}\"/>")
                 .expect("a string takes any text");
         }

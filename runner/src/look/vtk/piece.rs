@@ -106,8 +106,8 @@ impl Arrays {
 ///
 /// # Errors
 /// What the system says.
-pub(super) fn write(
-    outlines: impl Iterator<Item = Outline> + Clone,
+pub(super) fn write<'a>(
+    outlines: impl Iterator<Item = Outline<'a>> + Clone,
     columns: &[Column<'_>],
     attributes: &str,
     file: &mut File,

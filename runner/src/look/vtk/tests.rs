@@ -1,8 +1,9 @@
 use super::*;
 use crate::folder::recording::testing::{bodies, facts, record, stage};
+use crate::look::frame::Setting;
 use crate::look::source::records;
-use atoll_core::Shape;
-use glam::DVec2;
+use atoll_core::{GlobalId, Kind, Material, Part, Partition, Rot, Segment, Shape, StaticBody, Travel};
+use glam::{DVec2, Vec2};
 use std::fs;
 use tempfile::TempDir;
 
@@ -92,7 +93,7 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
             assert!((mean - body.position).length() < 1e-6, "{mean} and {}", body.position);
             let next = corners.iter().cycle().skip(1);
             let area: f64 = corners.iter().zip(next).map(|(a, b)| 0.5 * (*a - mean).perp_dot(*b - mean)).sum();
-            let shape = stage().0[body.kind.0 as usize].shape;
+            let shape = stage().0[body.kind.0 as usize].shape.clone();
             // A polygon within a circle is a little smaller, and all go round counter-clockwise.
             let least = if matches!(shape, Shape::Box { .. }) { 1.0 } else { 0.988 };
             let part = area / f64::from(shape.area());
@@ -144,4 +145,56 @@ fn what_fails_leaves_nothing() {
         assert!(error.to_string().contains("the bytes of step 10 are not those that were written"), "{error}");
     }
     assert!(!new.exists() && names(&empty).is_empty());
+}
+
+#[test]
+fn every_shape_is_polygons_and_what_moves_is_where_it_is() {
+    let at = |shape, x: f32| Part { shape, position: Vec2::new(x, 0.0), rotation: Rot::IDENTITY };
+    let capsule = Shape::capsule(2.0, 0.5).unwrap();
+    let pair = Shape::compound(vec![at(Shape::circle(1.0), -2.0), at(capsule.clone(), 3.0)]).unwrap();
+    let triangle = [(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)].map(|(x, y)| Vec2::new(x, y));
+    let segment = Segment::new(None, Vec2::ZERO, Vec2::new(4.0, 0.0), None).unwrap().0;
+    let shapes = [capsule, Shape::polygon(&triangle, 0.0).unwrap(), Shape::Segment(segment), pair];
+    let fixed = |(id, shape): (u64, &Shape)| StaticBody {
+        rotation: Rot::from_angle(0.4),
+        ..StaticBody::new(GlobalId(id), Kind::new(shape.clone(), Material::default()), DVec2::new(5.0, 6.0))
+    };
+    let mut setting = Setting {
+        partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1).unwrap(),
+        kinds: Vec::new(),
+        statics: (0..).zip(&shapes).map(fixed).collect(),
+        hertz: 50.0,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let written = |setting: &Setting, step| {
+        let path = folder.path().join("statics.vtu");
+        write_statics(setting, step, &mut fs::File::create(&path).unwrap()).unwrap();
+        Piece::read(&path)
+    };
+    let piece = written(&setting, 50);
+    // A compound is a polygon for each part.
+    assert_eq!(piece.numbers("id", u64::from_le_bytes), [0, 1, 2, 3, 3]);
+    assert_eq!(piece.column("types"), [7, 7, 3, 7, 7]);
+    let (points, ends) = (piece.numbers("Points", f64::from_le_bytes), piece.numbers("offsets", i64::from_le_bytes));
+    let mut start = 0;
+    let outlines = ends.iter().map(|&end| {
+        let of = &points[3 * start..3 * end as usize];
+        start = end as usize;
+        let corners: Vec<DVec2> = of.chunks(3).map(|p| DVec2::new(p[0], p[1])).collect();
+        let next = corners.iter().cycle().skip(1);
+        corners.iter().zip(next).map(|(a, b)| 0.5 * a.perp_dot(*b)).sum::<f64>()
+    });
+    let found: Vec<f64> = outlines.collect();
+    let (round, pill) = (std::f64::consts::PI, 2.0 + 0.25 * std::f64::consts::PI);
+    for (found, expected) in found.iter().zip([pill, 4.5, 0.0, round, pill]) {
+        assert!((found - expected).abs() <= 0.012 * expected + 1e-5, "{found} for {expected}");
+    }
+    setting.statics[1].path =
+        Some(atoll_core::Path { travel: Travel::Line { velocity: DVec2::new(0.0, 2.0) }, turning: 0.0 });
+    let moved = written(&setting, 50).numbers("Points", f64::from_le_bytes);
+    let first = 3 * ends[0] as usize;
+    // A second at 50 steps in it.
+    assert!((moved[first + 1] - points[first + 1] - 2.0).abs() < 1e-6 && moved[..first] == points[..first]);
+    let text = collection(&setting, &[0, 50]);
+    assert!(text.contains("\"statics-0000000000.vtu\"") && text.contains("\"statics-0000000050.vtu\""), "{text}");
 }

@@ -86,7 +86,7 @@ function hello(message) {
 function start_drawing() {
   state.drawing = new Drawing(canvas);
   state.sources = state.hello.sources.map((source) => {
-    const made = state.drawing.source(source.shapes, source.statics, state.hello.static_color);
+    const made = state.drawing.source(source, state.hello.static_color);
     state.drawing.grid(made, source, state.hello.rank_colors);
     return made;
   });
@@ -101,9 +101,8 @@ function shapes({ shapes }) {
 }
 
 function name_shapes() {
-  const name = ([x, y, radius]) => (radius ? `circle, ${short(2 * radius)} m` : `box, ${short(2 * x)} × ${short(2 * y)} m`);
   const chosen = at("shape").value;
-  options(at("shape"), state.hello.sources[0].shapes.map((shape, kind) => [kind, name(shape)]));
+  options(at("shape"), state.hello.sources[0].shapes.map(({ name }, kind) => [kind, name]));
   if (chosen) at("shape").value = chosen;
 }
 

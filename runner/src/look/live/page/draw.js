@@ -1,123 +1,8 @@
 // Draws frames with WebGL2. All bodies are one call: the vertex shader fetches its body from an integer texture by
 // `gl_VertexID / 6`, and each body is a square in whose pixels the fragment shader measures the distance to the outline.
 
-const ROW = 2048;
-
-const BODY_VERTEX = `#version 300 es
-precision highp float;
-precision highp usampler2D;
-uniform usampler2D bodies;
-uniform sampler2D shapes;
-uniform vec4 place;      // from fractions of the frame's rectangle to the clip square: scale, offset
-uniform vec2 pixels;     // half the size of the clip square, in pixels
-uniform float zoom;      // pixels in a meter
-flat out vec3 outline;   // half width, half height, radius: in pixels
-flat out vec4 color;
-out vec2 at;             // from the center, along the body's axes, in pixels
-const vec2 CORNERS[6] = vec2[](vec2(-1,-1), vec2(1,-1), vec2(1,1), vec2(-1,-1), vec2(1,1), vec2(-1,1));
-void main() {
-  int body = gl_VertexID / 6;
-  uvec3 word = texelFetch(bodies, ivec2(body % ${ROW}, body / ${ROW}), 0).xyz;
-  vec2 position = vec2(word.x & 0xffffu, word.x >> 16) / 65535.0;
-  float angle = float(word.y & 0xffffu) / 65536.0 * 6.283185307179586;
-  int kind = int(word.y >> 16) | int(word.z >> 24) << 16;
-  outline = texelFetch(shapes, ivec2(kind % ${ROW}, kind / ${ROW}), 0).xyz * zoom;
-  color = vec4(float(word.z & 0xffu), float((word.z >> 8) & 0xffu), float((word.z >> 16) & 0xffu), 255.0) / 255.0;
-  at = CORNERS[gl_VertexID % 6] * (outline.xy + outline.z + 1.0);
-  float c = cos(angle), s = sin(angle);
-  vec2 turned = vec2(c * at.x - s * at.y, s * at.x + c * at.y);
-  gl_Position = vec4(position * place.xy + place.zw + turned / pixels, 0.0, 1.0);
-}`;
-
-const STATIC_VERTEX = `#version 300 es
-precision highp float;
-layout(location = 0) in vec4 middle;   // x, y from the middle of the view, in pixels; cosine, sine
-layout(location = 1) in vec3 shape;    // half width, half height, radius: in pixels
-uniform vec2 pixels;
-uniform vec3 ink;
-flat out vec3 outline;
-flat out vec4 color;
-out vec2 at;
-const vec2 CORNERS[6] = vec2[](vec2(-1,-1), vec2(1,-1), vec2(1,1), vec2(-1,-1), vec2(1,1), vec2(-1,1));
-void main() {
-  outline = shape;
-  color = vec4(ink, 1.0);
-  at = CORNERS[gl_VertexID] * (shape.xy + shape.z + 1.0);
-  vec2 turned = vec2(middle.z * at.x - middle.w * at.y, middle.w * at.x + middle.z * at.y);
-  gl_Position = vec4((middle.xy + turned) / pixels, 0.0, 1.0);
-}`;
-
-const STATIC_FRAGMENT = `#version 300 es
-precision highp float;
-flat in vec3 outline;
-flat in vec4 color;
-in vec2 at;
-out vec4 pixel;
-void main() {
-  vec2 beyond = abs(at) - outline.xy;
-  float distance = length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - outline.z;
-  pixel = color * clamp(0.5 - distance, 0.0, 1.0);
-}`;
-
-const BODY_FRAGMENT = `#version 300 es
-precision highp float;
-flat in vec3 outline;
-flat in vec4 color;
-in vec2 at;
-out vec4 pixel;
-void main() {
-  vec2 beyond = abs(at) - outline.xy;
-  float distance = length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - outline.z;
-  float cover = clamp(0.5 - distance, 0.0, 1.0);
-  if (cover == 0.0) discard;
-  float size = min(outline.x, outline.y) + outline.z;
-  float rim = clamp(distance + 1.5, 0.0, 1.0) * smoothstep(3.0, 6.0, size);
-  // A line from the center outwards shows how the body is turned.
-  float reach = outline.x + outline.z;
-  float mark = clamp(1.1 - abs(at.y), 0.0, 1.0) * step(0.0, at.x) * step(at.x, 0.7 * reach) * smoothstep(5.0, 9.0, size);
-  vec3 ink = mix(color.rgb, color.rgb * 0.55, max(rim, mark));
-  pixel = vec4(ink, 1.0) * (cover * color.a);
-}`;
-
-const IMAGE_VERTEX = `#version 300 es
-uniform vec4 place;
-out vec2 texel;
-const vec2 CORNERS[6] = vec2[](vec2(0,0), vec2(1,0), vec2(1,1), vec2(0,0), vec2(1,1), vec2(0,1));
-void main() {
-  vec2 corner = CORNERS[gl_VertexID];
-  texel = vec2(corner.x, 1.0 - corner.y);
-  gl_Position = vec4(corner * place.xy + place.zw, 0.0, 1.0);
-}`;
-
-const IMAGE_FRAGMENT = `#version 300 es
-precision highp float;
-uniform sampler2D image;
-in vec2 texel;
-out vec4 pixel;
-void main() { pixel = texture(image, texel); }`;
-
-const LINE_VERTEX = `#version 300 es
-layout(location = 0) in vec4 ends;     // both ends of a line, in tiles
-layout(location = 1) in vec4 ink;      // color, and thickness in pixels
-uniform vec4 place;
-uniform vec2 pixels;
-uniform float fade;
-out vec4 color;
-const vec2 CORNERS[6] = vec2[](vec2(0,-1), vec2(1,-1), vec2(1,1), vec2(0,-1), vec2(1,1), vec2(0,1));
-void main() {
-  vec2 corner = CORNERS[gl_VertexID];
-  vec2 a = ends.xy * place.xy + place.zw, b = ends.zw * place.xy + place.zw;
-  vec2 along = normalize((b - a) * pixels);
-  vec2 across = vec2(-along.y, along.x) * 0.5 * ink.a;
-  gl_Position = vec4(mix(a, b, corner.x) + across * corner.y / pixels, 0.0, 1.0);
-  color = vec4(ink.rgb, 1.0) * (ink.a > 1.0 ? 1.0 : fade);
-}`;
-
-const LINE_FRAGMENT = `#version 300 es
-precision highp float;
-in vec4 color;
-out vec4 pixel;
-void main() { pixel = color; }`;
+import { BODY_FRAGMENT, BODY_VERTEX, IMAGE_FRAGMENT, IMAGE_VERTEX, LINE_FRAGMENT, LINE_VERTEX, ROW, STATIC_FRAGMENT, STATIC_VERTEX } from "./shaders.js";
+import { laid_out, pose } from "./shapes.js";
 
 function program(gl, vertex, fragment) {
   const linked = gl.createProgram();
@@ -193,28 +78,32 @@ export class Drawing {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   }
 
-  /// What is needed for one source: `shapes` are half widths, half heights and radii, in m; `statics` are x, y, cosine, sine, and
-  /// these.
-  source(shapes, statics, static_color) {
+  /// What is needed for one source: the shapes of bodies, those of statics, and the statics.
+  source({ shapes, static_shapes, statics }, static_color) {
     const { gl } = this;
-    const rows = Math.max(1, Math.ceil(shapes.length / ROW));
-    const table = new Float32Array(4 * ROW * rows);
-    shapes.forEach((shape, i) => table.set(shape, 4 * i));
+    const laid = laid_out([shapes, static_shapes]);
+    const list = (numbers) => {
+      const rows = Math.max(1, Math.ceil(numbers.length / 4 / ROW));
+      const table = new Float32Array(4 * ROW * rows);
+      table.set(numbers);
+      const made = texture(gl, gl.NEAREST);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, table);
+      return made;
+    };
     const made = {
-      shapes: texture(gl, gl.NEAREST), bodies: texture(gl, gl.NEAREST), density: texture(gl, gl.LINEAR),
-      rows: 0, count: 0, rectangle: null, density_rectangle: null, lines: null, statics, static_color,
-      fixed: { array: gl.createVertexArray(), buffer: gl.createBuffer(), values: new Float32Array(7 * statics.length) },
+      shapes: list(laid.shapes[0].flat()), parts: list(laid.parts), bodies: texture(gl, gl.NEAREST),
+      density: texture(gl, gl.LINEAR), rows: 0, count: 0, time: 0, rectangle: null, density_rectangle: null, lines: null,
+      statics, static_shapes: laid.shapes[1], static_color,
+      fixed: { array: gl.createVertexArray(), buffer: gl.createBuffer(), values: new Float32Array(8 * statics.length) },
     };
     gl.bindVertexArray(made.fixed.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, made.fixed.buffer);
-    for (const [location, size, offset] of [[0, 4, 0], [1, 3, 16]]) {
+    for (const location of [0, 1]) {
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 28, offset);
+      gl.vertexAttribPointer(location, 4, gl.FLOAT, false, 32, 16 * location);
       gl.vertexAttribDivisor(location, 1);
     }
     gl.bindVertexArray(null);
-    gl.bindTexture(gl.TEXTURE_2D, made.shapes);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, table);
     return made;
   }
 
@@ -239,6 +128,7 @@ export class Drawing {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     }
     source.count = count;
+    source.time = frame.time;
     source.rectangle = frame.rectangle;
     source.density_rectangle = width * height ? rectangle : null;
   }
@@ -340,6 +230,9 @@ export class Drawing {
       gl.uniform1f(at.zoom, camera.zoom);
       gl.uniform1i(at.bodies, 0);
       gl.uniform1i(at.shapes, 1);
+      gl.uniform1i(at.parts, 2);
+      gl.activeTexture(gl.TEXTURE2);
+      gl.bindTexture(gl.TEXTURE_2D, source.parts);
       gl.activeTexture(gl.TEXTURE1);
       gl.bindTexture(gl.TEXTURE_2D, source.shapes);
       gl.activeTexture(gl.TEXTURE0);
@@ -356,26 +249,34 @@ export class Drawing {
     }
   }
 
-  /// What never moves, never thinner than a pixel.
-  draw_statics({ statics, static_color, fixed }, camera, half) {
+  /// Statics where they are at the time of the frame, never thinner than a pixel.
+  draw_statics({ statics, static_shapes, static_color, fixed, parts, time }, camera, half) {
     const { gl } = this;
     let count = 0;
     const { zoom } = camera;
-    for (const [x, y, c, s, half_x, half_y, radius] of statics) {
+    for (const body of statics) {
+      const [x, y, c, s] = pose(body, time);
+      const [half_x, half_y, radius, first] = static_shapes[body.shape];
       const [px, py] = [(x - camera.x) * zoom, (y - camera.y) * zoom];
       const reach = (Math.hypot(half_x, half_y) + radius) * zoom + 2;
       if (Math.abs(px) > half[0] + reach || Math.abs(py) > half[1] + reach) continue;
-      const shape = radius ? [0, 0, Math.max(1, radius * zoom)] : [Math.max(0.5, half_x * zoom), Math.max(0.5, half_y * zoom), 0];
-      fixed.values.set([px, py, c, s, ...shape], 7 * count++);
+      const least = first || radius ? 0 : 0.5;
+      const round = first ? radius * zoom : radius && Math.max(1, radius * zoom);
+      fixed.values.set([px, py, c, s, Math.max(least, half_x * zoom), Math.max(least, half_y * zoom), round, first], 8 * count++);
     }
     if (!count) return;
     const { linked, at } = this.fixed;
     gl.useProgram(linked);
     gl.uniform2f(at.pixels, ...half);
     gl.uniform3f(at.ink, ...static_color.map((part) => part / 255));
+    gl.uniform1f(at.zoom, zoom);
+    gl.uniform1i(at.parts, 2);
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, parts);
+    gl.activeTexture(gl.TEXTURE0);
     gl.bindVertexArray(fixed.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, fixed.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, fixed.values.subarray(0, 7 * count), gl.STREAM_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, fixed.values.subarray(0, 8 * count), gl.STREAM_DRAW);
     gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, count);
   }
 

@@ -1,5 +1,9 @@
 //! Shapes in pixels, and how much of each pixel they cover.
 
+use crate::look::convex::to_convex;
+use atoll_core::MOST_CORNERS;
+use glam::DVec2;
+
 /// Of turned rectangles whose shorter side is less than twice this, in pixels, each pixel is looked at in nine pieces: few pixels
 /// make their area.
 const SMALL: f64 = 5.0;
@@ -32,6 +36,15 @@ pub(crate) enum Form {
         /// Of its corners.
         radius: f64,
     },
+    /// What is within a distance of a convex polygon.
+    Hull {
+        /// Its corners, counter-clockwise where y is downwards: clockwise as one sees them.
+        corners: [DVec2; MOST_CORNERS],
+        /// How many there are.
+        count: usize,
+        /// The distance; negative: what is within the polygon and further from its outline.
+        radius: f64,
+    },
 }
 
 impl Form {
@@ -58,6 +71,7 @@ impl Form {
                 high: high.map(|high| high + by),
                 radius: (radius + by).max(0.0),
             },
+            Self::Hull { corners, count, radius } => Self::Hull { corners, count, radius: radius + by },
         }
     }
 
@@ -72,6 +86,11 @@ impl Form {
                 around(center, [(c * x).abs() + (s * y).abs(), (s * x).abs() + (c * y).abs()])
             }
             Self::Plate { low, high, .. } => [low, high],
+            Self::Hull { ref corners, count, radius } => {
+                let [low, high] = [DVec2::min, DVec2::max].map(|pick| corners[..count].iter().copied().reduce(pick));
+                let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+                around((0.5 * (low + high)).to_array(), (0.5 * (high - low) + radius.max(0.0)).to_array())
+            }
         }
     }
 
@@ -105,6 +124,20 @@ impl Form {
                 let (dx, dy) = (outside(x, low[0], high[0]), outside(y, low[1], high[1]));
                 let corner = (dx.max(0.0) * dx.max(0.0) + dy.max(0.0) * dy.max(0.0)).sqrt();
                 (0.5 + radius - corner - dx.max(dy).min(0.0)).clamp(0.0, 1.0)
+            }
+            Self::Hull { ref corners, count, radius } => {
+                let point = DVec2::new(x, y);
+                let within = radius - to_convex(&corners[..count], point);
+                // Only near the outline is there something to look at closely.
+                if within.abs() > 1.0 {
+                    return if within > 0.0 { 1.0 } else { 0.0 };
+                }
+                let thirds = [-1.0 / 3.0, 0.0, 1.0 / 3.0];
+                let part = |x: f64, y: f64| {
+                    let within = radius - to_convex(&corners[..count], point + DVec2::new(x, y));
+                    (0.5 + 3.0 * within).clamp(0.0, 1.0)
+                };
+                thirds.iter().map(|&y| thirds.iter().map(|&x| part(x, y)).sum::<f64>()).sum::<f64>() / 9.0
             }
         }
     }
