@@ -35,6 +35,7 @@ const CONFIGS: &[(&str, Overrides)] = &[
     ("smash", &[("bodies", "2000"), ("steps", "120")]),
     ("sparse", &[("bodies", "4000"), ("steps", "100")]),
     ("stack", &[("steps", "120"), ("tiles", "2x2")]),
+    ("zoo", &[("bodies", "700"), ("steps", "150"), ("tiles", "5x2")]),
 ];
 
 /// What changes bits, on scenes where it does: first bodies that meet in flight, then bodies that rest.
@@ -73,6 +74,10 @@ const CHOICES: &[(&str, Overrides)] = &[
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "3x2"), ("solver", "pgs")]),
     ("pile", &[("bodies", "1000"), ("steps", "120"), ("tiles", "2x1"), ("max_bodies", "60"), ("retile_every", "3")]),
     ("pyramids", &[("bodies", "550"), ("steps", "120"), ("tiles", "1x1"), ("sleep", "true")]),
+    ("zoo", &[("bodies", "500"), ("steps", "150"), ("tiles", "3x1"), ("exchange", "step")]),
+    ("zoo", &[("bodies", "500"), ("steps", "150"), ("tiles", "3x1"), ("solver", "pgs")]),
+    ("zoo", &[("bodies", "500"), ("steps", "150"), ("tiles", "2x1"), ("max_bodies", "60"), ("retile_every", "5")]),
+    ("zoo", &[("bodies", "300"), ("steps", "150"), ("tiles", "1x1"), ("sleep", "true")]),
 ];
 
 /// Worlds of the library, by name.

@@ -69,6 +69,16 @@ impl SceneError {
         Self::bad(file, Place::default(), reason)
     }
 
+    /// Where something is wrong and what, for what is in no file.
+    pub(super) fn without_file(self) -> String {
+        match self {
+            Self::Bad { place: Place { name: Some(name), .. }, reason, .. } => {
+                format!("{}: {}", OneLine(&name), OneLine(&reason))
+            }
+            other => other.to_string(),
+        }
+    }
+
     /// What the system says.
     pub(super) fn read(file: &Path, what: &'static str, reason: impl fmt::Display) -> Self {
         Self::Read { file: file.display().to_string(), what, reason: reason.to_string() }

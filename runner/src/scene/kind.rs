@@ -45,6 +45,8 @@ pub enum SceneKind {
     Stack,
     /// A wall of boxes, and a large one that flies into it.
     Smash,
+    /// All shapes, and what moves them.
+    Zoo,
     /// Boxes on an incline.
     Slope {
         /// Of the incline, in degrees.
@@ -132,7 +134,7 @@ impl SceneKind {
     pub(crate) const FILE: &str = "file";
 
     /// Every kind but files, with what is usual for what only it has.
-    pub const USUAL: [Self; 8] = [
+    pub const USUAL: [Self; 9] = [
         Self::Rooms { power: 1.0 },
         Self::Pile { jitter: 0.01 },
         Self::Pyramids { base: 10 },
@@ -140,6 +142,7 @@ impl SceneKind {
         Self::SingleIsland,
         Self::Stack,
         Self::Smash,
+        Self::Zoo,
         Self::Slope { angle: 25.0, friction: 0.6 },
     ];
 
@@ -153,6 +156,7 @@ impl SceneKind {
             Self::SingleIsland => "single-island",
             Self::Stack => "stack",
             Self::Smash => "smash",
+            Self::Zoo => "zoo",
             Self::Slope { .. } => "slope",
             Self::File(_) => Self::FILE,
         }
@@ -176,6 +180,7 @@ impl SceneKind {
             Self::Pyramids { .. } => 22_000,
             Self::Stack => 10,
             Self::Smash => 9601,
+            Self::Zoo => 1980,
             Self::Slope { .. } => 1,
             Self::File(spec) => spec.file.as_ref().map_or(0, |file| file.count()),
         }
@@ -186,7 +191,12 @@ impl SceneKind {
         match self {
             Self::Rooms { .. } | Self::Sparse | Self::Smash | Self::File(_) => Params::default(),
             // Whatever rests needs its borders to converge.
-            Self::Pile { .. } | Self::Pyramids { .. } | Self::SingleIsland | Self::Stack | Self::Slope { .. } => {
+            Self::Pile { .. }
+            | Self::Pyramids { .. }
+            | Self::SingleIsland
+            | Self::Stack
+            | Self::Zoo
+            | Self::Slope { .. } => {
                 Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() }
             }
         }

@@ -13,6 +13,7 @@ mod lattice;
 mod pile;
 mod pyramids;
 mod random;
+pub(crate) mod record;
 mod rooms;
 mod single_island;
 mod slope;
@@ -20,6 +21,7 @@ mod smash;
 mod sparse;
 mod stack;
 mod statics;
+mod zoo;
 
 pub use error::{Place, SceneError};
 pub use file::SceneFile;
@@ -28,6 +30,9 @@ pub use random::SplitMix64;
 
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
 use file::BodyIter;
+pub(crate) use file::kind_of_command;
+#[cfg(test)]
+pub(crate) use file::shape_tests;
 use glam::DVec2;
 use std::iter;
 use std::sync::Arc;
@@ -92,6 +97,7 @@ impl Scene {
             SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(bodies)),
             SceneKind::Stack => Box::new(stack::Stack::new(bodies)),
             SceneKind::Smash => Box::new(smash::Smash::new(bodies)),
+            SceneKind::Zoo => Box::new(zoo::Zoo::new(bodies)),
             SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(bodies, angle, friction)),
             SceneKind::File(ref spec) => return Ok(Self { source: Source::Read(spec.file()?) }),
         };
@@ -266,7 +272,7 @@ fn mixture() -> Vec<Kind> {
 
 /// A table of shapes of the usual material.
 fn table<const N: usize>(shapes: [Shape; N]) -> Vec<Kind> {
-    shapes.map(|shape| Kind { shape, material: Material::default() }).to_vec()
+    shapes.map(|shape| Kind::new(shape, Material::default())).to_vec()
 }
 
 /// The first or the second row of a table, each with probability 1/2. One draw.

@@ -56,7 +56,7 @@ impl Slope {
     }
 
     fn kind(&self, half: Vec2) -> Kind {
-        Kind { shape: Shape::Box { half }, material: self.material }
+        Kind::new(Shape::Box { half }, self.material)
     }
 }
 
@@ -79,8 +79,10 @@ impl Layout for Slope {
         let incline = (self.point(0.0, surface - THICKNESS), Vec2::new(self.reach() as f32, THICKNESS as f32));
         let block = (self.point(self.reach(), surface + BLOCK), Vec2::splat(BLOCK as f32));
         let ids = (0..).map(GlobalId);
-        let fixed =
-            |(id, (position, half))| StaticBody { id, position, rotation: self.rotation, kind: self.kind(half) };
+        let fixed = |(id, (position, half))| StaticBody {
+            rotation: self.rotation,
+            ..StaticBody::new(id, self.kind(half), position)
+        };
         ids.zip([incline, block]).map(fixed).collect()
     }
 

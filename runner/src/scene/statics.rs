@@ -1,6 +1,6 @@
 //! What stands around the bodies: walls, boxes without walls on top, floors.
 
-use atoll_core::{GlobalId, Kind, Material, Rot, Shape, StaticBody};
+use atoll_core::{GlobalId, Kind, Material, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 
 /// Thickness of what encloses an open box, in meters.
@@ -11,8 +11,8 @@ const RISE: f64 = 20.0;
 /// A static rectangle between two corners.
 pub(super) fn wall(id: GlobalId, low: DVec2, high: DVec2) -> StaticBody {
     let half: Vec2 = ((high - low) * 0.5).as_vec2();
-    let kind = Kind { shape: Shape::Box { half }, material: Material::default() };
-    StaticBody { id, position: (low + high) * 0.5, rotation: Rot::IDENTITY, kind }
+    let kind = Kind::new(Shape::Box { half }, Material::default());
+    StaticBody::new(id, kind, (low + high) * 0.5)
 }
 
 /// Four walls inside the border of a rectangle, with ids from `first`: left, right, bottom, top.

@@ -4,7 +4,7 @@ use super::*;
 use atoll_core::Rot;
 
 /// Every kind of scene, and how many statics it has with 500 bodies.
-const KINDS: [(SceneKind, u64); 9] = [
+const KINDS: [(SceneKind, u64); 10] = [
     (SceneKind::Rooms { power: 1.2 }, 16),
     (SceneKind::Pile { jitter: 0.01 }, 3),
     (SceneKind::Pyramids { base: 10 }, 4),
@@ -13,6 +13,7 @@ const KINDS: [(SceneKind, u64); 9] = [
     (SceneKind::SingleIsland, 3),
     (SceneKind::Stack, 1),
     (SceneKind::Smash, 0),
+    (SceneKind::Zoo, 122),
     (SceneKind::Slope { angle: 35.0, friction: 0.5 }, 2),
 ];
 
@@ -62,12 +63,14 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(position: DVec2, rotation: Rot, shape: Shape) -> Self {
+    fn new(position: DVec2, rotation: Rot, shape: &Shape) -> Self {
         let (c, s) = (f64::from(rotation.c), f64::from(rotation.s));
         let center = DVec2::new(c * position.x + s * position.y, c * position.y - s * position.x);
         match shape {
-            Shape::Circle { radius } => Self { center, half: DVec2::ZERO, radius: radius.into() },
+            Shape::Circle { radius } => Self { center, half: DVec2::ZERO, radius: (*radius).into() },
             Shape::Box { half } => Self { center, half: half.as_dvec2(), radius: 0.0 },
+            // A circle around it.
+            other => Self { center, half: DVec2::ZERO, radius: other.bounding_radius().into() },
         }
     }
 
@@ -84,9 +87,9 @@ fn nothing_starts_inside_anything_else() {
     for (kind, _) in &KINDS {
         let scene = scene(kind);
         let kinds = scene.kinds();
-        let fixed = scene.statics().iter().map(|one| Placed::new(one.position, one.rotation, one.kind.shape));
+        let fixed = scene.statics().iter().map(|one| Placed::new(one.position, one.rotation, &one.kind.shape));
         let fixed: Vec<Placed> = fixed.collect();
-        let shape = |body: &Body| kinds[body.kind.0 as usize].shape;
+        let shape = |body: &Body| &kinds[body.kind.0 as usize].shape;
         let bodies: Vec<Placed> =
             scene.all().map(|body| Placed::new(body.position, body.rotation, shape(&body))).collect();
         for (i, body) in bodies.iter().enumerate() {
