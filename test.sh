@@ -176,12 +176,13 @@ if [[ -n ${python_job:-} ]]; then
         leave_out 'the examples in Python: their packages cannot be had'
     fi
 fi
-# As it is compiled for speed, everything, with every transport; of the runner what its program does, as the next says.
-step cargo test --release --workspace --exclude atoll --lib --bins --tests ${features[@]+"${features[@]}"}
+# As it is compiled for speed, everything, with every transport; of the runner what its program does, and of the core what worlds do,
+# as the next says: to compile its kernels once more, for its own tests, would take minutes.
+step cargo test --release --workspace --exclude atoll --exclude atoll-core --lib --bins --tests ${features[@]+"${features[@]}"}
 begin_aarch64
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
 # that there is for that (golden). What programs do around that is the same in both profiles.
-calculates=(borders collisions configs fast golden hostile library physics reported scenes sleep snapshots strategies)
+calculates=(borders collisions configs driven fast golden hostile library physics reported scenes shapes sleep snapshots strategies)
 step cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 

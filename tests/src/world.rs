@@ -92,7 +92,7 @@ impl Scene {
 
     /// Adds a shape and a material to the table.
     pub fn kind(&mut self, shape: Shape, material: Material) -> KindId {
-        self.kinds.push(Kind { shape, material });
+        self.kinds.push(Kind::new(shape, material));
         KindId(self.kinds.len() as u32 - 1)
     }
 
@@ -100,8 +100,8 @@ impl Scene {
     pub fn wall(&mut self, position: DVec2, (width, height): (f32, f32), angle: f32, material: Material) -> GlobalId {
         assert!(self.bodies.is_empty(), "statics come before bodies");
         let id = GlobalId(self.statics.len() as u64);
-        let kind = Kind { shape: Shape::rectangle(width, height), material };
-        self.statics.push(StaticBody { id, position, rotation: Rot::from_angle(angle), kind });
+        let kind = Kind::new(Shape::rectangle(width, height), material);
+        self.statics.push(StaticBody { rotation: Rot::from_angle(angle), ..StaticBody::new(id, kind, position) });
         id
     }
 
@@ -178,7 +178,7 @@ impl Sim {
 
     /// Mass of a body, in kg.
     pub fn mass(&self, body: &Body) -> f64 {
-        let Kind { shape, material } = self.kinds[body.kind.0 as usize];
+        let Kind { shape, material, .. } = &self.kinds[body.kind.0 as usize];
         f64::from(material.density * shape.area())
     }
 

@@ -22,7 +22,7 @@ struct Encounter {
 impl Encounter {
     fn scene(&self) -> Scene {
         let mut scene = Scene::new(MIDDLE, 0.0);
-        let kinds = self.shapes.map(|shape| scene.kind(shape, self.material));
+        let kinds = self.shapes.clone().map(|shape| scene.kind(shape, self.material));
         let direction = self.velocity.as_dvec2().normalize();
         for (side, kind) in [(-1.0, kinds[0]), (1.0, kinds[1])] {
             let place = MIDDLE + direction * side * 1.1 + direction.perp() * side * 0.5 * self.beside;
@@ -40,7 +40,7 @@ fn encounters() -> [Encounter; 5] {
     [
         Encounter {
             name: "circles, head on",
-            shapes: [circle; 2],
+            shapes: [circle.clone(), circle.clone()],
             material: rough,
             velocity: Vec2::new(2.0, 0.5),
             beside: 0.0,
@@ -48,7 +48,7 @@ fn encounters() -> [Encounter; 5] {
         },
         Encounter {
             name: "bouncing circles of two sizes, off center",
-            shapes: [circle, Shape::circle(0.25)],
+            shapes: [circle.clone(), Shape::circle(0.25)],
             material: bouncy,
             velocity: Vec2::new(2.0, 1.0),
             beside: 0.3,
@@ -56,7 +56,7 @@ fn encounters() -> [Encounter; 5] {
         },
         Encounter {
             name: "boxes, turning",
-            shapes: [square; 2],
+            shapes: [square.clone(), square.clone()],
             material: rough,
             velocity: Vec2::new(1.5, 0.5),
             beside: 0.1,
@@ -64,7 +64,7 @@ fn encounters() -> [Encounter; 5] {
         },
         Encounter {
             name: "bouncing boxes, along a diagonal",
-            shapes: [square, plank],
+            shapes: [square.clone(), plank],
             material: bouncy,
             velocity: Vec2::new(1.0, -1.0),
             beside: 0.2,
@@ -198,7 +198,7 @@ fn a_stack_under_a_heavy_top_rests_over_its_borders() {
             let material = Material::default();
             scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, material);
             let unit = Shape::rectangle(1.0, 1.0);
-            let kinds = [1.0, density].map(|density| scene.kind(unit, Material { density, ..material }));
+            let kinds = [1.0, density].map(|density| scene.kind(unit.clone(), Material { density, ..material }));
             for k in 0..10 {
                 scene.body(kinds[k / 9], DVec2::new(0.0, 0.5 + k as f64), Vec2::ZERO);
             }

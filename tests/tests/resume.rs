@@ -15,6 +15,9 @@ use tempfile::tempdir;
 
 const CONFIG: &str = "configs/quickstart.toml";
 
+/// With shapes of all kinds, and statics whose places follow from time.
+const ZOO: &str = "configs/zoo.toml";
+
 /// What every run here has in common.
 const OPTIONS: [&str; 10] = [
     "--quiet",
@@ -74,22 +77,25 @@ fn snapshots(folder: &Path) -> Vec<u64> {
 fn killed_runs_go_on_elsewhere() {
     let (times, steps) = kills();
     let folder = tempdir().unwrap();
-    let whole = folder.path().join("whole");
     let options = |command: &mut Command| {
         command.args(OPTIONS).args(["--steps", &steps]);
     };
-    let start = Instant::now();
-    let mut command = Way::Channel.command(2, CONFIG);
-    options(&mut command);
-    run(command.arg("--out").arg(&whole));
-    let duration = start.elapsed().as_secs_f64();
+    let wholes = [CONFIG, ZOO].map(|config| {
+        let whole = folder.path().join(Path::new(config).file_stem().expect("a name"));
+        let start = Instant::now();
+        let mut command = Way::Channel.command(2, config);
+        options(&mut command);
+        run(command.arg("--out").arg(&whole));
+        (config, whole, start.elapsed().as_secs_f64())
+    });
 
     let ways: Vec<Way> = Way::all().into_iter().filter(|way| *way != Way::Local).collect();
     for (w, &way) in (0..).zip(&ways) {
         for time in 0..times {
             let number = |k: u64, below: usize| (noise(100 * w + time, k) * below as f64) as usize;
+            let (config, whole, duration) = &wholes[(w + time) as usize % 2];
             let killed = folder.path().join(format!("killed-{w}-{time}"));
-            let mut command = way.command(1 + number(0, 4), CONFIG);
+            let mut command = way.command(1 + number(0, 4), config);
             options(&mut command);
             // Half of the tiles are on their way between any two steps.
             command.args(["--set", "balance=shuffled"]);
@@ -115,14 +121,14 @@ fn killed_runs_go_on_elsewhere() {
                 command.arg("--quiet");
                 command
             } else {
-                let mut command = other.command(ranks, CONFIG);
+                let mut command = other.command(ranks, config);
                 options(&mut command);
                 command.arg("--resume").arg(&killed);
                 command
             };
             run(&mut command);
-            assert_same_end(&killed, &whole, &what);
-            assert_same_log(&killed, &whole, &what);
+            assert_same_end(&killed, whole, &what);
+            assert_same_log(&killed, whole, &what);
             fs::remove_dir_all(&killed).unwrap();
         }
     }

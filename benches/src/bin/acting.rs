@@ -72,7 +72,7 @@ fn world(bodies: u64, speed: f32) -> Result<World, Failure> {
     let side = bodies.isqrt();
     let size = DVec2::splat(side as f64);
     let partition = Partition::uniform(DVec2::ZERO, size, 40, 40)?;
-    let kind = Kind { shape: Shape::circle(0.2), material: Material::default() };
+    let kind = Kind::new(Shape::circle(0.2), Material::default());
     let blueprint = Blueprint { params: Params::default(), partition, kinds: vec![kind], statics: Vec::new() };
     let mut world = World::whole(&blueprint)?;
     for k in 0..side * side {

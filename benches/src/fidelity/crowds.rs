@@ -24,7 +24,7 @@ fn gas(hertz: f64, side: u32, apart: f64, radius: f32, speed: f32, restitution: 
     let walls =
         [(DVec2::X, (2.0, long)), (DVec2::NEG_X, (2.0, long)), (DVec2::Y, (long, 2.0)), (DVec2::NEG_Y, (long, 2.0))];
     let wall = |(k, (way, (width, height)))| {
-        let kind = Kind { shape: Shape::rectangle(width, height), material: Material { restitution: 1.0, ..material } };
+        let kind = Kind::new(Shape::rectangle(width, height), Material { restitution: 1.0, ..material });
         StaticBody::new(GlobalId(k), kind, way * (half + 1.0))
     };
     let disc = |k: u32| {
@@ -114,7 +114,7 @@ fn silos(hertz: f64, each: [(f64, u32); 2]) -> Start {
                 (DVec2::new(side * (half + 0.25), 8.0), (0.5, 17.0)),
                 (DVec2::new(side * 0.5 * (opening + width), -0.25), (width as f32, 0.5)),
             ] {
-                let kind = Kind { shape: Shape::rectangle(size.0, size.1), material };
+                let kind = Kind::new(Shape::rectangle(size.0, size.1), material);
                 let id = GlobalId(walls.len() as u64);
                 walls.push(StaticBody::new(id, kind, place + DVec2::new(middle, 0.0)));
             }

@@ -35,7 +35,7 @@ pub(super) fn laws() -> Vec<Law> {
     laws.push(incline("a box slides down", 30.0, 0.3, Shape::rectangle(1.0, 1.0)));
     laws.push(incline("a disc rolls down", 20.0, FRICTION, Shape::circle(0.5)));
     for (name, shape) in [("disc", Shape::circle(RADIUS)), ("flat box", Shape::rectangle(0.5, 0.5))] {
-        laws.extend([0.5, 0.8, 1.0].map(|restitution| bounce(name, shape, restitution)));
+        laws.extend([0.5, 0.8, 1.0].map(|restitution| bounce(name, &shape, restitution)));
     }
     laws
 }
@@ -48,7 +48,7 @@ pub(super) fn world(
     bodies: &[(Shape, Material, DVec2, Rot, Vec2, f32)],
 ) -> Start {
     let first = statics.len() as u64;
-    let kinds = bodies.iter().map(|&(shape, material, ..)| Kind { shape, material }).collect();
+    let kinds = bodies.iter().map(|(shape, material, ..)| Kind::new(shape.clone(), *material)).collect();
     let made = (0..).zip(bodies).map(|(k, &(_, _, position, rotation, velocity, angular_velocity))| {
         let (id, kind) = (GlobalId(first + u64::from(k)), KindId(k));
         Body { id, position, rotation, velocity, angular_velocity, kind }
@@ -60,7 +60,7 @@ pub(super) fn world(
 }
 
 fn floor(material: Material) -> StaticBody {
-    StaticBody::new(GlobalId(0), Kind { shape: Shape::rectangle(60.0, 2.0), material }, DVec2::new(0.0, -1.0))
+    StaticBody::new(GlobalId(0), Kind::new(Shape::rectangle(60.0, 2.0), material), DVec2::new(0.0, -1.0))
 }
 
 fn rough(friction: f32) -> Material {
@@ -157,12 +157,13 @@ fn incline(name: &str, degrees: f32, friction: f32, shape: Shape) -> Law {
     let (rolls, half) = match shape {
         Shape::Circle { radius } => (true, radius),
         Shape::Box { half } => (false, half.y),
+        _ => unreachable!("no law is about other shapes"),
     };
     let (sine, cosine) = (f64::from(degrees).to_radians().sin(), f64::from(degrees).to_radians().cos());
     let start = move |hertz: f64, _: f64| {
         let slope = StaticBody { rotation: turned, position: (up * -1.0).as_dvec2(), ..floor(rough(friction)) };
         let place = (up * half - down * 15.0).as_dvec2();
-        world(hertz, -10.0, vec![slope], &[(shape, rough(friction), place, turned, Vec2::ZERO, 0.0)])
+        world(hertz, -10.0, vec![slope], &[(shape.clone(), rough(friction), place, turned, Vec2::ZERO, 0.0)])
     };
     Law {
         name: format!("{name} {degrees} degrees, friction {friction}: acceleration"),
@@ -178,16 +179,18 @@ fn incline(name: &str, degrees: f32, friction: f32, shape: Shape) -> Law {
 }
 
 /// Down from 5 m and up to the first peak: the square of the restitution.
-fn bounce(name: &str, shape: Shape, restitution: f32) -> Law {
+fn bounce(name: &str, shape: &Shape, restitution: f32) -> Law {
+    let shape = shape.clone();
     let half = match shape {
         Shape::Circle { radius } => radius,
         Shape::Box { half } => half.y,
+        _ => unreachable!("no law is about other shapes"),
     };
     let material = Material { friction: 0.0, restitution, ..Material::default() };
     let start = move |hertz: f64, phase: f64| {
         // Falling from 5 m takes a second: a step more or less is 0.17 m at 60 Hz.
         let high = f64::from(half) + 5.0 + 10.0 / hertz * phase;
-        let body = (shape, material, DVec2::new(0.0, high), Rot::IDENTITY, Vec2::ZERO, 0.0);
+        let body = (shape.clone(), material, DVec2::new(0.0, high), Rot::IDENTITY, Vec2::ZERO, 0.0);
         world(hertz, -10.0, vec![floor(Material { restitution: 0.0, ..material })], &[body])
     };
     Law {

@@ -183,7 +183,7 @@ fn create_dynamic(world: ffi::b2WorldId, body: &Body, kind: &Kind, params: &Para
 
 /// Gives a body that exists its shape.
 fn create_shape(body: ffi::b2BodyId, kind: &Kind) {
-    let Material { density, friction, restitution } = kind.material;
+    let Material { density, friction, restitution, .. } = kind.material;
     // SAFETY: the callers just created the body; definition and outline are copied.
     unsafe {
         let mut def = ffi::b2DefaultShapeDef();
@@ -198,6 +198,7 @@ fn create_shape(body: ffi::b2BodyId, kind: &Kind) {
             Shape::Box { half } => {
                 ffi::b2CreatePolygonShape(body, &def, &ffi::b2MakeBox(half.x, half.y));
             }
+            _ => unreachable!("no scene that is made has other shapes"),
         }
     }
 }

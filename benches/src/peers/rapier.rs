@@ -71,6 +71,7 @@ fn collider(kind: &Kind) -> ColliderBuilder {
     let shape = match kind.shape {
         Shape::Circle { radius } => ColliderBuilder::ball(radius),
         Shape::Box { half } => ColliderBuilder::cuboid(half.x, half.y),
+        _ => unreachable!("no scene that is made has other shapes"),
     };
     shape
         .density(kind.material.density)

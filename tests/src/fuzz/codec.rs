@@ -52,7 +52,7 @@ fn receive<R>(listen: impl FnOnce(&mut Inbox) -> R) -> R {
     let blueprint = Blueprint {
         params: Params { exchange: Exchange::Substep, ..Params::default() },
         partition: Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 2, TILES / 2).expect("a domain with a size"),
-        kinds: vec![Kind { shape: Shape::circle(0.2), material: Material::default() }],
+        kinds: vec![Kind::new(Shape::circle(0.2), Material::default())],
         statics: Vec::new(),
     };
     let mut world = World::new(&blueprint, &[TileId(0)]).expect("a world that can be built");

@@ -11,7 +11,7 @@ use glam::{DVec2, Vec2};
 
 /// A few bodies on a floor, over two tiles.
 fn world() -> World {
-    let solid = |shape| Kind { shape, material: Material::default() };
+    let solid = |shape| Kind::new(shape, Material::default());
     let params = Params {
         gravity: Vec2::new(0.0, -10.0),
         exchange: Exchange::Substep,

@@ -61,7 +61,7 @@ impl Run {
 
 /// Two kinds of bodies, and two statics, one of them turned.
 fn stage() -> StageText {
-    let kind = |shape| Kind { shape, material: Material::default() };
+    let kind = |shape| Kind::new(shape, Material::default());
     let wall = |id, x| StaticBody::new(GlobalId(id), kind(Shape::rectangle(1.0, 9.0)), DVec2::new(x, 4.0));
     let turned = StaticBody { rotation: Rot::from_angle(0.25), ..wall(7, 8.5) };
     StageText::new(&[kind(Shape::rectangle(0.5, 1.0)), kind(Shape::circle(0.25))], &[wall(6, -0.5), turned])
