@@ -16,9 +16,9 @@ fn files() -> Vec<PathBuf> {
 fn each_runs_a_step_at_a_small_size() {
     for path in files() {
         let config = Config::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        // Large worlds, but for two that show a handful of boxes, and two that are as Box2D's benchmarks have them.
-        let few =
-            ["stack.toml", "slope.toml", "large_pyramid.toml", "smash.toml"].iter().any(|name| path.ends_with(name));
+        // Large worlds, but for two that show a handful of boxes, two that are as Box2D's benchmarks have them, and the zoo.
+        let few = ["stack.toml", "slope.toml", "large_pyramid.toml", "smash.toml", "zoo.toml"];
+        let few = few.iter().any(|name| path.ends_with(name));
         assert_eq!(config.scene.bodies < 20_000, few, "{}", path.display());
         let text = std::fs::read_to_string(&path).unwrap();
         let config = Config::from_toml_str("small", &text, &[("bodies", "300"), ("steps", "1")]).unwrap();
