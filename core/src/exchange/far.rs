@@ -97,8 +97,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
     let corners = |(low, high): (DVec2, DVec2), place: &DVec2| (low.min(*place), high.max(*place));
     let (low, high) = tile.bodies.position[..dynamic].iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), corners);
     let (low, high) = (low - reach, high + reach);
-    for row in 0..setup.statics.len() as u32 {
-        let fixed = setup.static_at(row, step);
+    for (row, fixed) in (0..).zip(setup.statics_at(step)) {
         let half = setup.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
         let is_met = (fixed.position - half).cmple(high).all() && (fixed.position + half).cmpge(low).all();
         if is_met && tile.statics.binary_search(&row).is_err() {

@@ -281,6 +281,11 @@ impl Setup {
         Body { position, rotation, velocity, angular_velocity, ..body }
     }
 
+    /// All statics as a step begins, by their rows.
+    pub(crate) fn statics_at(&self, step: u64) -> impl Iterator<Item = Body> + '_ {
+        (0..self.statics.len() as u32).map(move |row| self.static_at(row, step))
+    }
+
     /// Whether the surface of any static moves.
     pub(crate) fn any_drives(&self) -> bool {
         !self.driving.is_empty()

@@ -51,7 +51,7 @@ pub(crate) struct Index {
 impl Index {
     fn new(bodies: impl Iterator<Item = Body>, setup: &Setup, step: u64) -> Self {
         let outline = |body: Body| Outline::new(&body, setup.kind(body.kind));
-        let statics = (0..setup.statics.len() as u32).map(|row| outline(setup.static_at(row, step))).collect();
+        let statics = setup.statics_at(step).map(outline).collect();
         Self { bodies: Tree::new(bodies.map(outline).collect()), statics: Tree::new(statics) }
     }
 

@@ -21,8 +21,7 @@ impl World {
     /// as for contacts.
     pub fn inside_sensors(&self, moving: &[Body]) -> Vec<(GlobalId, GlobalId)> {
         let setup = &self.setup;
-        let fixed = (0..setup.statics.len() as u32).map(|row| setup.static_at(row, self.step));
-        let fixed = fixed.filter(|body| setup.kind(body.kind).sensor);
+        let fixed = setup.statics_at(self.step).filter(|body| setup.kind(body.kind).sensor);
         let mut found = Vec::new();
         for sensor in fixed.chain(moving.iter().copied()) {
             let kind = setup.kind(sensor.kind);
