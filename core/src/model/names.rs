@@ -1,6 +1,7 @@
 //! The names that are taken.
 
 use crate::model::id::GlobalId;
+use rustc_hash::FxHashSet;
 use std::collections::HashSet;
 
 /// A set of names: runs of those that came in ascending order, as a scene tells them; of others a bit for each up to some
@@ -47,6 +48,29 @@ impl Names {
             self.sparse.insert(name);
         }
         true
+    }
+}
+
+/// Names that are noted for the case that somebody asks: only then they are hashed.
+#[derive(Default, Debug)]
+pub(crate) struct Noted {
+    latest: Vec<GlobalId>,
+    hashed: FxHashSet<GlobalId>,
+}
+
+impl Noted {
+    pub(crate) fn push(&mut self, name: GlobalId) {
+        self.latest.push(name);
+    }
+
+    pub(crate) fn contains(&mut self, name: GlobalId) -> bool {
+        self.hashed.extend(self.latest.drain(..));
+        self.hashed.contains(&name)
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.latest.clear();
+        self.hashed.clear();
     }
 }
 

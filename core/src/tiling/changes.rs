@@ -13,7 +13,7 @@ use std::ops::Deref;
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Changes {
     /// Owned bodies that were removed.
-    gone: FxHashSet<GlobalId>,
+    gone: Vec<GlobalId>,
     added: Vec<Body>,
     /// How many of these left again.
     left: usize,
@@ -23,6 +23,12 @@ impl Changes {
     /// Those that came and are still there.
     fn added(&self) -> impl Iterator<Item = Body> + '_ {
         self.added.iter().copied().filter(|body| body.kind != LEFT)
+    }
+
+    /// Tells of an owned body whether it was removed.
+    fn is_gone(&self) -> impl Fn(GlobalId) -> bool + use<> {
+        let gone: FxHashSet<GlobalId> = self.gone.iter().copied().collect();
+        move |id| gone.contains(&id)
     }
 }
 
@@ -50,12 +56,14 @@ impl Deref for Settled<'_> {
 }
 
 impl Tile {
-    /// The owned bodies as they are now.
-    pub(crate) fn present(&self) -> impl Iterator<Item = Body> + '_ {
+    /// The owned bodies as they are now, each with its place: those that came since the last step stand behind all that were there.
+    pub(crate) fn present(&self) -> impl Iterator<Item = (u32, Body)> + '_ {
         let changes = self.changes.as_deref();
-        let stays = move |&index: &usize| changes.is_none_or(|changes| !changes.gone.contains(&self.bodies.id[index]));
-        let stayed = (0..self.owned).filter(stays).map(|index| self.bodies.get(index));
-        stayed.chain(changes.into_iter().flat_map(Changes::added))
+        let is_gone = changes.filter(|changes| !changes.gone.is_empty()).map(Changes::is_gone);
+        let stays = move |&index: &usize| is_gone.as_ref().is_none_or(|is_gone| !is_gone(self.bodies.id[index]));
+        let stayed = (0..self.owned).filter(stays).map(|index| (index as u32, self.bodies.get(index)));
+        let added = (self.owned as u32..).zip(changes.into_iter().flat_map(|changes| &changes.added));
+        stayed.chain(added.filter(|(_, body)| body.kind != LEFT).map(|(place, &body)| (place, body)))
     }
 
     /// How many these are.
@@ -64,44 +72,67 @@ impl Tile {
         self.changes.as_deref().map_or(self.owned, changed)
     }
 
-    /// The places, among the bodies that came since the last step, of those that are still there.
-    pub(crate) fn added(&self) -> impl Iterator<Item = (u32, Body)> + '_ {
-        let all = self.changes.iter().flat_map(|changes| (0..).zip(&changes.added));
-        all.filter(|(_, body)| body.kind != LEFT).map(|(place, &body)| (place, body))
+    /// The place of one of them, who is there, if it has not left for another tile: it is sought where it was last seen; then, as
+    /// others may have left, a little before; elsewhere last of all.
+    pub(crate) fn find(&self, id: GlobalId, was: u32) -> Option<u32> {
+        let ids = &self.bodies.id[..self.owned];
+        if self.came(id, was) || ids.get(was as usize) == Some(&id) {
+            return Some(was);
+        }
+        let (before, after) = ids.split_at((was as usize).min(self.owned));
+        let found = before.iter().rposition(|&name| name == id);
+        let index = found.or_else(|| Some(before.len() + after.iter().position(|&name| name == id)?))?;
+        Some(index as u32)
     }
 
-    /// One of them.
-    pub(crate) fn added_at(&self, place: u32) -> Body {
-        self.changes.as_deref().expect("somebody came").added[place as usize]
+    /// Whether that is the place of one that came since the last step.
+    fn came(&self, id: GlobalId, place: u32) -> bool {
+        let place = (place as usize).checked_sub(self.owned);
+        place.and_then(|place| self.added_at(place)).is_some_and(|body| body.id == id && body.kind != LEFT)
     }
 
-    /// Whether one of the owned bodies is still there.
-    pub(crate) fn is_present(&self, id: GlobalId) -> bool {
-        self.changes.as_deref().is_none_or(|changes| !changes.gone.contains(&id))
+    /// The one at a place.
+    pub(crate) fn at(&self, place: u32) -> Body {
+        match (place as usize).checked_sub(self.owned) {
+            None => self.bodies.get(place as usize),
+            Some(place) => *self.added_at(place).expect("somebody came"),
+        }
     }
 
-    /// Adds a body, and says where among the [`added`](Self::added) it is.
+    /// Puts another of its name in its place; it wakes.
+    pub(crate) fn change_at(&mut self, place: u32, body: Body) {
+        match (place as usize).checked_sub(self.owned) {
+            None => {
+                self.bodies.set(place as usize, body);
+                self.sleep.wake(place as usize);
+                self.rim.is_known = false;
+            }
+            Some(place) => self.changes.as_deref_mut().expect("somebody came").added[place] = body,
+        }
+    }
+
+    /// One of those that came since the last step.
+    fn added_at(&self, place: usize) -> Option<&Body> {
+        self.changes.as_deref()?.added.get(place)
+    }
+
+    /// Adds a body, and gives its place.
     pub(crate) fn add(&mut self, body: Body) -> u32 {
         let added = &mut self.changes.get_or_insert_default().added;
         added.push(body);
-        added.len() as u32 - 1
+        (self.owned + added.len()) as u32 - 1
     }
 
-    /// Changes one of those that came.
-    pub(crate) fn change_added(&mut self, place: u32, change: impl FnOnce(&mut Body)) {
-        change(&mut self.changes.as_deref_mut().expect("somebody came").added[place as usize]);
-    }
-
-    /// Removes one of those that came.
-    pub(crate) fn remove_added(&mut self, place: u32) {
-        let changes = self.changes.as_deref_mut().expect("somebody came");
-        changes.added[place as usize].kind = LEFT;
-        changes.left += 1;
-    }
-
-    /// Removes one of the owned bodies, which is there.
-    pub(crate) fn remove(&mut self, id: GlobalId) {
-        self.changes.get_or_insert_default().gone.insert(id);
+    /// Removes a body that is there, and was last seen at that place.
+    pub(crate) fn remove(&mut self, id: GlobalId, was: u32) {
+        let came = self.came(id, was);
+        let changes = self.changes.get_or_insert_default();
+        if came {
+            changes.added[was as usize - self.owned].kind = LEFT;
+            changes.left += 1;
+        } else {
+            changes.gone.push(id);
+        }
     }
 
     /// Where there was something to settle: a copy in which it is settled, that remembers all that a step depends on.
@@ -137,8 +168,9 @@ impl Tile {
             owned = 0;
             // For each its new place.
             let mut places = Vec::with_capacity(self.owned);
-            for id in &self.bodies.id[..self.owned] {
-                let stays = !changes.gone.contains(id);
+            let is_gone = changes.is_gone();
+            for &id in &self.bodies.id[..self.owned] {
+                let stays = !is_gone(id);
                 places.push(if stays { owned as u32 } else { GONE });
                 owned += usize::from(stays);
             }

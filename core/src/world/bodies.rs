@@ -1,7 +1,7 @@
 //! The bodies of a world, one by one and by name: they come, are looked at, and go.
 
 use super::World;
-use super::locator::{At, Locator, Place};
+use super::locator::{Locator, Place};
 use crate::model::body::Body;
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId};
@@ -23,7 +23,7 @@ impl World {
     pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
         self.setup.check_body(&body)?;
         self.greatest_name = self.greatest_name.max(body.id);
-        if self.removed.contains(&body.id) {
+        if self.removed.contains(body.id) {
             self.forget_ghosts(body.id);
         }
         let owner = self.setup.partition.locate(body.position);
@@ -38,11 +38,7 @@ impl World {
         if !free {
             return Err(SetupError::NameTaken { id: body.id });
         }
-        let at = At::Added(self.tiles[place].add(body));
-        if let Some(locator) = self.locator.get_mut() {
-            locator.insert(body.id, Place { tile: place as u32, at });
-        }
-        self.note_change();
+        self.put(place, body);
         Ok(true)
     }
 
@@ -53,41 +49,50 @@ impl World {
     /// As [`add`](Self::add); no name is used up then.
     pub fn insert(&mut self, body: Body) -> Result<GlobalId, SetupError> {
         let id = GlobalId(self.greatest_name.0.checked_add(1).ok_or(SetupError::NameTaken { id: self.greatest_name })?);
-        self.add(Body { id, ..body })?;
+        let body = Body { id, ..body };
+        self.setup.check_body(&body)?;
+        self.greatest_name = id;
+        if let Some(place) = self.place_of(self.setup.partition.locate(body.position)) {
+            if self.knows_names {
+                self.names.insert(id);
+            }
+            self.put(place, body);
+        }
         Ok(id)
+    }
+
+    /// Adds a body under a name that is free to a tile.
+    fn put(&mut self, place: usize, body: Body) {
+        let at = self.tiles[place].add(body);
+        if let Some(locator) = self.locator.get_mut() {
+            locator.insert(body.id, Place { tile: place as u32, at });
+        }
+        self.note_change();
     }
 
     /// The body of that name, if it is one of this world's. The first time this is asked, all are looked at; from then on it takes
     /// the same time however many there are.
     pub fn get(&self, id: GlobalId) -> Option<Body> {
         let Place { tile, at } = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
-        let tile = &self.tiles[tile as usize];
-        Some(match at {
-            At::Owned(index) => tile.bodies.get(index as usize),
-            At::Added(place) => tile.added_at(place),
-        })
+        Some(self.tiles[tile as usize].at(at))
     }
 
     /// Removes the body of that name, and says whether it was one of this world's. Tell every rank. Takes as long as
     /// [`get`](Self::get).
     pub fn remove(&mut self, id: GlobalId) -> bool {
-        self.removed.insert(id);
+        self.removed.push(id);
         self.locate_all();
         let may_have_left = self.tiles.len() < self.setup.partition.tiles();
         let found = self.locator.get_mut().and_then(|locator| locator.remove(id, may_have_left, &self.tiles));
         let Some(Place { tile, at }) = found else { return false };
-        let tile = &mut self.tiles[tile as usize];
-        match at {
-            At::Owned(_) => tile.remove(id),
-            At::Added(place) => tile.remove_added(place),
-        }
+        self.tiles[tile as usize].remove(id, at);
         self.note_change();
         true
     }
 
     /// Every owned body.
     pub fn bodies(&self) -> impl Iterator<Item = Body> + '_ {
-        self.tiles.iter().flat_map(Tile::present)
+        self.tiles.iter().flat_map(Tile::present).map(|(_, body)| body)
     }
 
     /// How many there are.
@@ -127,29 +132,14 @@ impl World {
         if !std::mem::take(&mut self.is_unsettled) {
             return;
         }
-        let came = |(number, tile): (usize, &mut Tile)| {
-            let came: Vec<GlobalId> = tile.added().map(|(_, body)| body.id).collect();
-            tile.settle();
-            (number as u32, came)
-        };
-        let unsettled = self.tiles.par_iter_mut().enumerate().filter(|(_, tile)| tile.changes.is_some());
-        let came: Vec<(u32, Vec<GlobalId>)> = unsettled.map(came).collect();
-        if let Some(locator) = self.locator.get_mut() {
-            for (tile, came) in came {
-                // They are the last ones.
-                let first = (self.tiles[tile as usize].owned - came.len()) as u32;
-                came.into_iter().zip(first..).for_each(|(id, index)| {
-                    locator.insert(id, Place { tile, at: At::Owned(index) });
-                });
-            }
-        }
+        self.tiles.par_iter_mut().for_each(Tile::settle);
         self.changed = true;
     }
 
     /// The tile that owns a body, if it is one of this world's and was there in the last step.
     pub(crate) fn tile_of(&self, id: GlobalId) -> Option<&Tile> {
-        let place = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
-        matches!(place.at, At::Owned(_)).then(|| &self.tiles[place.tile as usize])
+        let Place { tile, at } = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
+        Some(&self.tiles[tile as usize]).filter(|tile| (at as usize) < tile.owned)
     }
 
     /// What questions are answered by, made if anything has changed.

@@ -1,7 +1,7 @@
 //! What may be done to a world between two steps, as values that can be sent, written down and repeated.
 
 use super::World;
-use super::locator::{At, Place};
+use super::locator::Place;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::error::SetupError;
@@ -9,7 +9,6 @@ use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::{Kind, KindRow};
 use crate::model::math::cross;
 use crate::model::params::Params;
-use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 use std::sync::Arc;
 
@@ -102,8 +101,8 @@ impl World {
                 self.settle();
                 self.forget_ghosts(id);
                 let changed = self.change(id, |body, _| body.kind = kind);
-                if let Some(Place { tile, at: At::Owned(index) }) = self.look_up(id) {
-                    let is_it = |slot| matches!(slot, SlotKind::Owned(i) if i == index as usize);
+                if let Some(Place { tile, at }) = self.look_up(id) {
+                    let is_it = |slot| matches!(slot, SlotKind::Owned(index) if index == at as usize);
                     self.tiles[tile as usize].forget_contacts(|slot| is_it(slot.kind()));
                 }
                 Ok(changed)
@@ -151,23 +150,11 @@ impl World {
     /// Changes a body, which wakes; says whether it is here.
     fn change(&mut self, id: GlobalId, change: impl FnOnce(&mut Body, &KindRow)) -> bool {
         let Some(Place { tile, at }) = self.look_up(id) else { return false };
-        let setup = Arc::clone(&self.setup);
-        let tile: &mut Tile = &mut self.tiles[tile as usize];
-        match at {
-            At::Owned(index) => {
-                let index = index as usize;
-                let mut body = tile.bodies.get(index);
-                let kind = setup.kind(body.kind);
-                change(&mut body, kind);
-                tile.bodies.set(index, body);
-                tile.sleep.wake(index);
-                tile.rim.is_known = false;
-            }
-            At::Added(place) => {
-                let kind = setup.kind(tile.added_at(place).kind);
-                tile.change_added(place, |body| change(body, kind));
-            }
-        }
+        let tile = &mut self.tiles[tile as usize];
+        let mut body = tile.at(at);
+        let kind = self.setup.kind(body.kind);
+        change(&mut body, kind);
+        tile.change_at(at, body);
         self.questions.take();
         true
     }

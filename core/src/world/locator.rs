@@ -8,16 +8,8 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Place {
     pub(super) tile: u32,
-    pub(super) at: At,
-}
-
-/// Where in a tile.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum At {
-    /// Among the owned bodies.
-    Owned(u32),
-    /// Among those that came since the last step.
-    Added(u32),
+    /// As [`Tile::present`] counts.
+    pub(super) at: u32,
 }
 
 /// For each body of a world its tile for certain; where in there it is only as long as the tile keeps its order, which is looked at
@@ -32,13 +24,6 @@ pub(super) struct Locator {
 /// Whoever is so few places nearer to the first is found as fast again.
 const NEAR: u32 = 256;
 
-/// Where a name is among others: most likely a little before where it was, as others have left.
-fn search(ids: &[GlobalId], was: usize, id: GlobalId) -> Option<usize> {
-    let (before, after) = ids.split_at(was.min(ids.len()));
-    let found = before.iter().rposition(|&name| name == id);
-    found.or_else(|| Some(before.len() + after.iter().position(|&name| name == id)?))
-}
-
 /// After so many the whole tile is written down anew: that takes as long as searching through it so often.
 const MISSES: u32 = 400;
 
@@ -52,18 +37,13 @@ impl Locator {
         };
         for (number, tile) in (0..).zip(tiles) {
             locator.write_down(number, tile);
-            for (place, body) in tile.added() {
-                locator.places.insert(body.id, Place { tile: number, at: At::Added(place) });
-            }
         }
         locator
     }
 
     fn write_down(&mut self, number: u32, tile: &Tile) {
-        for (index, &id) in (0..).zip(&tile.bodies.id[..tile.owned]) {
-            if tile.is_present(id) {
-                self.places.insert(id, Place { tile: number, at: At::Owned(index) });
-            }
+        for (at, body) in tile.present() {
+            self.places.insert(body.id, Place { tile: number, at });
         }
     }
 
@@ -74,15 +54,7 @@ impl Locator {
 
     /// Where a body is that was last seen there.
     fn confirm(id: GlobalId, known: Place, tiles: &[Tile]) -> Option<Place> {
-        let tile = &tiles[known.tile as usize];
-        match known.at {
-            At::Added(_) => Some(known),
-            At::Owned(index) => {
-                let (index, ids) = (index as usize, &tile.bodies.id[..tile.owned]);
-                let index = if ids.get(index) == Some(&id) { index } else { search(ids, index, id)? };
-                tile.is_present(id).then_some(Place { at: At::Owned(index as u32), ..known })
-            }
-        }
+        Some(Place { at: tiles[known.tile as usize].find(id, known.at)?, ..known })
     }
 
     /// As [`find`](Self::find), and remembers it.
@@ -93,9 +65,7 @@ impl Locator {
             Some(place) if place == known => {}
             Some(place) => {
                 self.places.insert(id, place);
-                if let (At::Owned(was), At::Owned(is)) = (known.at, place.at)
-                    && was.wrapping_sub(is) < NEAR
-                {
+                if known.at.wrapping_sub(place.at) < NEAR {
                     return found;
                 }
                 let missed = &mut self.missed[place.tile as usize];
@@ -114,17 +84,17 @@ impl Locator {
         self.places.insert(id, place);
     }
 
-    /// Forgets a body, and says where it was. If it may have left for another world, that is looked at; else it is there.
+    /// Forgets a body, and says where it was last seen. If it may have left for another world, that is looked at; else it is there.
     pub(super) fn remove(&mut self, id: GlobalId, may_have_left: bool, tiles: &[Tile]) -> Option<Place> {
         let known = self.places.remove(&id)?;
         if may_have_left { Self::confirm(id, known, tiles) } else { Some(known) }
     }
 
-    /// After a step, or after changes were settled: the bodies of a tile that are new there, or in another place.
+    /// After a step: the bodies of a tile that are new there, or in another place.
     pub(super) fn follow(&mut self, number: u32, tile: &Tile, newcomers: impl Iterator<Item = u32>) {
         for index in newcomers {
             let id = tile.bodies.id[index as usize];
-            self.places.insert(id, Place { tile: number, at: At::Owned(index) });
+            self.places.insert(id, Place { tile: number, at: index });
         }
     }
 

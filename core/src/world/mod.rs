@@ -11,7 +11,7 @@ use crate::exchange::mail::{Inbox, Outbox};
 use crate::exchange::verdict::Verdict;
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, TileId};
-use crate::model::names::Names;
+use crate::model::names::{Names, Noted};
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
@@ -26,7 +26,6 @@ pub use command::Command;
 use command::Force;
 use locator::Locator;
 use rayon::prelude::*;
-use rustc_hash::FxHashSet;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
@@ -50,7 +49,7 @@ pub struct World {
     /// The greatest of all bodies and statics that this world was told of.
     greatest_name: GlobalId,
     /// Of the bodies that were to be removed since the last step, wherever they were.
-    removed: FxHashSet<GlobalId>,
+    removed: Noted,
     /// Where each body is, once anybody has asked.
     locator: OnceLock<Locator>,
     /// What questions are answered by, once there was one since anything has changed.
@@ -126,7 +125,7 @@ impl World {
             names: Names::default(),
             knows_names: true,
             greatest_name: setup.statics.iter().map(|fixed| fixed.id).max().unwrap_or_default(),
-            removed: FxHashSet::default(),
+            removed: Noted::default(),
             locator: OnceLock::new(),
             questions: OnceLock::new(),
             forces: Vec::new(),
@@ -244,7 +243,10 @@ impl World {
 
     /// Where among this world's a tile is, if it is there.
     pub(crate) fn place_of(&self, tile: TileId) -> Option<usize> {
-        self.tiles.binary_search_by_key(&tile, |tile| tile.id).ok()
+        // Where all are here, each is at its own number.
+        let is_at = |place: usize| self.tiles.get(place).is_some_and(|other| other.id == tile);
+        let own = tile.0 as usize;
+        if is_at(own) { Some(own) } else { self.tiles.binary_search_by_key(&tile, |tile| tile.id).ok() }
     }
 
     pub(crate) fn tile_states(&self) -> &[Tile] {
