@@ -4,6 +4,7 @@ pub(crate) mod broad_phase;
 mod cull;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
+mod piece_boxes;
 pub(crate) mod proxies;
 mod touch;
 mod wide_boxes;

@@ -2,6 +2,7 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
+use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch, touch_pieces};
 use crate::collide::wide_boxes::BoxOutlook;
@@ -72,6 +73,7 @@ pub(crate) struct NarrowPhase {
     start: Vec<u32>,
     /// For each body whether its contacts are known by name alone.
     by_name: Vec<bool>,
+    boxes: PieceBoxes,
     /// What each of several threads finds.
     parts: Vec<Contacts>,
 }
@@ -91,15 +93,17 @@ impl NarrowPhase {
         self.sort(proxies.pairing);
         self.mark_newcomers(tile);
         contacts.clear();
-        let (sorted, by_name) = (&self.sorted[..], &self.by_name[..]);
+        self.boxes.place(tile, setup);
+        let (sorted, by_name, boxes) = (&self.sorted[..], &self.by_name[..], &self.boxes);
         let pieces = team.pieces(sorted.len(), GRAIN);
         if pieces == 1 {
-            return setup.lanes.run(FindAmong { sorted, by_name, tile, setup, contacts });
+            return setup.lanes.run((FindAmong { sorted, by_name, boxes, tile, setup }, contacts));
         }
         self.parts.resize_with(pieces, Contacts::default);
         let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
         team.for_each(parts, |(range, part): (Range<usize>, &mut Contacts)| {
-            setup.lanes.run(FindAmong { sorted: &sorted[range], by_name, tile, setup, contacts: part });
+            let among = FindAmong { sorted: &sorted[range], by_name, boxes, tile, setup };
+            setup.lanes.run((among, part));
         });
         self.parts.iter_mut().for_each(|part| contacts.append(part));
     }
@@ -152,13 +156,13 @@ impl NarrowPhase {
     }
 }
 
-/// Appends the contacts among some sorted pairs.
+/// Appends the contacts among some sorted pairs to those there are.
 struct FindAmong<'a> {
     sorted: &'a [Pair],
     by_name: &'a [bool],
+    boxes: &'a PieceBoxes,
     tile: &'a Tile,
     setup: &'a Setup,
-    contacts: &'a mut Contacts,
 }
 
 /// A pair as its contact names it.
@@ -168,6 +172,8 @@ struct Named<'a> {
     /// Bodies A and B.
     bodies: Pair,
     known: Option<&'a Contact>,
+    /// The place of the first of its contacts of the last step, if it has any but by name.
+    old: u32,
 }
 
 /// So many pairs are sorted by kinds at a time.
@@ -222,8 +228,6 @@ struct Block<'a> {
     /// The contacts of those that are found anew.
     found: [Contact; BLOCK],
     separation: [[f32; 2]; BLOCK],
-    /// The contacts of pairs that have any number of them, each with the place of its pair, ascending.
-    several: Vec<(u8, Contact, [f32; 2])>,
 }
 
 /// What comes of a pair.
@@ -233,24 +237,24 @@ enum Outcome {
     /// The contact that is known, as it is.
     Known,
     Found,
-    /// What is among several.
+    /// Any number, which are yet to be found.
     Several,
 }
 
-impl Kernel for FindAmong<'_> {
+impl Kernel for (FindAmong<'_>, &mut Contacts) {
     type Output = ();
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { sorted, by_name, tile, setup, contacts } = self;
+        let (among, contacts) = self;
+        let FindAmong { sorted, by_name, tile, setup, .. } = among;
         let mut names = Names::new(tile, by_name, sorted);
-        let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None };
+        let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None, old: 0 };
         let mut block = Block {
             named: [nobody; BLOCK],
             outcome: [Outcome::Nothing; BLOCK],
             found: [Contact::zeroed(); BLOCK],
             separation: [[0.0; 2]; BLOCK],
-            several: Vec::new(),
         };
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
@@ -263,8 +267,8 @@ impl Kernel for FindAmong<'_> {
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), contacts);
             } else {
-                block.find_several(lists.get(OF_PIECES), by_name, tile, setup);
-                block.keep_several(pairs.len(), contacts);
+                lists.get(OF_PIECES).iter().for_each(|&place| block.outcome[usize::from(place)] = Outcome::Several);
+                block.find_several(pairs.len(), &among, contacts);
             }
         }
     }
@@ -321,47 +325,33 @@ impl Block<'_> {
         bodies.truncate(kept);
     }
 
-    /// Finds the contacts of pairs of which one body is made of pieces.
+    /// As [`keep`](Self::keep), and finds the contacts of pairs of which one body is made of pieces.
     #[inline(never)]
-    fn find_several(&mut self, list: &[u8], by_name: &[bool], tile: &Tile, setup: &Setup) {
-        self.several.clear();
-        let mut known = Vec::new();
-        for &place in list {
-            let Named { key, bodies, .. } = self.named[usize::from(place)];
-            known.clear();
-            if bodies.iter().any(|&body| by_name[body as usize]) {
-                let pair = (tile.bodies.id[bodies[0] as usize], tile.bodies.id[bodies[1] as usize]);
-                known.extend(tile.strays.find_all(pair, key.is_own()));
-            } else {
-                known.extend(tile.contacts.find_all(key));
-            }
-            let several = &mut self.several;
-            touch_pieces(tile, bodies, &known, setup, |contact, now| several.push((place, contact, now)));
-            self.outcome[usize::from(place)] = Outcome::Several;
-        }
-    }
-
-    /// As [`keep`](Self::keep), with those of which there may be several.
-    #[inline(never)]
-    fn keep_several(&self, pairs: usize, contacts: &mut Contacts) {
+    fn find_several(&self, pairs: usize, among: &FindAmong<'_>, contacts: &mut Contacts) {
+        let &FindAmong { by_name, boxes, tile, setup, .. } = among;
         let Contacts { cache, separation, bodies, .. } = contacts;
-        let mut several = self.several.iter().peekable();
-        for i in 0..pairs {
-            let named = &self.named[i];
+        let mut several = Vec::new();
+        for (named, i) in self.named[..pairs].iter().zip(0..) {
+            let &Named { key, bodies: pair, known, old } = named;
             let mut keep = |contact: &Contact, now: [f32; 2]| {
-                cache.keys.push(named.key);
+                cache.keys.push(key);
                 cache.contacts.push(*contact);
                 separation.push(now);
-                bodies.push(named.bodies);
+                bodies.push(pair);
             };
             match self.outcome[i] {
                 Outcome::Nothing => {}
-                Outcome::Known => keep(named.known.expect("it is known"), self.separation[i]),
+                Outcome::Known => keep(known.expect("it is known"), self.separation[i]),
                 Outcome::Found => keep(&self.found[i], self.separation[i]),
                 Outcome::Several => {
-                    while let Some((_, contact, now)) = several.next_if(|(place, ..)| usize::from(*place) == i) {
-                        keep(contact, *now);
+                    several.clear();
+                    if pair.iter().any(|&body| by_name[body as usize]) {
+                        let names = (tile.bodies.id[pair[0] as usize], tile.bodies.id[pair[1] as usize]);
+                        several.extend(tile.strays.find_all(names, key.is_own()));
+                    } else if known.is_some() {
+                        several.extend(tile.contacts.all_from(old as usize));
                     }
+                    touch_pieces(tile, pair, boxes, &several, setup, keep);
                 }
             }
         }
@@ -454,13 +444,13 @@ impl<'a> Names<'a> {
             old += usize::from(key >= other);
         }
         self.old = old;
-        for ((named, &[low, high]), &known) in named.iter_mut().zip(pairs).zip(&known) {
+        for ((named, &[low, high]), &old) in named.iter_mut().zip(pairs).zip(&known) {
             let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
             let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
             let by_name = self.by_name[low as usize] | self.by_name[high as usize];
             let known =
-                if by_name { tile.strays.find(pair, named.key.is_own()) } else { tile.contacts.contacts.get(known) };
-            (named.bodies, named.known) = (bodies, known);
+                if by_name { tile.strays.find(pair, named.key.is_own()) } else { tile.contacts.contacts.get(old) };
+            (named.bodies, named.known, named.old) = (bodies, known, old as u32);
         }
     }
 }

@@ -8,6 +8,7 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
+use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
@@ -341,37 +342,41 @@ pub(super) fn recycle(tile: &Tile, pair: Pair, known: &Contact, setup: &Setup) -
 /// order. `known` are those of the last step.
 pub(super) fn touch_pieces(
     tile: &Tile,
-    pair: Pair,
+    bodies: Pair,
+    boxes: &PieceBoxes,
     known: &[&Contact],
     setup: &Setup,
-    mut found: impl FnMut(Contact, [f32; 2]),
+    mut found: impl FnMut(&Contact, [f32; 2]),
 ) {
-    let mut pair = Approach::new(tile, pair, setup);
+    let mut pair = Approach::new(tile, bodies, setup);
     if pair.pass_by(setup) {
         return;
     }
     let far = pair.far(setup.params.dt);
     let is_slow = far < setup.params.speculative_distance;
     let rolls = pair.a.is_round() || pair.b.is_round();
-    let (rotation_a, rotation_b, offset) = (pair.a.rotation, pair.b.rotation, pair.offset);
+    let (near, offset) = (setup.params.speculative_distance + far, pair.offset);
     let (pieces_a, pieces_b) = (&pair.a.kind.pieces, &pair.b.kind.pieces);
+    let (several, mut only) = (pieces_a.len() * pieces_b.len() > 1, [None; 2]);
+    let [only_a, only_b] = &mut only;
+    let boxes =
+        several.then(|| [(bodies[0], only_a), (bodies[1], only_b)].map(|(i, only)| boxes.of(i, tile, setup, only)));
     for (number_a, a) in (0..).zip(pieces_a.iter()) {
-        let center = offset - rotation_a.rotate(a.center);
         for (number_b, b) in (0..).zip(pieces_b.iter()) {
-            let (gap, near) =
-                (center + rotation_b.rotate(b.center), a.reach + b.reach + setup.params.speculative_distance + far);
-            if dot(gap, gap) > near * near {
+            if let Some([boxes_a, boxes_b]) = boxes
+                && !boxes_a[number_a as usize].is_near(&boxes_b[number_b as usize], offset, near)
+            {
                 continue;
             }
             (pair.pieces, pair.features) = (Some([a, b]), Contact::features_of(number_a, number_b));
             let known = known.iter().copied().find(|known| known.pieces() == pair.features);
-            let contact = match known {
-                Some(known) if is_slow && rolls => pair.roll(known, setup),
-                Some(known) if is_slow => pair.recycle(known, setup).map(|separation| (*known, separation)),
-                _ => None,
-            };
-            if let Some((contact, separation)) = contact.or_else(|| pair.touch(known, setup)) {
-                found(contact, separation);
+            let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
+            if let Some(known) = known.filter(|_| is_slow && !rolls)
+                && let Some(separation) = pair.recycle(known, setup)
+            {
+                found(known, separation);
+            } else if let Some((contact, separation)) = rolled.or_else(|| pair.touch(known, setup)) {
+                found(&contact, separation);
             }
         }
     }

@@ -136,24 +136,57 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
 ///
 /// Source: continuous collision against statics after the solver, as in Box2D v3 (E. Catto), which a body pays for with time.
 pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup) {
-    let statics = tile.owned + tile.ghosts()..tile.bodies.len();
-    tile.rim.is_known &= ways.is_empty();
+    if ways.is_empty() {
+        return;
+    }
+    tile.rim.is_known = false;
+    let bounds = Bounds::new(tile, setup);
     for &Way { row, start } in ways {
         let whole = tile.bodies.position[row] - start;
         let body = tile.bodies.get(row);
         let (kind, way) = (setup.kind(body.kind), whole.as_vec2());
         let (half, middle) = (kind.half_extents(body.rotation).as_dvec2() + 0.5 * whole.abs(), start + 0.5 * whole);
         let mut part = 1.0_f32;
-        for fixed in statics.clone() {
+        for fixed in bounds.meeting(middle - half, middle + half) {
             let fixed = tile.bodies.get(fixed);
-            let other = setup.kind(fixed.kind);
-            let reach = half + other.half_extents(fixed.rotation).as_dvec2();
-            if (fixed.position - middle).abs().cmple(reach).all() {
-                let offset = (fixed.position - start).as_vec2();
-                part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
-            }
+            let (other, offset) = (setup.kind(fixed.kind), (fixed.position - start).as_vec2());
+            part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
         }
         tile.bodies.position[row] = start + whole * f64::from(part);
+    }
+}
+
+/// The statics of a tile, with the low and high corners of upright rectangles around them: from left to right by the low ones.
+struct Bounds {
+    all: Vec<(usize, DVec2, DVec2)>,
+    /// How far to the right any comes of those up to each.
+    right: Vec<f64>,
+}
+
+impl Bounds {
+    fn new(tile: &Tile, setup: &Setup) -> Self {
+        let bound = |row: usize| {
+            let fixed = tile.bodies.get(row);
+            let half = setup.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
+            (row, fixed.position - half, fixed.position + half)
+        };
+        let mut all: Vec<_> = (tile.owned + tile.ghosts()..tile.bodies.len()).map(bound).collect();
+        all.sort_unstable_by(|(_, a, _), (_, b, _)| a.x.total_cmp(&b.x));
+        let mut right = f64::NEG_INFINITY;
+        let furthest = |(_, _, high): &(usize, DVec2, DVec2)| {
+            right = right.max(high.x);
+            right
+        };
+        let right = all.iter().map(furthest).collect();
+        Self { all, right }
+    }
+
+    /// Those that meet a rectangle.
+    fn meeting(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + '_ {
+        let first = self.right.partition_point(|&right| right < low.x);
+        let near = self.all[first..].iter().take_while(move |(_, own, _)| own.x <= high.x);
+        near.filter(move |(_, own_low, own_high)| own_low.cmple(high).all() && own_high.cmpge(low).all())
+            .map(|(row, ..)| *row)
     }
 }
 

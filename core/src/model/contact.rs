@@ -236,11 +236,10 @@ impl ContactCache {
         self.contacts.extend_from_slice(&other.contacts);
     }
 
-    /// Those of a pair.
-    pub(crate) fn find_all(&self, key: PairKey) -> impl Iterator<Item = &Contact> {
-        let first = self.keys.partition_point(|&other| other < key);
-        let count = self.keys[first..].iter().take_while(|&&other| other == key).count();
-        self.contacts[first..][..count].iter()
+    /// Those of the pair whose first contact is at this place.
+    pub(crate) fn all_from(&self, first: usize) -> &[Contact] {
+        let count = self.keys[first..].iter().take_while(|&&other| other == self.keys[first]).count();
+        &self.contacts[first..][..count]
     }
 
     #[cfg(test)]

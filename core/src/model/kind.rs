@@ -261,6 +261,11 @@ impl KindRow {
         })
     }
 
+    /// Whether it is made of several pieces.
+    pub(crate) fn is_compound(&self) -> bool {
+        self.pieces.len() > 1
+    }
+
     /// Half width and half height of the AABB at a rotation, in meters.
     #[inline(always)]
     pub(crate) fn half_extents(&self, rotation: crate::model::math::Rot) -> Vec2 {

@@ -2,6 +2,7 @@
 
 pub(crate) mod body;
 pub(crate) mod contact;
+pub(crate) mod convex;
 pub(crate) mod error;
 pub(crate) mod id;
 pub(crate) mod kind;

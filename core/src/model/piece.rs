@@ -1,21 +1,18 @@
 //! The convex pieces that contacts of all shapes but circles and boxes are found by.
 
-use crate::model::math::{dot, max};
-use crate::model::shape::{MOST_CORNERS, Polygon, Segment, Shape};
+use crate::model::convex::Convex;
+use crate::model::math::dot;
+use crate::model::shape::{Polygon, Segment, Shape};
 use glam::Vec2;
 use std::sync::Arc;
 
 /// A convex polygon and what is within a radius of it, in the frame of its body. One corner makes a disc.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
-    corners: [Vec2; MOST_CORNERS],
-    /// Out of the face from each corner to the next.
-    normals: [Vec2; MOST_CORNERS],
-    count: usize,
+    pub(crate) outline: Convex,
     pub(crate) radius: f32,
-    /// A circle around it.
+    /// Mean of its corners.
     pub(crate) center: Vec2,
-    pub(crate) reach: f32,
     /// Of a segment that is solid from one side.
     pub(crate) side: Option<Side>,
 }
@@ -39,31 +36,12 @@ pub(crate) enum Joint {
 
 impl Piece {
     fn new(corners: &[Vec2], radius: f32) -> Self {
-        let mut piece = Self {
-            corners: [Vec2::ZERO; MOST_CORNERS],
-            normals: [Vec2::ZERO; MOST_CORNERS],
-            count: corners.len(),
-            radius,
-            center: Vec2::ZERO,
-            reach: 0.0,
-            side: None,
-        };
-        piece.corners[..corners.len()].copy_from_slice(corners);
-        piece.normals = piece.outward();
-        piece.center = corners.iter().sum::<Vec2>() / corners.len() as f32;
-        let far = |&corner: &Vec2| dot(corner - piece.center, corner - piece.center).sqrt();
-        piece.reach = corners.iter().map(far).fold(0.0, max) + radius;
-        piece
+        Self::with_normals(corners, &outward(corners), radius)
     }
 
-    fn outward(&self) -> [Vec2; MOST_CORNERS] {
-        let mut normals = [Vec2::ZERO; MOST_CORNERS];
-        for (i, normal) in normals.iter_mut().enumerate().take(self.count) {
-            let along = (self.corners[(i + 1) % self.count] - self.corners[i]).as_dvec2();
-            // In double precision, rounded once.
-            *normal = (-along.perp()).normalize_or_zero().as_vec2();
-        }
-        normals
+    fn with_normals(corners: &[Vec2], normals: &[Vec2], radius: f32) -> Self {
+        let center = corners.iter().sum::<Vec2>() / corners.len() as f32;
+        Self { outline: Convex::new(corners, normals), radius, center, side: None }
     }
 
     fn of_polygon(polygon: &Polygon) -> Self {
@@ -75,18 +53,17 @@ impl Piece {
 
     /// A line is a box without height: four corners, and faces at its ends.
     fn of_line(from: Vec2, to: Vec2, radius: f32) -> Self {
-        let mut piece = Self::new(&[from, to, to, from], radius);
-        let out = piece.normals[0];
+        let corners = [from, to, to, from];
+        let out = outward(&corners)[0];
         let along = Vec2::new(-out.y, out.x);
-        piece.normals[..4].copy_from_slice(&[out, along, -out, -along]);
-        piece
+        Self::with_normals(&corners, &[out, along, -out, -along], radius)
     }
 
     fn of_segment(segment: &Segment) -> Self {
         let [from, to] = segment.ends();
         // Its free side is on its left, its solid one on its right: the face from its end to its start.
         let mut piece = Self::new(&[to, from], 0.0);
-        let out = piece.normals[0];
+        let out = piece.outline.normal(0);
         let along = -(out.perp());
         let joint = |other: Option<Vec2>, end: Vec2, is_end: bool| {
             let Some(other) = other else { return Joint::Open(if is_end { along } else { -along }) };
@@ -99,18 +76,18 @@ impl Piece {
         piece
     }
 
-    pub(crate) fn corners(&self) -> &[Vec2] {
-        &self.corners[..self.count]
-    }
-
-    pub(crate) fn normals(&self) -> &[Vec2] {
-        &self.normals[..self.count]
-    }
-
     /// Half extents of an upright rectangle around the center of the body that holds it.
     pub(crate) fn half_extents(&self) -> Vec2 {
-        self.corners().iter().fold(Vec2::ZERO, |most, corner| most.max(corner.abs())) + self.radius
+        self.outline.corners().fold(Vec2::ZERO, |most, corner| most.max(corner.abs())) + self.radius
     }
+}
+
+/// The normals out of the faces from each corner to the next.
+fn outward(corners: &[Vec2]) -> Vec<Vec2> {
+    let next = corners.iter().cycle().skip(1);
+    // In double precision, rounded once.
+    let normal = |(&from, &to): (&Vec2, &Vec2)| (-(to - from).as_dvec2().perp()).normalize_or_zero().as_vec2();
+    corners.iter().zip(next).map(normal).collect()
 }
 
 /// The convex pieces of a shape.
@@ -136,7 +113,7 @@ pub(crate) fn pieces(shape: &Shape) -> Arc<[Piece]> {
 
 impl Piece {
     fn placed(&self, place: impl Fn(Vec2) -> Vec2) -> Self {
-        let corners: Vec<Vec2> = self.corners().iter().map(|&corner| place(corner)).collect();
+        let corners: Vec<Vec2> = self.outline.corners().map(place).collect();
         match corners[..] {
             [from, to, again, _] if to == again => Self::of_line(from, to, self.radius),
             _ => Self::new(&corners, self.radius),

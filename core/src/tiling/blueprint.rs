@@ -97,6 +97,8 @@ pub(crate) struct Setup {
     pub(crate) bouncy: bool,
     /// Whether there are bodies that do not touch all others.
     pub(crate) filters: bool,
+    /// Whether there are shapes of several pieces.
+    pub(crate) compounds: bool,
     /// For each dynamic kind how its bodies move by themselves ([`Dynamics::factors`]); empty where all do alike.
     pub(crate) factors: Vec<[f32; 4]>,
 }
@@ -147,6 +149,7 @@ impl Setup {
         let halo_width = halo_width(&blueprint.kinds, &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
+        let compounds = kinds.iter().any(KindRow::is_compound);
         let factors = factors(&kinds[..dynamic_kinds], &params);
         Ok(Self {
             partition: blueprint.partition.clone(),
@@ -161,6 +164,7 @@ impl Setup {
             totals: bouncy || params.exchange == Exchange::Substep,
             bouncy,
             filters,
+            compounds,
             factors,
             kinds,
             dynamic_kinds,
@@ -188,6 +192,7 @@ impl Setup {
         setup.bouncy |= kind.material.restitution > 0.0;
         setup.totals |= setup.bouncy;
         setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
+        setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
         setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
         Ok(setup)
     }

@@ -4,7 +4,8 @@
 //! Source: one-sided chains with ghost vertices as in Box2D (E. Catto); here a joint that juts out belongs to one of its two segments.
 
 use super::Manifold;
-use super::convex::{Outline, clip};
+use super::convex::clip;
+use crate::model::convex::Convex;
 use crate::model::math::dot;
 use crate::model::piece::{Joint, Side};
 use glam::Vec2;
@@ -20,13 +21,13 @@ const BEYOND: f32 = 1e-5;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
 /// the piece. What is far may have any normal: it only tells how far it is.
-pub(super) fn collide(own: &Outline, side: Side, other: &Outline, radius: f32, center: Vec2) -> Manifold {
-    let &[to, from, ..] = own.corners() else { return Manifold::EMPTY };
+pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2) -> Manifold {
+    let [to, from] = own.edge(0);
     let along = to - from;
     let length = dot(along, along).sqrt();
     let along = along / length;
     let n = Vec2::new(-along.y, along.x);
-    let heights = other.corners().iter().map(|&corner| (dot(corner - from, n), dot(corner - from, along)));
+    let heights = other.corners().map(|corner| (dot(corner - from, n), dot(corner - from, along)));
     let (lowest, place) = heights.fold((f32::INFINITY, 0.0), |least, at| if at.0 < least.0 { at } else { least });
     let is_before = dot(center - from, n) >= 0.0;
     let over = is_before.then(|| against_face(own, n, other, radius)).flatten();
@@ -44,7 +45,7 @@ pub(super) fn collide(own: &Outline, side: Side, other: &Outline, radius: f32, c
         let may = match joint {
             Joint::Open(limit) => {
                 let other_side = is_before || dot(center - end, limit) >= 0.0;
-                other_side && is_between(normal, [n, limit], if other.corners().len() == 1 { 0.0 } else { SAME })
+                other_side && is_between(normal, [n, limit], if other.count() == 1 { 0.0 } else { SAME })
             }
             Joint::Closed => false,
         };
@@ -53,7 +54,7 @@ pub(super) fn collide(own: &Outline, side: Side, other: &Outline, radius: f32, c
         if (may || is_far) && best.is_none_or(|(least, _)| distance < least) {
             let separation = distance - radius;
             let anchor = end + normal * (0.5 * separation);
-            let feature = if other.corners().len() == 1 { 0 } else { 1 << 8 | number };
+            let feature = if other.count() == 1 { 0 } else { 1 << 8 | number };
             best = Some((distance, Manifold::single(normal, anchor, separation, feature)));
         }
     }
@@ -70,9 +71,10 @@ pub(super) fn collide(own: &Outline, side: Side, other: &Outline, radius: f32, c
 }
 
 /// Along the segment's own normal, as far as the piece is over it.
-fn against_face(own: &Outline, n: Vec2, other: &Outline, radius: f32) -> Option<Manifold> {
-    let &[to, from, ..] = own.corners() else { return None };
-    if let [point] = *other.corners() {
+fn against_face(own: &Convex, n: Vec2, other: &Convex, radius: f32) -> Option<Manifold> {
+    let [to, from] = own.edge(0);
+    if other.count() == 1 {
+        let point = other.corner(0);
         let (along, height) = (dot(point - from, to - from), dot(point - from, n));
         let square = dot(to - from, to - from);
         let is_over = (-BEYOND * square..=(1.0 + BEYOND) * square).contains(&along);

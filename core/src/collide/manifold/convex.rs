@@ -6,110 +6,10 @@
 
 use super::box_box::PREFERENCE;
 use super::{Manifold, ManifoldPoint, chain};
+use crate::model::convex::Convex;
 use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::Piece;
-use crate::model::shape::MOST_CORNERS;
 use glam::Vec2;
-
-/// A polygon seen from somewhere.
-#[derive(Clone, Copy)]
-pub(super) struct Outline {
-    corners: [Vec2; MOST_CORNERS],
-    normals: [Vec2; MOST_CORNERS],
-    count: usize,
-}
-
-impl Outline {
-    pub(super) fn of(piece: &Piece) -> Self {
-        Self::seen(piece, Rot::IDENTITY, Vec2::ZERO)
-    }
-
-    pub(super) fn seen(piece: &Piece, turn: Rot, offset: Vec2) -> Self {
-        let mut seen = Self {
-            corners: [Vec2::ZERO; MOST_CORNERS],
-            normals: [Vec2::ZERO; MOST_CORNERS],
-            count: piece.corners().len(),
-        };
-        for (to, &from) in seen.corners.iter_mut().zip(piece.corners()) {
-            *to = offset + turn.rotate(from);
-        }
-        for (to, &from) in seen.normals.iter_mut().zip(piece.normals()) {
-            *to = turn.rotate(from);
-        }
-        seen
-    }
-
-    pub(super) fn corners(&self) -> &[Vec2] {
-        &self.corners[..self.count]
-    }
-
-    fn normals(&self) -> &[Vec2] {
-        &self.normals[..self.count]
-    }
-
-    /// The ends of the edge that begins at a corner.
-    pub(super) fn edge(&self, number: usize) -> [Vec2; 2] {
-        [self.corners[number], self.corners[(number + 1) % self.count]]
-    }
-
-    /// The face along which another lies furthest out, and how far.
-    fn separate(&self, other: &Self) -> (usize, f32) {
-        let mut most = (0, f32::NEG_INFINITY);
-        for (face, (&corner, &normal)) in self.corners().iter().zip(self.normals()).enumerate() {
-            let least = other.corners().iter().fold(f32::INFINITY, |least, &at| min(dot(at - corner, normal), least));
-            if least > most.1 {
-                most = (face, least);
-            }
-        }
-        most
-    }
-
-    /// The edge that looks most against a normal.
-    pub(super) fn against(&self, normal: Vec2) -> usize {
-        let mut most = (0, f32::INFINITY);
-        for (edge, &own) in self.normals().iter().enumerate() {
-            let along = dot(own, normal);
-            if along < most.1 {
-                most = (edge, along);
-            }
-        }
-        most.0
-    }
-
-    /// Its point nearest to another, or if that is inside the nearest way out: direction from here to there, distance, and where on
-    /// the outline: twice the number of an edge or corner, one more for a corner.
-    pub(super) fn nearest(&self, point: Vec2) -> (Vec2, f32, u32) {
-        if self.count == 1 {
-            let away = point - self.corners[0];
-            let distance = dot(away, away).sqrt();
-            // Discs upon one another part along an axis: any direction will do, if it is always the same.
-            let normal = if distance > 0.0 { away / distance } else { Vec2::Y };
-            return (normal, distance, 1);
-        }
-        let mut most = (0, f32::NEG_INFINITY);
-        for (face, (&corner, &normal)) in self.corners().iter().zip(self.normals()).enumerate() {
-            let distance = dot(point - corner, normal);
-            if distance > most.1 {
-                most = (face, distance);
-            }
-        }
-        let (face, height) = most;
-        let (normal, [from, to]) = (self.normals[face], self.edge(face));
-        if height <= 0.0 {
-            return (normal, height, 2 * face as u32);
-        }
-        let corner = if dot(point - from, to - from) <= 0.0 {
-            face
-        } else if dot(point - to, to - from) >= 0.0 {
-            (face + 1) % self.count
-        } else {
-            return (normal, height, 2 * face as u32);
-        };
-        let away = point - self.corners[corner];
-        let distance = dot(away, away).sqrt();
-        (if distance > 0.0 { away / distance } else { normal }, distance, 2 * corner as u32 + 1)
-    }
-}
 
 /// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none.
 #[inline(never)]
@@ -119,11 +19,11 @@ pub(in crate::collide) fn collide([a, b]: [&Piece; 2], [rot_a, rot_b]: [Rot; 2],
         return back.swapped(offset);
     }
     let (turn, seen) = (rot_a.to(rot_b), rot_a.unrotate(offset));
-    let (own, other) = (Outline::of(a), Outline::seen(b, turn, seen));
+    let (own, other) = (&a.outline, &b.outline.seen(turn, seen));
     let radii = [a.radius, b.radius];
     let mut manifold = match a.side {
-        Some(side) => chain::collide(&own, side, &other, b.radius, turn.rotate(b.center) + seen),
-        None => polygons(&own, &other, radii, reach),
+        Some(side) => chain::collide(own, side, other, b.radius, turn.rotate(b.center) + seen),
+        None => polygons(own, other, radii, reach),
     };
     manifold.normal = rot_a.rotate(manifold.normal);
     for point in &mut manifold.points[..manifold.count] {
@@ -132,18 +32,22 @@ pub(in crate::collide) fn collide([a, b]: [&Piece; 2], [rot_a, rot_b]: [Rot; 2],
     manifold
 }
 
-fn polygons(a: &Outline, b: &Outline, [radius_a, radius_b]: [f32; 2], reach: f32) -> Manifold {
-    if b.count == 1 {
-        let (normal, distance, _) = a.nearest(b.corners[0]);
-        return of_point(b.corners[0] - normal * distance, normal, distance, [radius_a, radius_b], 0);
+fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) -> Manifold {
+    if b.count() == 1 {
+        let (normal, distance, _) = a.nearest(b.corner(0));
+        return of_point(b.corner(0) - normal * distance, normal, distance, [radius_a, radius_b], 0);
     }
-    if a.count == 1 {
-        let (normal, distance, _) = b.nearest(a.corners[0]);
-        return of_point(a.corners[0], -normal, distance, [radius_a, radius_b], 0);
+    if a.count() == 1 {
+        let (normal, distance, _) = b.nearest(a.corner(0));
+        return of_point(a.corner(0), -normal, distance, [radius_a, radius_b], 0);
     }
-    let ((face_a, most_a), (face_b, most_b)) = (a.separate(b), b.separate(a));
     let rounding = radius_a + radius_b;
-    if most_a - rounding > reach || most_b - rounding > reach {
+    let (face_a, most_a) = a.separate(b);
+    if most_a - rounding > reach {
+        return Manifold::EMPTY;
+    }
+    let (face_b, most_b) = b.separate(a);
+    if most_b - rounding > reach {
         return Manifold::EMPTY;
     }
     let found = if most_b > most_a + PREFERENCE {
@@ -162,19 +66,19 @@ fn of_point(on_a: Vec2, normal: Vec2, distance: f32, [radius_a, radius_b]: [f32;
 
 /// What is between a face and the edge of the other that looks most against it, if that is over the face.
 fn against_face(
-    reference: &Outline,
+    reference: &Convex,
     face: usize,
-    other: &Outline,
+    other: &Convex,
     height: f32,
     radii: [f32; 2],
     features: u32,
 ) -> Option<Manifold> {
-    let edge = other.against(reference.normals[face]);
+    let edge = other.against(reference.normal(face));
     let features = features | (face as u32) << 4 | (edge as u32) << 1;
-    let manifold = clip(reference.edge(face), reference.normals[face], other.edge(edge), radii, features);
+    let manifold = clip(reference.edge(face), reference.normal(face), other.edge(edge), radii, features);
     // An end of a line has no width: those that overlap part there nevertheless.
     if manifold.is_none() && height <= 0.0 {
-        let n = reference.normals[face];
+        let n = reference.normal(face);
         let ([corner, next], [from, to]) = (reference.edge(face), other.edge(edge));
         let deepest = if dot(to - from, n) < 0.0 { to } else { from };
         let on_face = if corner == next { corner } else { deepest - n * height };
@@ -234,15 +138,15 @@ fn gap(corner: Vec2, ends: [Vec2; 2]) -> (f32, bool) {
 
 /// The nearest points of two polygons that are apart: at a corner of one of them.
 #[cold]
-fn corners(a: &Outline, b: &Outline, radii: [f32; 2]) -> Manifold {
+fn corners(a: &Convex, b: &Convex, radii: [f32; 2]) -> Manifold {
     let mut least = (f32::INFINITY, Vec2::Y, Vec2::ZERO, 0);
-    for (corner, &point) in b.corners().iter().enumerate() {
+    for (corner, point) in b.corners().enumerate() {
         let (normal, distance, at) = a.nearest(point);
         if distance < least.0 {
             least = (distance, normal, point - normal * distance, 1 << 8 | at << 3 | corner as u32);
         }
     }
-    for (corner, &point) in a.corners().iter().enumerate() {
+    for (corner, point) in a.corners().enumerate() {
         let (normal, distance, at) = b.nearest(point);
         if distance < least.0 {
             least = (distance, -normal, point, 1 << 9 | at << 3 | corner as u32);

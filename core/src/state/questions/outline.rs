@@ -65,7 +65,7 @@ impl Outline {
 
     /// Half extents of an upright rectangle around the center of the body that holds a piece of it.
     fn extent(&self, piece: &Piece) -> DVec2 {
-        let corners = piece.corners().iter().map(|corner| self.rotate(corner.as_dvec2()).abs());
+        let corners = piece.outline.corners().map(|corner| self.rotate(corner.as_dvec2()).abs());
         corners.fold(DVec2::ZERO, DVec2::max) + f64::from(piece.radius)
     }
 

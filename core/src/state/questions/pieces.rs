@@ -5,20 +5,19 @@ use glam::DVec2;
 
 /// The edges of a piece, each with its normal.
 fn edges(piece: &Piece) -> impl Iterator<Item = (DVec2, DVec2, DVec2)> + '_ {
-    let corners = piece.corners();
-    let next = corners.iter().cycle().skip(1);
-    let edges = corners.iter().zip(next).zip(piece.normals());
+    let corners = piece.outline.corners();
+    let edges = corners.clone().zip(corners.cycle().skip(1)).zip(piece.outline.normals());
     edges.map(|((from, to), normal)| (from.as_dvec2(), to.as_dvec2(), normal.as_dvec2()))
 }
 
 fn corners(piece: &Piece) -> impl Iterator<Item = DVec2> + '_ {
-    piece.corners().iter().map(|corner| corner.as_dvec2())
+    piece.outline.corners().map(|corner| corner.as_dvec2())
 }
 
 /// Whether a point is in it or on it.
 pub(super) fn holds(piece: &Piece, point: DVec2) -> bool {
     let radius = f64::from(piece.radius);
-    let is_within = piece.corners().len() > 2 && edges(piece).all(|(from, _, normal)| normal.dot(point - from) <= 0.0);
+    let is_within = piece.outline.count() > 2 && edges(piece).all(|(from, _, normal)| normal.dot(point - from) <= 0.0);
     is_within || radius > 0.0 && edges(piece).any(|(from, to, _)| distance(point, from, to) <= radius)
 }
 
@@ -34,7 +33,7 @@ pub(super) fn meets(piece: &Piece, other: &[DVec2]) -> bool {
 /// Where a line from outside enters it, and the normal there. A segment is entered from its free side only.
 pub(super) fn enter(piece: &Piece, start: DVec2, along: DVec2) -> Option<(f64, DVec2)> {
     let radius = f64::from(piece.radius);
-    let free = if piece.side.is_some() { 1 } else { piece.corners().len() };
+    let free = if piece.side.is_some() { 1 } else { piece.outline.count() };
     let faces = edges(piece).take(free).filter_map(|(from, to, normal)| {
         let (speed, edge) = (normal.dot(along), to - from);
         if speed >= 0.0 {

@@ -1,0 +1,72 @@
+//! Upright rectangles around the convex pieces of bodies, by which most pairs of pieces are seen to be apart.
+
+use crate::model::math::{Rot, max};
+use crate::model::piece::Piece;
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+use glam::Vec2;
+
+/// Low and high corner of a rectangle, from the center of the body, in meters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PieceBox {
+    low: Vec2,
+    high: Vec2,
+}
+
+impl PieceBox {
+    #[inline(always)]
+    fn new(piece: &Piece, rotation: Rot) -> Self {
+        let [low, high] = piece.outline.bounds(rotation);
+        Self { low: low - piece.radius, high: high + piece.radius }
+    }
+
+    /// Whether another, of a body at `offset` from this one's, is nearer than so far along both axes.
+    #[inline(always)]
+    pub(super) fn is_near(&self, other: &Self, offset: Vec2, near: f32) -> bool {
+        let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
+        // Where a speed is not a number nothing is known.
+        !(max(gap.x, gap.y) > near)
+    }
+}
+
+/// Those of the bodies of a tile that are made of several pieces.
+#[derive(Default, Debug)]
+pub(super) struct PieceBoxes {
+    /// For each body of the tile where its own begin; and their end.
+    start: Vec<u32>,
+    boxes: Vec<PieceBox>,
+}
+
+impl PieceBoxes {
+    /// Places them around the bodies of several pieces as they are now, if there are any.
+    pub(super) fn place(&mut self, tile: &Tile, setup: &Setup) {
+        self.start.clear();
+        self.boxes.clear();
+        if !setup.compounds {
+            return;
+        }
+        for (&kind, &rotation) in tile.bodies.kind.iter().zip(&tile.bodies.rotation) {
+            self.start.push(self.boxes.len() as u32);
+            if let all @ [_, _, ..] = &setup.kind(kind).pieces[..] {
+                self.boxes.extend(all.iter().map(|piece| PieceBox::new(piece, rotation)));
+            }
+        }
+        self.start.push(self.boxes.len() as u32);
+    }
+
+    /// Those of a body, in the order of its pieces; `only` is room for that of a body that has one.
+    #[inline(always)]
+    pub(super) fn of<'a>(
+        &'a self,
+        body: u32,
+        tile: &Tile,
+        setup: &Setup,
+        only: &'a mut Option<PieceBox>,
+    ) -> &'a [PieceBox] {
+        let body = body as usize;
+        match &setup.kind(tile.bodies.kind[body]).pieces[..] {
+            [piece] => std::slice::from_ref(only.insert(PieceBox::new(piece, tile.bodies.rotation[body]))),
+            _ => &self.boxes[self.start[body] as usize..self.start[body + 1] as usize],
+        }
+    }
+}
