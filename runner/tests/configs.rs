@@ -16,9 +16,11 @@ fn files() -> Vec<PathBuf> {
 fn each_runs_a_step_at_a_small_size() {
     for path in files() {
         let config = Config::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        // Large worlds, but for two that show a handful of boxes, two that are as Box2D's benchmarks have them, and the zoo.
-        let few = ["stack.toml", "slope.toml", "large_pyramid.toml", "smash.toml", "zoo.toml"];
-        let few = few.iter().any(|name| path.ends_with(name));
+        // Large worlds, but for two that show a handful of boxes, those that are as Box2D's benchmarks have them, and the zoo.
+        let box2d =
+            ["large_pyramid.toml", "smash.toml", "compounds.toml", "junkyard.toml", "washer.toml", "tumbler.toml"];
+        let mut few = ["stack.toml", "slope.toml", "zoo.toml"].iter().chain(&box2d);
+        let few = few.any(|name| path.ends_with(name));
         assert_eq!(config.scene.bodies < 20_000, few, "{}", path.display());
         let text = std::fs::read_to_string(&path).unwrap();
         let config = Config::from_toml_str("small", &text, &[("bodies", "300"), ("steps", "1")]).unwrap();
@@ -40,6 +42,17 @@ fn the_worlds_in_files_run_too() {
         run += 1;
     }
     assert!(run > 0);
+}
+
+#[test]
+fn so_do_the_worlds_of_each_shape() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/worlds/shapes");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let config = Config::load(&path, &[Override::set("steps", "200"), Override::set("tiles", "2x1")]).unwrap();
+        let summary = atoll::run(&config).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!((summary.bodies_lost, summary.escaped), (0, 0), "{}", path.display());
+    }
 }
 
 #[test]

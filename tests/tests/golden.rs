@@ -23,6 +23,8 @@ type Overrides = &'static [(&'static str, &'static str)];
 
 /// Every configuration, small.
 const CONFIGS: &[(&str, Overrides)] = &[
+    ("compounds", &[("bodies", "300"), ("steps", "200"), ("tiles", "3x4")]),
+    ("junkyard", &[("bodies", "1200"), ("steps", "200"), ("tiles", "5x2")]),
     ("large_pyramid", &[("bodies", "820"), ("base", "40"), ("steps", "60")]),
     ("normal", &[("bodies", "4000"), ("steps", "120")]),
     ("pile", &[("bodies", "1500"), ("steps", "120")]),
@@ -35,6 +37,8 @@ const CONFIGS: &[(&str, Overrides)] = &[
     ("smash", &[("bodies", "2000"), ("steps", "120")]),
     ("sparse", &[("bodies", "4000"), ("steps", "100")]),
     ("stack", &[("steps", "120"), ("tiles", "2x2")]),
+    ("tumbler", &[("bodies", "1000"), ("steps", "150"), ("tiles", "2x2")]),
+    ("washer", &[("bodies", "1800"), ("steps", "150"), ("tiles", "3x3")]),
     ("zoo", &[("bodies", "700"), ("steps", "150"), ("tiles", "5x2")]),
 ];
 

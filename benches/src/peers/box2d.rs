@@ -4,6 +4,7 @@ use super::given::{Corners, Given};
 use super::{Failure, Simulation};
 use ::atoll_core::{Body, Kind, Material, Params, Rot, Shape, StaticBody};
 use boxdd_sys::ffi;
+use glam::Vec2;
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -56,8 +57,12 @@ pub struct Worlds<'a, W> {
     given: &'a W,
     /// In the order of the ids, whatever the world.
     bodies: Vec<ffi::b2BodyId>,
+    /// What moves on a path.
+    driven: Vec<(ffi::b2BodyId, &'a StaticBody)>,
     dt: f32,
     substeps: c_int,
+    /// Steps made.
+    step: u64,
 }
 
 /// The rooms, with the number of their bodies.
@@ -105,14 +110,17 @@ impl<'a, W: Given> Worlds<'a, W> {
             worlds: Vec::new(),
             given,
             bodies: Vec::with_capacity(rooms.iter().map(|(_, bodies)| bodies).sum()),
+            driven: Vec::new(),
             dt: params.dt,
             substeps: params.substeps as c_int,
+            step: 0,
         };
         for (room, _) in &rooms {
             let world = create_world(params, threads)?;
             worlds.worlds.push(world);
             for fixed in blueprint.statics.iter().filter(|fixed| rooms.len() == 1 || stands_in(room, fixed)) {
-                create_static(world, fixed);
+                let body = create_static(world, fixed);
+                worlds.driven.extend(fixed.path.map(|_| (body, fixed)));
             }
         }
         for (index, body) in (0..).zip(given.bodies()) {
@@ -151,14 +159,19 @@ fn create_world(params: &Params, threads: usize) -> Result<ffi::b2WorldId, Failu
 
 static CREATION: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
-fn create_static(world: ffi::b2WorldId, fixed: &StaticBody) {
+fn create_static(world: ffi::b2WorldId, fixed: &StaticBody) -> ffi::b2BodyId {
     let place = fixed.position.as_vec2();
     // SAFETY: as in `create_world`, and the world exists.
     unsafe {
         let mut def = ffi::b2DefaultBodyDef();
         def.position = ffi::b2Vec2 { x: place.x, y: place.y };
         def.rotation = ffi::b2Rot { c: fixed.rotation.c, s: fixed.rotation.s };
-        create_shape(ffi::b2CreateBody(world, &def), &fixed.kind);
+        if fixed.path.is_some() {
+            def.type_ = ffi::b2BodyType_b2_kinematicBody;
+        }
+        let id = ffi::b2CreateBody(world, &def);
+        create_shapes(id, &fixed.kind);
+        id
     }
 }
 
@@ -176,13 +189,13 @@ fn create_dynamic(world: ffi::b2WorldId, body: &Body, kind: &Kind, params: &Para
         def.angularDamping = params.angular_damping;
         def.enableSleep = false;
         let id = ffi::b2CreateBody(world, &def);
-        create_shape(id, kind);
+        create_shapes(id, kind);
         id
     }
 }
 
-/// Gives a body that exists its shape.
-fn create_shape(body: ffi::b2BodyId, kind: &Kind) {
+/// Gives a body that exists its shapes.
+fn create_shapes(body: ffi::b2BodyId, kind: &Kind) {
     let Material { density, friction, restitution, .. } = kind.material;
     // SAFETY: the callers just created the body; definition and outline are copied.
     unsafe {
@@ -198,13 +211,40 @@ fn create_shape(body: ffi::b2BodyId, kind: &Kind) {
             Shape::Box { half } => {
                 ffi::b2CreatePolygonShape(body, &def, &ffi::b2MakeBox(half.x, half.y));
             }
-            _ => unreachable!("no scene that is made has other shapes"),
+            ref shape => {
+                for (corners, radius) in shape.outlines() {
+                    let corners: Vec<ffi::b2Vec2> = corners.iter().map(|&Vec2 { x, y }| ffi::b2Vec2 { x, y }).collect();
+                    match corners[..] {
+                        [center] => {
+                            ffi::b2CreateCircleShape(body, &def, &ffi::b2Circle { center, radius });
+                        }
+                        [center1, center2] => {
+                            ffi::b2CreateCapsuleShape(body, &def, &ffi::b2Capsule { center1, center2, radius });
+                        }
+                        _ => {
+                            let hull = ffi::b2ComputeHull(corners.as_ptr(), corners.len() as c_int);
+                            ffi::b2CreatePolygonShape(body, &def, &ffi::b2MakePolygon(&hull, radius));
+                        }
+                    }
+                }
+            }
         }
     }
 }
 
 impl<W: Given> Simulation for Worlds<'_, W> {
     fn step(&mut self) -> Result<(), String> {
+        self.step += 1;
+        for &(body, fixed) in &self.driven {
+            let (place, turned) = fixed.pose(self.step, self.dt);
+            let place = place.as_vec2();
+            let target = ffi::b2WorldTransform {
+                p: ffi::b2Vec2 { x: place.x, y: place.y },
+                q: ffi::b2Rot { c: turned.c, s: turned.s },
+            };
+            // SAFETY: as in `mass`.
+            unsafe { ffi::b2Body_SetTargetTransform(body, target, self.dt, true) };
+        }
         for &world in &self.worlds {
             // SAFETY: the world is ours and lives until the drop; nothing else touches it meanwhile.
             unsafe { ffi::b2World_Step(world, self.dt, self.substeps) };

@@ -24,13 +24,23 @@ pub enum SceneName {
     LargePyramid,
     /// A wall of boxes, and a large one that flies into it.
     Smash,
+    /// Bodies of two triangles fall into a basin.
+    Compounds,
+    /// Pentagons in a basin, and a box that goes to and fro among them.
+    Junkyard,
+    /// Boxes in a round drum that turns.
+    Washer,
+    /// Boxes in a square drum that turns.
+    Tumbler,
 }
 
 impl SceneName {
     fn steps(self) -> u64 {
         match self {
             Self::Pile => 600,
-            Self::LargePyramid => 500,
+            Self::LargePyramid | Self::Compounds | Self::Washer => 500,
+            Self::Junkyard => 800,
+            Self::Tumbler => 750,
             Self::Smash => 300,
             _ => 200,
         }
@@ -51,6 +61,10 @@ impl fmt::Display for SceneName {
             Self::Pyramids => "pyramids",
             Self::LargePyramid => "large_pyramid",
             Self::Smash => "smash",
+            Self::Compounds => "compounds",
+            Self::Junkyard => "junkyard",
+            Self::Washer => "washer",
+            Self::Tumbler => "tumbler",
         })
     }
 }

@@ -35,7 +35,13 @@ pub fn measure(case: &Case, bodies: &[Body]) -> Result<Quality, Failure> {
         return Err(Failure::broken(message));
     }
     let tiles: Vec<TileId> = (0..blueprint.partition.tiles() as u32).map(TileId).collect();
-    let mut world = World::new(blueprint, &tiles).map_err(Failure::broken)?;
+    // What moved on a path stands where it has come to.
+    let mut blueprint = blueprint.clone();
+    for fixed in &mut blueprint.statics {
+        (fixed.position, fixed.rotation) = fixed.pose(case.steps, blueprint.params.dt);
+        fixed.path = None;
+    }
+    let mut world = World::new(&blueprint, &tiles).map_err(Failure::broken)?;
     for &body in bodies {
         world.add(body).map_err(|error| Failure::broken(format!("at the end: {error}")))?;
     }

@@ -2,11 +2,12 @@
 
 use super::Simulation;
 use super::given::Given;
-use ::atoll_core::{Body, Kind, Params, Rot, Shape};
+use ::atoll_core::{Body, Kind, Params, Rot, Shape, StaticBody};
+use glam::Vec2;
 use rapier2d::dynamics::SpringCoefficients;
 use rapier2d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
-    Vector,
+    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, Pose, RigidBodyBuilder,
+    RigidBodyHandle, SharedShape, Vector,
 };
 
 /// The version of rapier2d.
@@ -20,6 +21,10 @@ pub struct Simulated<'a, W> {
     given: &'a W,
     /// In the order of the ids.
     handles: Vec<RigidBodyHandle>,
+    /// What moves on a path.
+    driven: Vec<(RigidBodyHandle, &'a StaticBody)>,
+    /// Steps made.
+    step: u64,
 }
 
 impl<'a, W: Given> Simulated<'a, W> {
@@ -30,11 +35,15 @@ impl<'a, W: Given> Simulated<'a, W> {
         let gravity = Vector::new(params.gravity.x, params.gravity.y);
         let integration_parameters = integration_parameters(params);
         let mut world = PhysicsWorld { gravity, integration_parameters, ..PhysicsWorld::default() };
+        let mut driven = Vec::new();
         for fixed in &blueprint.statics {
-            let body = RigidBodyBuilder::fixed()
+            let body =
+                fixed.path.map_or_else(RigidBodyBuilder::fixed, |_| RigidBodyBuilder::kinematic_position_based());
+            let body = body
                 .translation(Vector::new(fixed.position.x as f32, fixed.position.y as f32))
                 .rotation(fixed.rotation.angle());
-            world.insert(body, collider(&fixed.kind));
+            let (handle, _) = world.insert(body, collider(&fixed.kind));
+            driven.extend(fixed.path.map(|_| (handle, fixed)));
         }
         let place = |body: Body| {
             let dynamic = RigidBodyBuilder::dynamic()
@@ -49,7 +58,7 @@ impl<'a, W: Given> Simulated<'a, W> {
             world.insert(dynamic, collider(&blueprint.kinds[body.kind.0 as usize])).0
         };
         let handles = given.bodies().map(place).collect();
-        Self { world, given, handles }
+        Self { world, given, handles, driven, step: 0 }
     }
 }
 
@@ -71,7 +80,13 @@ fn collider(kind: &Kind) -> ColliderBuilder {
     let shape = match kind.shape {
         Shape::Circle { radius } => ColliderBuilder::ball(radius),
         Shape::Box { half } => ColliderBuilder::cuboid(half.x, half.y),
-        _ => unreachable!("no scene that is made has other shapes"),
+        ref shape => {
+            let mut parts: Vec<(Pose, SharedShape)> = shape.outlines().iter().map(part).collect();
+            match parts.pop() {
+                Some((pose, only)) if parts.is_empty() => ColliderBuilder::new(only).position(pose),
+                last => ColliderBuilder::compound(parts.into_iter().chain(last).collect()),
+            }
+        }
     };
     shape
         .density(kind.material.density)
@@ -81,8 +96,28 @@ fn collider(kind: &Kind) -> ColliderBuilder {
         .restitution_combine_rule(CoefficientCombineRule::Max)
 }
 
+/// One of the outlines of a shape, at its place.
+fn part((corners, radius): &(Vec<Vec2>, f32)) -> (Pose, SharedShape) {
+    let corners: Vec<Vector> = corners.iter().map(|corner| Vector::new(corner.x, corner.y)).collect();
+    match corners[..] {
+        [center] => (Pose::from_translation(center), SharedShape::ball(*radius)),
+        [from, to] => (Pose::IDENTITY, SharedShape::capsule(from, to, *radius)),
+        _ => {
+            let hull = SharedShape::round_convex_hull(&corners, *radius);
+            let hull = if *radius > 0.0 { hull } else { SharedShape::convex_hull(&corners) };
+            (Pose::IDENTITY, hull.expect("corners of a polygon"))
+        }
+    }
+}
+
 impl<W: Given> Simulation for Simulated<'_, W> {
     fn step(&mut self) -> Result<(), String> {
+        self.step += 1;
+        for &(handle, fixed) in &self.driven {
+            let (place, turned) = fixed.pose(self.step, self.world.integration_parameters.dt);
+            let pose = Pose::new(Vector::new(place.x as f32, place.y as f32), turned.angle());
+            self.world.bodies[handle].set_next_kinematic_position(pose);
+        }
         self.world.step();
         Ok(())
     }

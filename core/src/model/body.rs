@@ -60,6 +60,11 @@ impl StaticBody {
     pub fn new(id: GlobalId, kind: Kind, position: DVec2) -> Self {
         Self { id, position, rotation: Rot::IDENTITY, kind, path: None }
     }
+
+    /// Where it is and how it is turned as a step begins; `dt` is the length of a step in seconds.
+    pub fn pose(&self, step: u64, dt: f32) -> (DVec2, Rot) {
+        self.path.map_or((self.position, self.rotation), |path| path.pose(self.position, self.rotation, step, dt))
+    }
 }
 
 /// Many bodies, a column for each field, all of one length.

@@ -8,8 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// What a scene may be called.
-const KINDS: &str =
-    r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "zoo", "slope" or "file""#;
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "compounds", "junkyard", "washer", "tumbler", "zoo", "slope" or "file""#;
 const ROOMS: &str = "[scene]\nkind = \"rooms\"\n";
 
 fn read(text: &str, overrides: &[(&str, &str)]) -> Result<Config, String> {

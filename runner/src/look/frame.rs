@@ -25,8 +25,10 @@ impl Setting {
     pub(crate) fn statics_at(&self, step: u64) -> impl Iterator<Item = Cow<'_, StaticBody>> {
         let dt = (1.0 / self.hertz) as f32;
         self.statics.iter().map(move |fixed| {
-            let Some(path) = &fixed.path else { return Cow::Borrowed(fixed) };
-            let (position, rotation) = path.pose(fixed.position, fixed.rotation, step, dt);
+            if fixed.path.is_none() {
+                return Cow::Borrowed(fixed);
+            }
+            let (position, rotation) = fixed.pose(step, dt);
             Cow::Owned(StaticBody { position, rotation, ..fixed.clone() })
         })
     }

@@ -1,7 +1,8 @@
 //! Which scenes there are, and what is usual for each.
 
 use super::file::SceneFile;
-use super::{SceneError, rooms, sparse};
+use super::yards::Yard;
+use super::{SceneError, compounds, junkyard, rooms, sparse, tumbler, washer};
 use atoll_core::{Exchange, Params};
 use glam::Vec2;
 use std::fmt;
@@ -45,6 +46,14 @@ pub enum SceneKind {
     Stack,
     /// A wall of boxes, and a large one that flies into it.
     Smash,
+    /// Bodies of two triangles fall into a basin.
+    Compounds,
+    /// Pentagons in a basin, and a box that goes to and fro among them.
+    Junkyard,
+    /// Boxes in a round drum that turns.
+    Washer,
+    /// Boxes in a square drum that turns.
+    Tumbler,
     /// All shapes, and what moves them.
     Zoo,
     /// Boxes on an incline.
@@ -134,7 +143,7 @@ impl SceneKind {
     pub(crate) const FILE: &str = "file";
 
     /// Every kind but files, with what is usual for what only it has.
-    pub const USUAL: [Self; 9] = [
+    pub const USUAL: [Self; 13] = [
         Self::Rooms { power: 1.0 },
         Self::Pile { jitter: 0.01 },
         Self::Pyramids { base: 10 },
@@ -142,6 +151,10 @@ impl SceneKind {
         Self::SingleIsland,
         Self::Stack,
         Self::Smash,
+        Self::Compounds,
+        Self::Junkyard,
+        Self::Washer,
+        Self::Tumbler,
         Self::Zoo,
         Self::Slope { angle: 25.0, friction: 0.6 },
     ];
@@ -156,6 +169,10 @@ impl SceneKind {
             Self::SingleIsland => "single-island",
             Self::Stack => "stack",
             Self::Smash => "smash",
+            Self::Compounds => "compounds",
+            Self::Junkyard => "junkyard",
+            Self::Washer => "washer",
+            Self::Tumbler => "tumbler",
             Self::Zoo => "zoo",
             Self::Slope { .. } => "slope",
             Self::File(_) => Self::FILE,
@@ -180,6 +197,10 @@ impl SceneKind {
             Self::Pyramids { .. } => 22_000,
             Self::Stack => 10,
             Self::Smash => 9601,
+            Self::Compounds => compounds::Compounds::BODIES,
+            Self::Junkyard => junkyard::Junkyard::BODIES,
+            Self::Washer => washer::Washer::BODIES,
+            Self::Tumbler => tumbler::Tumbler::BODIES,
             Self::Zoo => 1980,
             Self::Slope { .. } => 1,
             Self::File(spec) => spec.file.as_ref().map_or(0, |file| file.count()),
@@ -195,6 +216,10 @@ impl SceneKind {
             | Self::Pyramids { .. }
             | Self::SingleIsland
             | Self::Stack
+            | Self::Compounds
+            | Self::Junkyard
+            | Self::Washer
+            | Self::Tumbler
             | Self::Zoo
             | Self::Slope { .. } => {
                 Params { gravity: Vec2::new(0.0, -10.0), exchange: Exchange::Substep, ..Params::default() }

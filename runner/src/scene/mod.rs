@@ -5,9 +5,11 @@
 //! nothing depends on tiles, ranks or threads. To add a scene, implement `Layout` in a file of its own and name it in
 //! [`SceneKind`] and [`Scene::open`]. Or its bodies are read from files that a user wrote: `file/`.
 
+mod compounds;
 mod error;
 pub(crate) mod file;
 pub(crate) mod import;
+mod junkyard;
 mod kind;
 mod lattice;
 mod pile;
@@ -21,6 +23,9 @@ mod smash;
 mod sparse;
 mod stack;
 mod statics;
+mod tumbler;
+mod washer;
+mod yards;
 mod zoo;
 
 pub use error::{Place, SceneError};
@@ -97,6 +102,10 @@ impl Scene {
             SceneKind::SingleIsland => Box::new(single_island::SingleIsland::new(bodies)),
             SceneKind::Stack => Box::new(stack::Stack::new(bodies)),
             SceneKind::Smash => Box::new(smash::Smash::new(bodies)),
+            SceneKind::Compounds => Box::new(yards::Yards::<compounds::Compounds>::new(bodies)),
+            SceneKind::Junkyard => Box::new(yards::Yards::<junkyard::Junkyard>::new(bodies)),
+            SceneKind::Washer => Box::new(yards::Yards::<washer::Washer>::new(bodies)),
+            SceneKind::Tumbler => Box::new(yards::Yards::<tumbler::Tumbler>::new(bodies)),
             SceneKind::Zoo => Box::new(zoo::Zoo::new(bodies)),
             SceneKind::Slope { angle, friction } => Box::new(slope::Slope::new(bodies, angle, friction)),
             SceneKind::File(ref spec) => return Ok(Self { source: Source::Read(spec.file()?) }),

@@ -1,10 +1,10 @@
 //! What all scenes have in common.
 
 use super::*;
-use atoll_core::Rot;
+use atoll_core::{Part, Rot};
 
 /// Every kind of scene, and how many statics it has with 500 bodies.
-const KINDS: [(SceneKind, u64); 10] = [
+const KINDS: [(SceneKind, u64); 14] = [
     (SceneKind::Rooms { power: 1.2 }, 16),
     (SceneKind::Pile { jitter: 0.01 }, 3),
     (SceneKind::Pyramids { base: 10 }, 4),
@@ -13,6 +13,10 @@ const KINDS: [(SceneKind, u64); 10] = [
     (SceneKind::SingleIsland, 3),
     (SceneKind::Stack, 1),
     (SceneKind::Smash, 0),
+    (SceneKind::Compounds, 281),
+    (SceneKind::Junkyard, 262),
+    (SceneKind::Washer, 1),
+    (SceneKind::Tumbler, 1),
     (SceneKind::Zoo, 122),
     (SceneKind::Slope { angle: 35.0, friction: 0.5 }, 2),
 ];
@@ -91,8 +95,15 @@ fn nothing_starts_inside_anything_else() {
     for (kind, _) in &KINDS {
         let scene = scene(kind);
         let kinds = scene.kinds();
-        let placed = if *kind == SceneKind::Zoo { Placed::around } else { Placed::new };
-        let fixed = scene.statics().iter().map(|one| placed(one.position, one.rotation, &one.kind.shape));
+        let others = [SceneKind::Zoo, SceneKind::Compounds, SceneKind::Junkyard, SceneKind::Washer, SceneKind::Tumbler];
+        let placed = if others.contains(kind) { Placed::around } else { Placed::new };
+        let fixed = scene.statics().iter().flat_map(|one| match &one.kind.shape {
+            Shape::Compound(compound) => {
+                let part = |part: &Part| placed(one.position + part.position.as_dvec2(), part.rotation, &part.shape);
+                compound.parts().iter().map(part).collect()
+            }
+            shape => vec![placed(one.position, one.rotation, shape)],
+        });
         let fixed: Vec<Placed> = fixed.collect();
         let shape = |body: &Body| &kinds[body.kind.0 as usize].shape;
         let bodies: Vec<Placed> = scene.all().map(|body| placed(body.position, body.rotation, shape(&body))).collect();

@@ -4,6 +4,7 @@
 //! Yards stand side by side, each with as many bodies. Bodies take three draws each, in this order: kind, shift along x, angle.
 
 use super::random::SplitMix64;
+use super::yards::corners;
 use super::{Layout, statics};
 use atoll_core::{
     Body, Dynamics, Filter, GlobalId, Kind, KindId, Material, Part, Path, Rot, Segment, Shape, StaticBody, Travel,
@@ -184,16 +185,7 @@ impl Layout for Zoo {
     }
 
     fn extent(&self, first: u64, last: u64) -> (DVec2, DVec2) {
-        let yard = |index: u64| index / (COLUMNS * ROWS);
-        let row = |index: u64| index % (COLUMNS * ROWS) / COLUMNS;
-        let (mut low, mut high) = (Self::place(first), Self::place(last));
-        if yard(first) != yard(last) {
-            low = Self::place(yard(first) * COLUMNS * ROWS);
-            high = Self::place((yard(last) + 1) * COLUMNS * ROWS - 1);
-        } else if row(first) != row(last) {
-            low.x = Self::place(yard(first) * COLUMNS * ROWS).x;
-            high.x = Self::place(yard(first) * COLUMNS * ROWS + COLUMNS - 1).x;
-        }
+        let [low, high] = corners(first, last, COLUMNS * ROWS, COLUMNS).map(Self::place);
         (low - DVec2::X * SHIFT, high + DVec2::X * SHIFT)
     }
 }

@@ -51,7 +51,15 @@ fn check(config: &Config) {
         SceneKind::Pile { jitter } => assert!(jitter.is_finite() && jitter >= 0.0),
         SceneKind::Pyramids { base } => assert!(base >= 2),
         SceneKind::Slope { angle, friction } => assert!((0.0..90.0).contains(&angle) && friction >= 0.0),
-        SceneKind::Sparse | SceneKind::SingleIsland | SceneKind::Stack | SceneKind::Smash | SceneKind::Zoo => {}
+        SceneKind::Sparse
+        | SceneKind::SingleIsland
+        | SceneKind::Stack
+        | SceneKind::Smash
+        | SceneKind::Compounds
+        | SceneKind::Junkyard
+        | SceneKind::Washer
+        | SceneKind::Tumbler
+        | SceneKind::Zoo => {}
     }
     let tiles = run.tiles.unwrap_or([1, 1]);
     assert!(tiles.iter().all(|&count| count >= 1));

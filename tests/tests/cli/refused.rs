@@ -8,8 +8,7 @@ use std::fs;
 const ENDLESS: &str = "[scene]\nkind = \"rooms\"\nbodies = 5_000_000\n\n[run]\nsteps = 4_000_000_000\nranks = 2\n";
 
 /// What a scene may be called.
-const KINDS: &str =
-    r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "zoo", "slope" or "file""#;
+const KINDS: &str = r#""rooms", "pile", "pyramids", "sparse", "single-island", "stack", "smash", "compounds", "junkyard", "washer", "tumbler", "zoo", "slope" or "file""#;
 
 /// The endless world with some options, separated by spaces, is refused as bad input.
 #[track_caller]

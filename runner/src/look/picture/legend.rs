@@ -64,9 +64,9 @@ impl Legend {
             };
             rows.push((Sign::Square(colors::tile(0, 0)), count));
         }
-        rows.push(square(colors::STATIC, "never moves"));
-        if setting.statics.is_empty() {
-            rows.pop();
+        if !setting.statics.is_empty() {
+            let any_moves = setting.statics.iter().any(|fixed| fixed.path.is_some());
+            rows.push(square(colors::STATIC, if any_moves { "never moves, or on a path" } else { "never moves" }));
         }
         if layers.ghosts {
             rows.push((Sign::Ring(colors::GHOST), "ghost".to_owned()));
