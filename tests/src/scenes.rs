@@ -4,6 +4,13 @@ use crate::world::{Scene, noise};
 use atoll_core::{Material, Shape};
 use glam::{DVec2, Vec2};
 
+/// A box of some width and height, in meters, and the same given as a polygon: what holds for one holds for the other.
+pub fn boxes(width: f32, height: f32) -> [Shape; 2] {
+    let half = 0.5 * Vec2::new(width, height);
+    let corners = [-half, Vec2::new(half.x, -half.y), half, Vec2::new(-half.x, half.y)];
+    [Shape::rectangle(width, height), Shape::polygon(&corners, 0.0).expect("four corners")]
+}
+
 /// Boxes of 0.2 m, one upon the other, hardly out of line; tile borders cross in the middle of the stack.
 pub fn stack(boxes: u32) -> Scene {
     let mut scene = Scene::new(DVec2::new(0.0, 0.1 * f64::from(boxes)), -10.0);

@@ -2,6 +2,7 @@
 //! others, and whenever in the step surfaces touch.
 
 use atoll_core::{Body, Exchange, Material, Rot, Shape};
+use atoll_tests::scenes::boxes;
 use atoll_tests::world::{Cut, Scene, Sim};
 use glam::{DVec2, Vec2};
 
@@ -120,21 +121,23 @@ fn a_box_that_lands_on_a_corner_turns_about_it() {
         let impulse = Vec2::new(-velocity.x * yy + velocity.y * xy, -velocity.y * xx + velocity.x * xy) / determinant;
         assert!(impulse.x.abs() < 0.95 * FRICTION * impulse.y, "the corner is to hold: {degrees} {impulse}");
         let expected = f64::from(6.0 * arm.perp_dot(impulse));
-        let mut mean = 0.0;
-        for phase in 0..PHASES {
-            let mut scene = Scene::new(MIDDLE, 0.0);
-            scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, rough());
-            let kind = scene.kind(Shape::rectangle(1.0, 1.0), rough());
-            let gap = -velocity.y / 60.0 * (2.0 + phase as f32 / PHASES as f32);
-            let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(gap - arm.y)), velocity);
-            scene.last().rotation = rotation;
-            let mut sim = start(&scene);
-            sim.run(5);
-            let spin = sim.body(id).angular_velocity;
-            assert_near(&format!("{degrees} degrees"), phase, [spin.into(), expected], 2e-2);
-            mean += f64::from(spin) / f64::from(PHASES);
+        for shape in boxes(1.0, 1.0) {
+            let mut mean = 0.0;
+            for phase in 0..PHASES {
+                let mut scene = Scene::new(MIDDLE, 0.0);
+                scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, rough());
+                let kind = scene.kind(shape.clone(), rough());
+                let gap = -velocity.y / 60.0 * (2.0 + phase as f32 / PHASES as f32);
+                let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(gap - arm.y)), velocity);
+                scene.last().rotation = rotation;
+                let mut sim = start(&scene);
+                sim.run(5);
+                let spin = sim.body(id).angular_velocity;
+                assert_near(&format!("{degrees} degrees"), phase, [spin.into(), expected], 2e-2);
+                mean += f64::from(spin) / f64::from(PHASES);
+            }
+            assert_near(&format!("{degrees} degrees, mean"), PHASES, [mean, expected], 1e-2);
         }
-        assert_near(&format!("{degrees} degrees, mean"), PHASES, [mean, expected], 1e-2);
     }
 }
 
@@ -143,11 +146,7 @@ fn peak(shape: &Shape, restitution: f32, height: f64) -> f64 {
     let mut scene = Scene::new(MIDDLE, -10.0);
     scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, bouncy(0.0));
     let kind = scene.kind(shape.clone(), bouncy(restitution));
-    let half = match *shape {
-        Shape::Circle { radius } => radius,
-        Shape::Box { half } => half.y,
-        _ => panic!("no test has other shapes"),
-    };
+    let half = shape.half_extents(Rot::IDENTITY).y;
     let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(half) + height), Vec2::ZERO);
     let mut sim = start(&scene);
     let (mut rises, mut peak) = (false, 0.0);
@@ -168,7 +167,7 @@ fn peak(shape: &Shape, restitution: f32, height: f64) -> f64 {
 
 #[test]
 fn what_falls_flat_bounces_to_the_square_of_its_restitution() {
-    for shape in [Shape::circle(0.25), Shape::rectangle(0.5, 0.5), Shape::rectangle(1.5, 0.4)] {
+    for shape in [&[Shape::circle(0.25)][..], &boxes(0.5, 0.5), &boxes(1.5, 0.4)].concat() {
         for restitution in [0.5, 0.8, 1.0] {
             for phase in 0..PHASES {
                 let peak = peak(&shape, restitution, 5.0 + 0.17 * f64::from(phase) / f64::from(PHASES));
@@ -183,10 +182,9 @@ fn what_falls_flat_bounces_to_the_square_of_its_restitution() {
 #[test]
 fn what_slides_and_what_rolls_gains_the_speed_that_theory_gives() {
     let (slides, rolls) = (30.0_f32.to_radians(), 20.0_f32.to_radians());
-    for (angle, friction, shape, expected) in [
-        (slides, 0.3, Shape::rectangle(1.0, 1.0), 10.0 * (slides.sin() - 0.3 * slides.cos())),
-        (rolls, FRICTION, Shape::circle(0.5), 10.0 * rolls.sin() / 1.5),
-    ] {
+    let slide = |shape| (slides, 0.3, shape, 10.0 * (slides.sin() - 0.3 * slides.cos()));
+    let roll = (rolls, FRICTION, Shape::circle(0.5), 10.0 * rolls.sin() / 1.5);
+    for (angle, friction, shape, expected) in boxes(1.0, 1.0).map(slide).into_iter().chain([roll]) {
         for phase in 0..PHASES {
             let mut scene = Scene::new(MIDDLE, -10.0);
             let turn = Rot::from_angle(-angle);

@@ -82,26 +82,29 @@ fn a_box_slides_if_the_slope_is_steeper_than_friction_holds() {
     for friction in [0.2_f32, 0.6] {
         for steeper in [0.95_f32, 1.05] {
             let angle = (steeper * friction).atan();
-            let (scene, id) = on_a_slope(angle, friction, Shape::rectangle(1.0, 0.5), 0.25);
-            compare(&scene, &EXACT_WAYS, 120, |sim, _, way| {
-                let moved = (sim.body(id).position - MIDDLE).length();
-                if steeper < 1.0 {
-                    assert!(moved < 0.005, "{way:?}: moved {moved} m on a slope that friction {friction} holds");
-                } else {
-                    // a = g (sin - friction cos), for two seconds.
-                    let expected = f64::from(0.5 * 10.0 * (angle.sin() - friction * angle.cos()) * 4.0);
-                    assert!((moved / expected - 1.0).abs() < 0.05, "{way:?}: slid {moved} m, not {expected}");
-                    assert!((sim.body(id).rotation.angle() + angle).abs() < 0.01, "{way:?}: it turned");
-                }
-            });
+            for shape in scenes::boxes(1.0, 0.5) {
+                let (scene, id) = on_a_slope(angle, friction, shape, 0.25);
+                compare(&scene, &EXACT_WAYS, 120, |sim, _, way| {
+                    let moved = (sim.body(id).position - MIDDLE).length();
+                    if steeper < 1.0 {
+                        assert!(moved < 0.005, "{way:?}: moved {moved} m on a slope that friction {friction} holds");
+                    } else {
+                        // a = g (sin - friction cos), for two seconds.
+                        let expected = f64::from(0.5 * 10.0 * (angle.sin() - friction * angle.cos()) * 4.0);
+                        assert!((moved / expected - 1.0).abs() < 0.05, "{way:?}: slid {moved} m, not {expected}");
+                        assert!((sim.body(id).rotation.angle() + angle).abs() < 0.01, "{way:?}: it turned");
+                    }
+                });
+            }
         }
     }
 }
 
 #[test]
 fn a_stack_of_ten_boxes_stands() {
-    let scene = scenes::stack(10);
-    for way in EXACT_WAYS {
+    for (way, shape) in EXACT_WAYS.into_iter().flat_map(|way| scenes::boxes(0.2, 0.2).map(|shape| (way, shape))) {
+        let mut scene = scenes::stack(10);
+        scene.kinds[0].shape = shape;
         let mut sim = scene.start(way);
         let top = |sim: &Sim| sim.body(GlobalId(10)).position;
         let start = top(&sim);
@@ -141,9 +144,13 @@ fn a_stack_stands_anywhere_in_a_wide_world() {
 
 #[test]
 fn a_pyramid_stands() {
+    scenes::boxes(1.0, 1.0).into_iter().for_each(pyramid);
+}
+
+fn pyramid(shape: Shape) {
     let mut scene = Scene::new(DVec2::new(0.0, 3.0), -10.0);
     scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, Material::default());
-    let kind = scene.kind(Shape::rectangle(1.0, 1.0), Material::default());
+    let kind = scene.kind(shape, Material::default());
     for row in 0..10 {
         for i in 0..10 - row {
             let x = f64::from(i) - 0.5 * f64::from(9 - row);
