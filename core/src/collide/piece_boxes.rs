@@ -20,12 +20,11 @@ impl PieceBox {
         Self { low: low - piece.radius, high: high + piece.radius }
     }
 
-    /// Whether another, of a body at `offset` from this one's, is nearer than so far along both axes.
+    /// Whether another, of a body at `offset` from this one's, is further than so far along an axis.
     #[inline(always)]
-    pub(super) fn is_near(&self, other: &Self, offset: Vec2, near: f32) -> bool {
+    pub(super) fn is_apart(&self, other: &Self, offset: Vec2, far: f32) -> bool {
         let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
-        // Where a speed is not a number nothing is known.
-        !(max(gap.x, gap.y) > near)
+        max(gap.x, gap.y) > far
     }
 }
 

@@ -364,7 +364,7 @@ pub(super) fn touch_pieces(
     for (number_a, a) in (0..).zip(pieces_a.iter()) {
         for (number_b, b) in (0..).zip(pieces_b.iter()) {
             if let Some([boxes_a, boxes_b]) = boxes
-                && !boxes_a[number_a as usize].is_near(&boxes_b[number_b as usize], offset, near)
+                && boxes_a[number_a as usize].is_apart(&boxes_b[number_b as usize], offset, near)
             {
                 continue;
             }
