@@ -84,6 +84,7 @@ pub(crate) fn identity(record_every: Option<u64>, canonical: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::SceneKind;
     use crate::scene::SplitMix64;
     use std::collections::BTreeSet;
     use std::fs;

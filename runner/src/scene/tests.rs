@@ -79,7 +79,14 @@ impl Placed {
 
     /// An upright rectangle around it: where everything is turned in a way of its own.
     fn around(position: DVec2, rotation: Rot, shape: &Shape) -> Self {
-        Self { center: position, half: shape.half_extents(rotation).as_dvec2(), radius: 0.0 }
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for (corners, radius) in shape.outlines() {
+            for corner in corners {
+                let corner = position + rotation.rotate(corner).as_dvec2();
+                (low, high) = (low.min(corner - f64::from(radius)), high.max(corner + f64::from(radius)));
+            }
+        }
+        Self { center: 0.5 * (low + high), half: 0.5 * (high - low), radius: 0.0 }
     }
 
     /// How deep two of them are inside each other, in meters; negative where they are not.

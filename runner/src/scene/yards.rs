@@ -145,7 +145,7 @@ mod tests {
         let yards = Yards::<tumbler::Tumbler>::new(5000);
         assert_eq!((yards.count(), yards.statics().len()), (3, 3));
         for index in [0, 700, 2024, 4999 - 4050] {
-            let place = |yard| yards.body(index + 2025 * yard, GlobalId(0), 1).position;
+            let place = |yard: u64| yards.body(index + 2025 * yard, GlobalId(0), 1).position;
             assert!((place(2) - place(0) - DVec2::X * 64.0).length() < 1e-9);
             let (low, high) = yards.home(index + 4050);
             assert!(place(2).cmpgt(low).all() && place(2).cmplt(high).all());
