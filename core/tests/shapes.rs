@@ -120,6 +120,49 @@ fn a_chain_holds_what_comes_from_its_free_side() {
     assert!(free.windows(2).all(|pair| (pair[1] - pair[0] + G / 60.0).abs() < 1e-4), "{free:?}");
 }
 
+/// A chain there and back, as edges of R.U.B.E. are read, holds from both sides.
+#[test]
+fn a_chain_there_and_back_is_solid_from_both_sides() {
+    let points: Vec<DVec2> = (0..=32).map(|i| DVec2::new(2.0 + 0.5 * f64::from(i), 10.0)).collect();
+    let back: Vec<DVec2> = points.iter().rev().copied().collect();
+    let mut statics = chain(&points, 0, Material::default());
+    statics.extend(chain(&back, 100, Material::default()));
+    let shapes = [
+        (Shape::circle(0.25), 0.25),
+        (Shape::rectangle(0.5, 0.5), 0.25),
+        (square(0.5), 0.25),
+        (Shape::capsule(0.5, 0.2).unwrap(), 0.2),
+        (polygon(&[(-0.4, -0.1), (0.4, -0.1), (0.4, 0.1), (-0.4, 0.1)], 0.1), 0.2),
+    ];
+    let kinds = shapes.iter().map(|(shape, _)| Kind::new(shape.clone(), Material::default())).collect();
+    let mut world = world(DVec2::splat(20.0), (2, 2), kinds, statics);
+    for (i, id) in (0..5).zip(1000..) {
+        // Over a joint, and between two.
+        let x = 3.0 + 3.1 * f64::from(i);
+        let above = Body::at_rest(GlobalId(id), KindId(i), DVec2::new(x, 12.0));
+        let below = Body::at_rest(GlobalId(id + 100), KindId(i), DVec2::new(x, 8.0));
+        world.add(Body { velocity: Vec2::new(0.0, -9.0), ..above }).unwrap();
+        world.add(Body { velocity: Vec2::new(0.0, 9.0), ..below }).unwrap();
+    }
+    let mut highest = [0.0_f64; 5];
+    for _ in 0..300 {
+        step(&mut world, &mut Loopback).unwrap();
+        for (body, i) in bodies(&world).iter().zip((0..5).cycle()) {
+            let half = shapes[i].1;
+            if body.id.0 < 1100 {
+                assert!(body.position.y > 10.0 + half - 0.05, "{i} fell to {}", body.position.y);
+            } else {
+                assert!(body.position.y < 10.0 - half + 0.05, "{i} rose to {}", body.position.y);
+                highest[i] = highest[i].max(body.position.y + half);
+            }
+        }
+    }
+    for (body, (_, half)) in bodies(&world).iter().zip(&shapes) {
+        assert!((body.position.y - 10.0 - half).abs() < 0.01 && body.velocity.length() < 0.01, "{body:?}");
+    }
+    assert!(highest.iter().all(|&top| top > 9.9), "{highest:?} came to the chain from below");
+}
+
 /// Stacks of ten of a shape, over a corner of four tiles and away from any: how far they have sunk and moved after ten seconds.
 fn stack(shape: Shape, height: f64, tiles: (u32, u32)) -> (f64, f64, f32) {
     let floor = StaticBody::new(

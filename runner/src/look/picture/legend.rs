@@ -66,7 +66,7 @@ impl Legend {
         }
         if !setting.statics.is_empty() {
             let any_moves = setting.statics.iter().any(|fixed| fixed.path.is_some());
-            rows.push(square(colors::STATIC, if any_moves { "never moves, or on a path" } else { "never moves" }));
+            rows.push(square(colors::STATIC, if any_moves { "no body moves it" } else { "never moves" }));
         }
         if layers.ghosts {
             rows.push((Sign::Ring(colors::GHOST), "ghost".to_owned()));
