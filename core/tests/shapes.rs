@@ -15,6 +15,17 @@ fn square(side: f32) -> Shape {
     polygon(&[(-half, -half), (half, -half), (half, half), (-half, half)], 0.0)
 }
 
+/// One of each that can lie flat, and half the height of it.
+fn flat_shapes() -> [(Shape, f64); 5] {
+    [
+        (Shape::circle(0.25), 0.25),
+        (Shape::rectangle(0.5, 0.5), 0.25),
+        (square(0.5), 0.25),
+        (Shape::capsule(0.5, 0.2).unwrap(), 0.2),
+        (polygon(&[(-0.4, -0.1), (0.4, -0.1), (0.4, 0.1), (-0.4, 0.1)], 0.1), 0.2),
+    ]
+}
+
 /// A static for each segment of a chain, named from a number on.
 fn chain(points: &[DVec2], first: u64, material: Material) -> Vec<StaticBody> {
     let at = |i: isize| usize::try_from(i).ok().and_then(|i| points.get(i)).copied();
@@ -45,14 +56,7 @@ fn bodies(world: &World) -> Vec<Body> {
 fn what_slides_over_a_chain_feels_no_joint() {
     let ice = Material { friction: 0.0, ..Material::default() };
     let points: Vec<DVec2> = (0..=1000).map(|i| DVec2::new(10.0 + 0.5 * f64::from(i), 5.0)).collect();
-    let shapes = [
-        (Shape::circle(0.25), 0.25),
-        (Shape::rectangle(0.5, 0.5), 0.25),
-        (square(0.5), 0.25),
-        (Shape::capsule(0.5, 0.2).unwrap(), 0.2),
-        (polygon(&[(-0.4, -0.1), (0.4, -0.1), (0.4, 0.1), (-0.4, 0.1)], 0.1), 0.2),
-    ];
-    for (number, (shape, height)) in shapes.into_iter().enumerate() {
+    for (number, (shape, height)) in flat_shapes().into_iter().enumerate() {
         for speed in [0.7_f32, 5.0] {
             let kinds = vec![Kind::new(shape.clone(), ice)];
             let mut world = world(DVec2::new(520.0, 20.0), (8, 1), kinds, chain(&points, 0, ice));
@@ -127,13 +131,7 @@ fn a_chain_there_and_back_is_solid_from_both_sides() {
     let back: Vec<DVec2> = points.iter().rev().copied().collect();
     let mut statics = chain(&points, 0, Material::default());
     statics.extend(chain(&back, 100, Material::default()));
-    let shapes = [
-        (Shape::circle(0.25), 0.25),
-        (Shape::rectangle(0.5, 0.5), 0.25),
-        (square(0.5), 0.25),
-        (Shape::capsule(0.5, 0.2).unwrap(), 0.2),
-        (polygon(&[(-0.4, -0.1), (0.4, -0.1), (0.4, 0.1), (-0.4, 0.1)], 0.1), 0.2),
-    ];
+    let shapes = flat_shapes();
     let kinds = shapes.iter().map(|(shape, _)| Kind::new(shape.clone(), Material::default())).collect();
     let mut world = world(DVec2::splat(20.0), (2, 2), kinds, statics);
     for (i, id) in (0..5).zip(1000..) {
