@@ -3,6 +3,7 @@
 use crate::model::math::{Rot, dot, max, min};
 use crate::model::shape::MOST_CORNERS;
 use glam::Vec2;
+use std::array::from_fn;
 
 /// Corners, counter-clockwise, and the normal out of the face from each to the next. Two corners make a line, one a point. Places that
 /// are left over repeat the last.
@@ -19,7 +20,7 @@ impl Convex {
     /// As many normals as corners, one to eight.
     pub(crate) fn new(corners: &[Vec2], normals: &[Vec2]) -> Self {
         let last = corners.len() - 1;
-        let column = |of: &[Vec2], axis: usize| std::array::from_fn(|i| of[i.min(last)][axis]);
+        let column = |of: &[Vec2], axis: usize| from_fn(|i| of[i.min(last)][axis]);
         Self {
             x: column(corners, 0),
             y: column(corners, 1),
@@ -32,14 +33,13 @@ impl Convex {
     /// The same, turned and then moved.
     #[inline(always)]
     pub(crate) fn seen(&self, Rot { c, s }: Rot, offset: Vec2) -> Self {
-        let mut seen = *self;
-        for i in 0..MOST_CORNERS {
-            seen.x[i] = offset.x + (c * self.x[i] - s * self.y[i]);
-            seen.y[i] = offset.y + (s * self.x[i] + c * self.y[i]);
-            seen.normal_x[i] = c * self.normal_x[i] - s * self.normal_y[i];
-            seen.normal_y[i] = s * self.normal_x[i] + c * self.normal_y[i];
+        Self {
+            x: from_fn(|i| offset.x + (c * self.x[i] - s * self.y[i])),
+            y: from_fn(|i| offset.y + (s * self.x[i] + c * self.y[i])),
+            normal_x: from_fn(|i| c * self.normal_x[i] - s * self.normal_y[i]),
+            normal_y: from_fn(|i| s * self.normal_x[i] + c * self.normal_y[i]),
+            count: self.count,
         }
-        seen
     }
 
     #[inline(always)]
@@ -92,13 +92,13 @@ impl Convex {
     /// The first face of which a figure is greatest.
     #[inline(always)]
     fn most(of_faces: &[f32; MOST_CORNERS]) -> (usize, f32) {
-        let mut most = (0, of_faces[0]);
-        for (face, &figure) in of_faces.iter().enumerate().skip(1) {
-            if figure > most.1 {
-                most = (face, figure);
-            }
-        }
-        most
+        // By halves, as one after the other would have to wait for each.
+        let fours: [f32; MOST_CORNERS / 2] = from_fn(|i| max(of_faces[i], of_faces[i + MOST_CORNERS / 2]));
+        let most = max(max(fours[0], fours[2]), max(fours[1], fours[3]));
+        let are_most = of_faces.iter().rev().fold(0, |bits, &figure| bits << 1 | u32::from(figure == most));
+        // Where nothing is a number it is the first.
+        let face = are_most.trailing_zeros() as usize % MOST_CORNERS;
+        (face, of_faces[face])
     }
 
     /// The face along which another lies furthest out, and how far.
@@ -118,7 +118,7 @@ impl Convex {
     /// The face that looks most against a normal.
     #[inline(always)]
     pub(crate) fn against(&self, normal: Vec2) -> usize {
-        let against = std::array::from_fn(|face| -(self.normal_x[face] * normal.x + self.normal_y[face] * normal.y));
+        let against = from_fn(|face| -(self.normal_x[face] * normal.x + self.normal_y[face] * normal.y));
         Self::most(&against).0
     }
 
@@ -132,7 +132,7 @@ impl Convex {
             let normal = if distance > 0.0 { away / distance } else { Vec2::Y };
             return (normal, distance, 1);
         }
-        let heights = std::array::from_fn(|face| dot(point - self.corner(face), self.normal(face)));
+        let heights = from_fn(|face| dot(point - self.corner(face), self.normal(face)));
         let (face, height) = Self::most(&heights);
         let (normal, [from, to]) = (self.normal(face), self.edge(face));
         if height <= 0.0 {
