@@ -114,7 +114,7 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
 #[inline(never)]
 pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
     let pair = Approach::new(tile, pair, setup);
-    if pair.pass_by(setup) { None } else { pair.touch(known, setup) }
+    if pair.pass_by(setup) { None } else { pair.touch(known, pair.far(setup.params.dt), setup) }
 }
 
 impl<'a> Approach<'a> {
@@ -126,10 +126,9 @@ impl<'a> Approach<'a> {
         Self { a, b, offset, between, pieces: None, features: 0 }
     }
 
-    /// The contact, if there is one.
+    /// The contact, if there is one, of bodies whose surfaces can move so [`far`](Self::far).
     #[inline(always)]
-    fn touch(&self, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-        let far = self.far(setup.params.dt);
+    fn touch(&self, known: Option<&Contact>, far: f32, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         let reach = setup.params.speculative_distance + far;
         let now = self.at(0.0, reach);
         let nearest = now.manifold.nearest()?.separation;
@@ -349,7 +348,8 @@ pub(super) fn touch_pieces(
     mut found: impl FnMut(&Contact, [f32; 2]),
 ) {
     let mut pair = Approach::new(tile, bodies, setup);
-    if pair.pass_by(setup) {
+    // Who touched will hardly have gone so far.
+    if known.is_empty() && pair.pass_by(setup) {
         return;
     }
     let far = pair.far(setup.params.dt);
@@ -375,7 +375,7 @@ pub(super) fn touch_pieces(
                 && let Some(separation) = pair.recycle(known, setup)
             {
                 found(known, separation);
-            } else if let Some((contact, separation)) = rolled.or_else(|| pair.touch(known, setup)) {
+            } else if let Some((contact, separation)) = rolled.or_else(|| pair.touch(known, far, setup)) {
                 found(&contact, separation);
             }
         }
