@@ -1,6 +1,6 @@
 //! The configurations that come with the program can all be run.
 
-use atoll::config::{AdaptiveConfig, OutputConfig};
+use atoll::config::{OutputConfig, Retiling};
 use atoll::{Config, Override};
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ fn what_the_full_example_comments_out_are_the_defaults() {
     assert_eq!(explicit.output.log_every, implicit.output.log_every);
     implicit.output = explicit.output;
     // Tiles follow the bodies only where somebody says how.
-    assert_eq!((explicit.run.adaptive, implicit.run.adaptive), (Some(AdaptiveConfig::default()), None));
-    implicit.run.adaptive = explicit.run.adaptive;
+    assert_eq!((explicit.run.retiling, implicit.run.retiling), (Some(Retiling::ADAPTIVE), None));
+    implicit.run.retiling = explicit.run.retiling;
     assert_eq!(explicit, implicit);
 }

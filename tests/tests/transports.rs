@@ -11,12 +11,16 @@ const RANKS: [usize; 5] = [1, 2, 3, 4, 8];
 
 /// The scenes, each with steps enough to mix ranks well and few enough for the slowest of them. `ATOLL_FULL_LENGTH` runs
 /// them to their end.
-const SCENES: [(&str, &[&str]); 3] = [
+const SCENES: [(&str, &[&str]); 4] = [
     (
         "configs/quickstart.toml",
         &["--tiles", "5x5", "--set", "max_bodies=700", "--set", "retile_every=5", "--steps", "60"],
     ),
     ("configs/pile.toml", &["--bodies", "2000", "--set", "exchange=substep", "--tiles", "4x3", "--steps", "40"]),
+    (
+        "configs/skewed.toml",
+        &["--bodies", "2000", "--set", "tile_count=11", "--set", "retile_every=3", "--steps", "40"],
+    ),
     (
         "configs/zoo.toml",
         &["--bodies", "500", "--tiles", "5x2", "--set", "max_bodies=50", "--set", "retile_every=7", "--steps", "60"],

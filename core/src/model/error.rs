@@ -90,6 +90,12 @@ pub enum SetupError {
         /// The first tile that is not in order.
         tile: TileId,
     },
+    /// No cut of a domain in two, again and again.
+    #[error("cut {cut} of a bisection does not lie within what it cuts, or leaves a part without a width")]
+    BadBisection {
+        /// The first cut that is not in order.
+        cut: u32,
+    },
     /// Sleeping is known within one tile only.
     #[error(
         "sleep = true on {tiles} tiles: an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"

@@ -110,7 +110,7 @@ impl Setup {
         if params.sleep && blueprint.partition.tiles() > 1 {
             return Err(SetupError::SleepAcrossTiles { tiles: blueprint.partition.tiles() });
         }
-        if params.sleep && blueprint.partition.levels().is_some() {
+        if params.sleep && !blueprint.partition.is_uniform() {
             return Err(SetupError::SleepInForest);
         }
         let mut kinds = Vec::with_capacity(blueprint.kinds.len() + blueprint.statics.len());

@@ -24,7 +24,7 @@ impl Blueprint {
             met(columns, size.x) * met(rows, size.y) - 1.0
         };
         // Equal tiles are all like the first.
-        let looked_at = partition.levels().map_or(1, |levels| levels.len() as u32);
+        let looked_at = if partition.is_uniform() { 1 } else { partition.tiles() as u32 };
         let copies = (0..looked_at).map(|tile| copies(TileId(tile))).sum::<f64>() / f64::from(looked_at);
         let ghosts = (bodies as f64 * copies * PER_GHOST) as u64;
         let tiles = partition.tiles() as u64 * (size_of::<Tile>() as u64 + 64);

@@ -5,7 +5,7 @@ use crate::exchange::record::Unseen;
 use crate::exchange::rim::Rim;
 use crate::islands::sleep::Sleep;
 use crate::model::body::Bodies;
-use crate::model::contact::{ContactCache, PairKey, Slot, Strays};
+use crate::model::contact::{ContactCache, PairKey, Slot, SlotKind, Strays};
 use crate::model::id::{GlobalId, TileId};
 use crate::model::params::BroadPhase;
 use crate::solver::index::GraphNode;
@@ -42,6 +42,8 @@ pub(crate) struct Tile {
     pub(crate) ghost_owners: Vec<TileId>,
     /// Rows of the setup's statics.
     pub(crate) statics: Vec<u32>,
+    /// Those from the next step on, where the tile's borders have moved since the last.
+    pub(crate) next_statics: Option<Vec<u32>>,
     /// What was solved last. From the first sync point on those of newcomers and ghosts mean nothing.
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
@@ -112,6 +114,7 @@ impl Tile {
             unseen: Vec::new(),
             ghost_owners: Vec::new(),
             statics,
+            next_statics: None,
             contacts: ContactCache::default(),
             strays: Strays::default(),
             sleep: Sleep::default(),
@@ -157,6 +160,34 @@ impl Tile {
         self.unseen = Vec::new();
         self.ghost_owners = Vec::new();
         self.violation = Violation::default();
+    }
+
+    /// Gives the tile another region. Whom it owns and what it remembers is settled with the next step, as if all bodies had moved.
+    pub(crate) fn move_borders(&mut self, setup: &Setup) {
+        let Self { region, interior, rectangle, quadtree, .. } = Self::with_statics(self.id, Vec::new(), setup);
+        let is_same = region == self.region;
+        (self.region, self.interior, self.rectangle) = (region, interior, rectangle);
+        // A neighbour's border may have moved where this one's have not.
+        self.rim.is_known = false;
+        if !is_same {
+            self.quadtree = quadtree;
+            let statics = setup.statics_of(self.id);
+            self.next_statics = (statics != self.statics).then_some(statics);
+        }
+    }
+
+    /// Takes in the statics of a region that has changed: contacts go on with those that the tile still knows. Before the statics
+    /// are put behind the bodies.
+    pub(crate) fn change_statics(&mut self) {
+        let Some(statics) = self.next_statics.take() else { return };
+        let known = std::mem::replace(&mut self.statics, statics);
+        let number = |slot: Slot| match slot.kind() {
+            SlotKind::Static(old) => self.statics.binary_search(&known[old]).map(|new| Slot::from_index(new, 0, 0)),
+            _ => Ok(slot),
+        };
+        // Both lists ascend, so the contacts stay in order.
+        self.contacts.retain(|key| number(key.high()).is_ok());
+        self.contacts.renumber(|slot| number(slot).unwrap_or(slot));
     }
 
     /// Puts the statics behind owned bodies and ghosts, as they are at the beginning of a step.

@@ -78,6 +78,12 @@ pub struct World {
     figures: Option<Box<Figures>>,
     /// Whether it was said that bodies outrun their tiles.
     warned_of_leaps: bool,
+    /// Where a single thread begins among the busy tiles.
+    first: usize,
+    /// How the domain is cut from the next step on, if that changes.
+    next_partition: Option<Partition>,
+    /// Whether it has changed with the step under way.
+    borders_moved: bool,
 }
 
 /// A clock to book the time of tiles by: how long the thread that asks has worked so far, or how late it is.
@@ -141,6 +147,9 @@ impl World {
             takes_figures: false,
             figures: None,
             warned_of_leaps: false,
+            first: 0,
+            next_partition: None,
+            borders_moved: false,
             setup,
         }
     }
@@ -223,6 +232,13 @@ impl World {
     /// Has the time that is worked on each tile booked from here on. Times never enter a result.
     pub fn book_time(&mut self, clock: Clock) {
         self.clock = Some(clock);
+    }
+
+    /// Has one thread, where it works on all tiles, begin with another than the first: who comes first finds less in the caches, and
+    /// is booked more time. It shows nowhere else.
+    #[doc(hidden)]
+    pub fn begin_with(&mut self, place: usize) {
+        self.first = place;
     }
 
     /// All time that was booked so far, of all threads together.

@@ -4,9 +4,11 @@ use super::World;
 use crate::exchange::mail::Inbox;
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
-use crate::tiling::partition::{Adaptive, CONTACT, Census, Partition};
+use crate::tiling::partition::{Adaptive, CONTACT, Census, Counter, GHOST, Partition, Share};
 use crate::tiling::regroup::{Renaming, regroup};
+use crate::tiling::tile::Tile;
 use glam::DVec2;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 impl World {
@@ -33,17 +35,58 @@ impl World {
         census
     }
 
+    /// Counts what there is to do of this world's bodies and contacts in each tile of a bisection where there is any, ascending: that
+    /// of all ranks, added up by tile, is what [`Partition::rebisected`] asks for. Everything counts where it will be so many steps
+    /// later, if nothing stops it.
+    pub fn shares(&self, partition: &Partition, later: u64) -> Vec<Share> {
+        let later = later as f32 * self.setup.params.dt;
+        let is_current = std::ptr::eq(partition, self.partition());
+        let of_tile = |mut counter: Counter, tile: &Tile| {
+            let tile = tile.settled(&self.setup);
+            let place = |body: usize| tile.bodies.position[body] + (later * tile.bodies.velocity[body]).as_dvec2();
+            (0..tile.owned).for_each(|body| counter.add(partition, place(body), 1));
+            let own = tile.contacts.own();
+            tile.contacts.keys[..own]
+                .iter()
+                .for_each(|key| counter.add(partition, place(tile.index(key.low())), CONTACT));
+            if is_current {
+                let for_others = (tile.contacts.len() - own) as u64;
+                counter.add_others(tile.id, GHOST * (tile.ghosts() as u64 + for_others));
+            }
+            counter
+        };
+        let busy = self.tiles.iter().filter(|tile| !tile.is_bare() || tile.changes.is_some());
+        busy.fold(Counter::new(partition), of_tile).shares()
+    }
+
+    /// Moves the borders that are to be moved. Takes time for each tile. Says whether there were any.
+    pub(super) fn follow_borders(&mut self) -> bool {
+        let Some(partition) = self.next_partition.take() else { return false };
+        let setup = Arc::new(self.setup.with_partition(&partition));
+        self.tiles.par_iter_mut().for_each(|tile| tile.move_borders(&setup));
+        self.works.iter_mut().for_each(|work| *work = None);
+        self.setup = setup;
+        true
+    }
+
     /// Cuts and joins tiles as another partition has it, which every rank must be given at the same step. No bit of a body changes,
     /// and contacts go on with the impulses they have. This world goes on to hold what becomes of its tiles. Takes time for each
     /// tile, and for each body and contact of those that change, or border such.
     ///
+    /// The borders of a [bisection](Partition::bisection) move as the next step begins, in which bodies change their owners as if they
+    /// had moved; until then nothing shows of it.
+    ///
     /// # Errors
-    /// If the two partitions are not [forests](Partition::forest) over the same squares, or this world holds some of the tiles
-    /// that are to be joined and not the others: it is left as it was.
+    /// If the two partitions are not [forests](Partition::forest) over the same squares, or bisections of one domain into equally many
+    /// tiles, or this world holds some of the tiles that are to be joined and not the others: it is left as it was.
     pub fn retile(&mut self, partition: &Partition) -> Result<(), SetupError> {
         let old = Arc::clone(&self.setup);
         let torn = |tile: u32| SetupError::TornApart { tile: TileId(tile) };
         let changes = old.partition.changes(partition).ok_or(torn(0))?;
+        if partition.cuts().is_some() {
+            self.next_partition = Some(partition.clone());
+            return Ok(());
+        }
         let held = |tile: u32| self.place_of(TileId(tile)).is_some();
         if let Some(change) =
             changes.iter().find(|change| change.old.clone().any(|tile| held(tile) != held(change.old.start)))
@@ -91,7 +134,7 @@ mod tests {
     use crate::step::step;
     use crate::testing::{circle, rectangle};
     use crate::tiling::blueprint::Blueprint;
-    use crate::tiling::tile::Tile;
+    use crate::tiling::partition::Bisector;
     use glam::Vec2;
 
     /// A heap of discs and boxes in the corner of two squares.
@@ -205,6 +248,51 @@ mod tests {
         }
         tilings.dedup();
         assert!(tilings.len() > 1, "{tilings:?}");
+    }
+
+    #[test]
+    fn borders_that_move_change_no_body_and_what_is_saved_goes_on_alike() {
+        let cut = |axis: u32, part: f64| Bisector { axis, at: (part * 2_f64.powi(32)) as u32 };
+        let bisection = |number: usize| {
+            let [a, b, c] = [0.3, 0.5, 0.7].map(|part| part + 0.07 * (number % 5) as f64 - 0.14);
+            let turned = u32::from(number % 7 == 3);
+            Partition::bisection(DVec2::ZERO, DVec2::new(16.0, 8.0), &[cut(turned, b), cut(1 - turned, a), cut(1, c)])
+                .unwrap()
+        };
+        for exchange in [Exchange::Step, Exchange::Substep] {
+            let blueprint = |number| Blueprint { partition: bisection(number), ..heap(exchange, &[0, 0]) };
+            let mut world = World::whole(&blueprint(0)).unwrap();
+            bodies_of_heap().for_each(|body| assert!(world.add(body).unwrap()));
+            for number in 1..70 {
+                step(&mut world, &mut Loopback).unwrap();
+                let before = (bodies(&world), contacts(&world), world.hashes());
+                assert!(number < 5 || before.1.len() > 200, "{} contacts", before.1.len());
+                // Nothing shows before the next step, and all of it can be saved, and goes on alike.
+                world.retile(&bisection(number)).unwrap();
+                assert!((bodies(&world), contacts(&world), world.hashes()) == before, "after step {number}");
+                let mut bytes = Vec::new();
+                let saved = world.save(&mut bytes);
+                let mut again =
+                    World::whole(&Blueprint { partition: world.partition().clone(), ..blueprint(0) }).unwrap();
+                let mut rest = &bytes[..];
+                for saved in saved {
+                    again.restore(saved.tile, rest.split_off(..saved.length).unwrap()).unwrap();
+                }
+                again.resume_at(world.step_count());
+                again.retile(&bisection(number)).unwrap();
+                step(&mut world, &mut Loopback).unwrap();
+                step(&mut again, &mut Loopback).unwrap();
+                assert_eq!(again.hashes(), world.hashes(), "after step {number}");
+                assert_eq!(*world.partition(), bisection(number));
+                let is_home = |tile: &Tile| {
+                    // Where it was at the beginning of the step; a step leads no further than this.
+                    let grown = tile.region.shrunk(-0.5);
+                    tile.bodies.position[..tile.owned].iter().all(|&place| grown.contains(place))
+                };
+                assert!(world.tile_states().iter().all(is_home), "after step {number}");
+                contacts(&world);
+            }
+        }
     }
 
     #[test]

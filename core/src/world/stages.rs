@@ -26,6 +26,7 @@ impl World {
     /// Starts a step: no sync point passed, nothing counted.
     pub(crate) fn begin_step(&mut self) {
         self.settle();
+        self.borders_moved = self.follow_borders();
         self.sync = 0;
         let threads = rayon::current_num_threads();
         if self.hands.len() < threads {
@@ -53,7 +54,7 @@ impl World {
             self.booked += std::mem::take(&mut hand.booked);
             self.timings.add_share(&std::mem::take(&mut hand.timings), threads);
         }
-        if leaps > 0 && !self.warned_of_leaps {
+        if leaps > 0 && !self.borders_moved && !self.warned_of_leaps {
             self.warned_of_leaps = true;
             tracing::warn!(
                 "step {}: {leaps} bodies moved past a neighbouring tile; larger tiles or a speed limit are faster",
@@ -141,7 +142,7 @@ impl World {
 
     fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
         let apart = apart(self.busy.len());
-        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, clock, .. } = self;
+        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, clock, first, .. } = self;
         let team = if apart { Team::ALONE } else { Team::of_pool() };
         let workers = if apart { 1 } else { rayon::current_num_threads() as u32 };
         let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
@@ -175,12 +176,18 @@ impl World {
             rest = (place + 1, tiles, works);
             (place, tile, work)
         });
-        if !apart {
-            return tiles.map(run).collect();
-        }
-        let dealt = dealt(tiles.collect(), |(_, tile, _)| tile.work(), rayon::current_num_threads());
         let in_place = |job: (usize, &mut Tile, &mut Option<Box<Work>>)| (job.0, run(job));
-        let mut results: Vec<_> = dealt.into_par_iter().with_max_len(1).map(in_place).collect();
+        let mut results: Vec<_> = if apart {
+            let dealt = dealt(tiles.collect(), |(_, tile, _)| tile.work(), rayon::current_num_threads());
+            dealt.into_par_iter().with_max_len(1).map(in_place).collect()
+        } else if *first == 0 {
+            return tiles.map(run).collect();
+        } else {
+            let mut jobs: Vec<_> = tiles.collect();
+            let first = *first % jobs.len().max(1);
+            jobs.rotate_left(first);
+            jobs.into_iter().map(in_place).collect()
+        };
         results.sort_unstable_by_key(|&(place, _)| place);
         results.into_iter().map(|(_, result)| result).collect()
     }

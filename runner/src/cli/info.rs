@@ -50,7 +50,7 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, Ru
     let config = Config::load_begun(&folder.configuration())?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
-    let tiling = tiles::in_words(tiles, config.run.adaptive.map(|adaptive| adaptive.max_bodies));
+    let tiling = tiles::in_words(tiles, config.run.retiling.map(|retiling| retiling.how));
     let seed = if matches!(config.scene.kind, SceneKind::File(_)) { String::new() } else { format!(", seed {seed}") };
     let mut text = format!("{kind}: {bodies} bodies{seed}, {tiling}\n");
     row(&mut text, "config hash", &config.hash(tiles));

@@ -28,7 +28,7 @@ pub(super) fn run(args: &ProjectArgs) -> Result<Exit, RunError> {
     let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
     let show = if args.quiet { Show::Nothing } else { Show::OnStderr };
     let observer = Observer { listener: Some(Arc::new(Console::new(show))), stop, ..Observer::default() };
-    let wanted = Wanted { ranks: args.ranks.clone(), threads: args.threads, network: args.network };
+    let wanted = Wanted { ranks: args.ranks.clone(), threads: args.threads, times: args.times, network: args.network };
     let Some(projection) = Projection::make(&plan, &wanted, &observer)? else {
         complain(&"interrupted: a projection needs all steps");
         return Ok(Exit::Interrupted);

@@ -1,7 +1,7 @@
 //! Forms of values: how each is read from what was given and written again. [`super::keys`] says which key has which.
 
 use super::error::{ConfigError, Origin};
-use super::sections::{AdaptiveConfig, Config, MOST_THREADS, MOST_TILES, TransportKind};
+use super::sections::{Config, MOST_THREADS, MOST_TILES, Retile, Retiling, TransportKind};
 use super::settings::{Settings, TilesChoice};
 use super::words::{self, Words, word_for};
 use crate::wording::shortest;
@@ -210,7 +210,8 @@ pub(super) struct Tiles;
 impl Form for Tiles {
     fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
         match settings.tiles(key, MOST_TILES)? {
-            Some(TilesChoice::Adaptive) => config.run.adaptive = Some(AdaptiveConfig::default()),
+            Some(TilesChoice::Adaptive) => config.run.retiling = Some(Retiling::ADAPTIVE),
+            Some(TilesChoice::Bisected) => config.run.retiling = Some(Retiling::BISECTED),
             Some(TilesChoice::Counts(counts)) => config.run.tiles = Some(counts),
             Some(TilesChoice::Auto) | None => {}
         }
@@ -218,6 +219,9 @@ impl Form for Tiles {
     }
 
     fn write(&self, config: &mut Config) -> Option<Value> {
+        if config.run.is_bisected() {
+            return Some("bisected".into());
+        }
         config.run.tiles.map(|tiles| tiles.map(Value::from).to_vec().into())
     }
 }
@@ -227,14 +231,35 @@ pub(super) struct MaxBodies;
 
 impl Form for MaxBodies {
     fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
-        if let Some(max_bodies) = settings.integer(key, 1..=u64::from(u32::MAX))? {
-            config.run.adaptive.get_or_insert_default().max_bodies = max_bodies;
+        if !config.run.is_bisected()
+            && let Some(max_bodies) = settings.integer(key, 1..=u64::from(u32::MAX))?
+        {
+            config.run.retiling.get_or_insert(Retiling::ADAPTIVE).how = Retile::Adaptive { max_bodies };
         }
         Ok(())
     }
 
     fn write(&self, config: &mut Config) -> Option<Value> {
-        config.run.adaptive.map(|adaptive| whole(adaptive.max_bodies))
+        config.run.max_bodies().map(whole)
+    }
+}
+
+/// How many tiles there are whose borders move: says that they do, where nothing else is said of tiles.
+pub(super) struct TileCount;
+
+impl Form for TileCount {
+    fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
+        if (config.run.retiling.is_none() && config.run.tiles.is_none() || config.run.is_bisected())
+            && let Some(count) = settings.integer(key, 1..=u64::from(MOST_TILES))?
+        {
+            config.run.retiling.get_or_insert(Retiling::BISECTED);
+            config.run.tiles = Some([count as u32, 1]);
+        }
+        Ok(())
+    }
+
+    fn write(&self, config: &mut Config) -> Option<Value> {
+        config.run.tiles.filter(|_| config.run.is_bisected()).map(|[count, _]| whole(count.into()))
     }
 }
 

@@ -8,8 +8,8 @@
 
 use super::error::ConfigError;
 use super::forms::{
-    Flag, Float, Form, Hertz, MaxBodies, Number, OptionalWhole, OptionalWord, Pair, Ranks, Seconds, Threads, Tiles,
-    Whole, Word,
+    Flag, Float, Form, Hertz, MaxBodies, Number, OptionalWhole, OptionalWord, Pair, Ranks, Seconds, Threads, TileCount,
+    Tiles, Whole, Word,
 };
 use super::scene_forms::{SceneBodies, SceneDigest, ScenePath, SceneWord};
 use super::sections::Config;
@@ -77,6 +77,7 @@ pub(super) static KEYS: &[Key] = &[
     key("run.transport", How, &OptionalWord(|c| &mut c.run.transport, words::TRANSPORT)),
     key("run.tiles", What, &Tiles),
     key("run.max_bodies", What, &MaxBodies),
+    key("run.tile_count", What, &TileCount),
     key("run.retile_every", What, &Whole(retile_every, |_| 1..=MOST_STEPS)),
     key("run.peer_timeout", How, &Seconds(|c| &mut c.run.peer_timeout, 0.001..=1e6)),
     key("run.instructions", How, &Word(|c| &mut c.params.instructions, words::INSTRUCTIONS)),
@@ -119,7 +120,7 @@ pub(super) static KEYS: &[Key] = &[
 // What only some tilings and scenes have.
 
 fn retile_every(config: &mut Config) -> Option<&mut u64> {
-    config.run.adaptive.as_mut().map(|adaptive| &mut adaptive.retile_every)
+    config.run.retiling.as_mut().map(|retiling| &mut retiling.every)
 }
 
 fn seed(config: &mut Config) -> Option<&mut u64> {
@@ -204,7 +205,9 @@ mod tests {
         ];
         let usual = config("rooms", &[("max_bodies", "9")]);
         let (mut changed, before) = (BTreeSet::new(), kept(&usual));
-        for key in KEYS.iter().filter(|key| key.name.split_once('.').is_some_and(|(section, _)| section != "scene")) {
+        // A number of tiles does not go with what they have at most; it is kept where columns and rows are.
+        let keys = KEYS.iter().filter(|key| !key.name.starts_with("scene.") && key.name != "run.tile_count");
+        for key in keys {
             let value = others.iter().find(|(name, _)| *name == key.name).map_or("11", |(_, value)| value);
             let other = config("rooms", &[("max_bodies", "9"), (key.name, value)]);
             assert_ne!(usual, other, "{} changes nothing", key.name);

@@ -20,6 +20,6 @@ mod words;
 pub(crate) use difference::{Difference, differences, other_run};
 pub use error::{ConfigError, Given, Origin};
 pub(crate) use resolved::{identity, is_resolved};
-pub use sections::{AdaptiveConfig, Balance, Config, MpiExchange, OutputConfig, RunConfig, TransportKind};
+pub use sections::{Balance, Config, MpiExchange, OutputConfig, Retile, Retiling, RunConfig, TransportKind};
 pub(crate) use sections::{MOST_THREADS, MOST_TILES};
 pub use settings::Override;

@@ -3,6 +3,7 @@
 use super::forms;
 use crate::scene::{SceneKind, SceneSpec};
 use atoll_core::Params;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -42,7 +43,7 @@ pub struct RunConfig {
     /// physics, never by ranks or threads.
     pub tiles: Option<[u32; 2]>,
     /// Whether tiles follow the bodies, and how; `None` leaves all of them equal.
-    pub adaptive: Option<AdaptiveConfig>,
+    pub retiling: Option<Retiling>,
     /// A rank that stays silent for so long is given up.
     pub peer_timeout: Duration,
     /// How ranks exchange messages with transport mpi.
@@ -51,14 +52,42 @@ pub struct RunConfig {
     pub balance: Balance,
 }
 
-/// How tiles follow the bodies.
+/// That tiles follow the bodies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct AdaptiveConfig {
-    /// A tile with more to do is cut in four, and four that together have less than half of that are joined: in bodies that touch
-    /// nothing, of which a contact counts as six.
-    pub max_bodies: u64,
+pub struct Retiling {
+    /// In which way.
+    pub how: Retile,
     /// So many steps lie between two times at which that is looked at.
-    pub retile_every: u64,
+    pub every: u64,
+}
+
+/// How tiles follow the bodies.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Retile {
+    /// They are cut in four and joined.
+    Adaptive {
+        /// A tile with more to do is cut, and four that together have less than half of that are joined: in bodies that touch
+        /// nothing, of which a contact counts as six.
+        max_bodies: u64,
+    },
+    /// There are as many as ever, and their borders move: as many as columns and rows come to.
+    Bisected,
+}
+
+impl RunConfig {
+    /// How much a tile has to do at most, where tiles are cut and joined.
+    pub fn max_bodies(&self) -> Option<u64> {
+        match self.retiling?.how {
+            Retile::Adaptive { max_bodies } => Some(max_bodies),
+            Retile::Bisected => None,
+        }
+    }
+
+    /// Whether borders of tiles move.
+    pub fn is_bisected(&self) -> bool {
+        self.retiling.is_some_and(|retiling| retiling.how == Retile::Bisected)
+    }
 }
 
 /// `[output]`: of runs that were given a folder for it, or a file for their log.
@@ -152,7 +181,7 @@ impl Default for RunConfig {
             threads: None,
             transport: None,
             tiles: None,
-            adaptive: None,
+            retiling: None,
             peer_timeout: Duration::from_secs(30),
             mpi_exchange: MpiExchange::default(),
             balance: Balance::default(),
@@ -160,10 +189,12 @@ impl Default for RunConfig {
     }
 }
 
-impl Default for AdaptiveConfig {
-    fn default() -> Self {
-        Self { max_bodies: 48_000, retile_every: 32 }
-    }
+impl Retiling {
+    /// In the usual way of cutting and joining.
+    pub const ADAPTIVE: Self = Self { how: Retile::Adaptive { max_bodies: 48_000 }, every: 32 };
+
+    /// As often as is usual where borders move.
+    pub const BISECTED: Self = Self { how: Retile::Bisected, every: 16 };
 }
 
 impl Default for OutputConfig {

@@ -14,8 +14,10 @@ use toml::{Table, Value};
 pub(super) enum TilesChoice {
     /// As suits the scene.
     Auto,
-    /// They follow the bodies.
+    /// They are cut and joined.
     Adaptive,
+    /// Their borders move.
+    Bisected,
     /// Columns and rows.
     Counts([u32; 2]),
 }
@@ -206,12 +208,13 @@ impl Settings {
         Ok(self.get(key, format!("\"auto\", or a whole number within 1 to {most}"), threads)?.flatten())
     }
 
-    /// `"auto"`, `"adaptive"`, `[columns, rows]` or `"COLUMNSxROWS"`.
+    /// `"auto"`, `"bisected"`, `"adaptive"`, `[columns, rows]` or `"COLUMNSxROWS"`.
     pub(super) fn tiles(&mut self, key: &'static str, most: u32) -> Result<Option<TilesChoice>, ConfigError> {
         let count = |number: u64| u32::try_from(number).ok().filter(|number| (1..=most).contains(number));
         let tiles = |value: &Value| match value {
             Value::String(text) if text == "auto" => Some(TilesChoice::Auto),
             Value::String(text) if text == "adaptive" => Some(TilesChoice::Adaptive),
+            Value::String(text) if text == "bisected" => Some(TilesChoice::Bisected),
             Value::String(text) => {
                 let (columns, rows) = text.split_once(['x', 'X'])?;
                 Some(TilesChoice::Counts([count(columns.parse().ok()?)?, count(rows.parse().ok()?)?]))
@@ -224,8 +227,9 @@ impl Settings {
             },
             _ => None,
         };
-        let must =
-            format!("\"auto\", \"adaptive\", or columns and rows as [17, 17] or \"17x17\", each within 1 to {most}");
+        let must = format!(
+            "\"auto\", \"bisected\", \"adaptive\", or columns and rows as [17, 17] or \"17x17\", each within 1 to {most}"
+        );
         self.get(key, must, tiles)
     }
 

@@ -144,7 +144,7 @@ fn every_key_can_be_given() {
     assert_eq!((config.run.transport, config.run.tiles), (Some(TransportKind::Channel), Some([4, 5])));
     assert_eq!(config.run.peer_timeout, Duration::from_millis(2500));
     assert_eq!((config.run.mpi_exchange, config.run.ranks_asked_for), (MpiExchange::Sparse, false));
-    assert_eq!(config.run.adaptive, Some(AdaptiveConfig { max_bodies: 600, retile_every: 8 }));
+    assert_eq!(config.run.retiling, Some(Retiling { how: Retile::Adaptive { max_bodies: 600 }, every: 8 }));
     assert_eq!(config.run.balance, Balance::Bodies);
     assert_eq!(config.params.instructions, Instructions::Portable);
     assert_eq!((config.params.dt, config.params.substeps), (1.0 / 120.0, 2));
@@ -157,21 +157,36 @@ fn every_key_can_be_given() {
     assert_eq!(config.output, OutputConfig { record_every: Some(10), checkpoint_every: Some(100), log_every: 5 });
 
     let keys: usize = text.lines().filter(|line| line.contains('=') && !line.contains('{')).count();
-    // The scene's four stand on one line; path, digest, jitter, base, angle and friction belong to other kinds.
-    assert_eq!(keys + 4 + 6, keys::KEYS.len(), "a key is missing from this test");
+    // The scene's four stand on one line; path, digest, jitter, base, angle and friction belong to other kinds, and tile_count to
+    // other tiles.
+    assert_eq!(keys + 4 + 7, keys::KEYS.len(), "a key is missing from this test");
 }
 
 #[test]
 fn overrides_win_and_the_last_of_them_most() {
     let config = read(ROOMS, &[("scene.bodies", "1e3"), ("bodies", "2000"), ("tiles", "3x2")]).unwrap();
     assert_eq!((config.scene.bodies, config.run.tiles), (2000, Some([3, 2])));
-    let adaptive = |overrides| read(ROOMS, overrides).unwrap().run.adaptive.map(|a| (a.max_bodies, a.retile_every));
-    assert_eq!(adaptive(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((48_000, 5)));
-    assert_eq!(adaptive(&[("tiles", "3x2"), ("max_bodies", "70")]), Some((70, 32)));
+    let retiling = |overrides: &[_]| read(ROOMS, overrides).unwrap().run.retiling.map(|r| (r.how, r.every));
+    let adaptive = |max_bodies| Retile::Adaptive { max_bodies };
+    assert_eq!(retiling(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((adaptive(48_000), 5)));
+    assert_eq!(retiling(&[("tiles", "3x2"), ("max_bodies", "70")]), Some((adaptive(70), 32)));
+    assert_eq!(retiling(&[("tiles", "bisected"), ("retile_every", "5")]), Some((Retile::Bisected, 5)));
+    for bisected in [&[("tile_count", "7")][..], &[("tiles", "bisected"), ("tile_count", "7")]] {
+        assert_eq!(
+            (retiling(bisected).unwrap().0, read(ROOMS, bisected).unwrap().run.tiles),
+            (Retile::Bisected, Some([7, 1]))
+        );
+    }
+    for both in [("tiles", "3x2"), ("tiles", "adaptive"), ("max_bodies", "70")] {
+        let error = read(ROOMS, &[both, ("tile_count", "7")]).unwrap_err();
+        assert_eq!(error, "--set run.tile_count=7: goes with tiles = \"bisected\" alone; leave one of them out");
+    }
+    let error = read(ROOMS, &[("tiles", "bisected"), ("max_bodies", "70")]).unwrap_err();
+    assert!(error.contains("tiles that are bisected have as much to do as each other; leave it out"), "{error}");
     let error = read(ROOMS, &[("tiles", "3x2"), ("retile_every", "5")]).unwrap_err();
     assert_eq!(
         error,
-        "--set run.retile_every=5: tiles stay as they are here; add tiles = \"adaptive\", or leave it out"
+        "--set run.retile_every=5: tiles stay as they are here; add tiles = \"bisected\" or \"adaptive\", or leave it out"
     );
     let config = read(ROOMS, &[("tiles", "3x2"), ("run.tiles", "auto"), ("kind", "pile")]).unwrap();
     assert_eq!((config.run.tiles, config.scene.kind.name()), (None, "pile"));
@@ -194,7 +209,11 @@ fn out_of_range_and_of_the_wrong_type() {
         ("run", "steps = 0", "test.toml: run.steps = 0: must be a whole number within 1 to"),
         ("run", "ranks = 0", "test.toml: run.ranks = 0: must be a whole number within 1 to 1024"),
         ("run", "threads = 0", "test.toml: run.threads = 0: must be \"auto\", or a whole number within 1 to 1024"),
-        ("run", "tiles = [0, 3]", "test.toml: run.tiles = [0, 3]: must be \"auto\", \"adaptive\", or columns and rows"),
+        (
+            "run",
+            "tiles = [0, 3]",
+            "test.toml: run.tiles = [0, 3]: must be \"auto\", \"bisected\", \"adaptive\", or columns and rows",
+        ),
         ("run", "tiles = [3]", "test.toml: run.tiles = [3]: must be"),
         ("run", "tiles = \"3by2\"", "test.toml: run.tiles = \"3by2\": must be"),
         (

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! `after` so many steps, before the next, the tiles became these: for each how often it was cut from its square, `a` for a
-//! square that is whole, in the order of [`Partition::forest`].
+//! square that is whole, in the order of [`Partition::forest`]; or, where borders move, for each cut the axis that it is made across
+//! and its place, as in `X80000000`, in the order of [`Partition::bisection`].
 
-use atoll_core::Partition;
+use atoll_core::{Bisector, Partition};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -17,13 +18,37 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The levels of a forest's tiles as text: a letter for each.
-pub(crate) fn in_letters(levels: &[u8]) -> String {
-    levels.iter().map(|level| char::from(b'a' + level)).collect()
+/// The letters of a cut across either axis, before its place.
+const AXES: [char; 2] = ['X', 'Y'];
+
+/// A cut as text has so many letters: the axis, and its place in hexadecimal digits.
+const CUT: usize = 9;
+
+/// What tells tiles that are not all equal from others over the same squares, as text: for each tile of a forest its level, `a` for
+/// none; for each cut of a bisection the axis and the place.
+pub(crate) fn in_letters(partition: &Partition) -> Option<String> {
+    let levels = |levels: &[u8]| levels.iter().map(|level| char::from(b'a' + level)).collect();
+    let cuts =
+        |cuts: &[Bisector]| cuts.iter().map(|cut| format!("{}{:08x}", AXES[cut.axis as usize], cut.at)).collect();
+    partition.levels().map(levels).or_else(|| partition.cuts().map(cuts))
 }
 
-/// The forest over columns x rows of squares whose levels were written as letters, if there is one.
+/// How many tiles a text tells of that [`in_letters`] wrote.
+pub(crate) fn tiles_in_letters(text: &str) -> usize {
+    if text.is_empty() || text.starts_with(AXES) { text.len() / CUT + 1 } else { text.len() }
+}
+
+/// The tiles over columns x rows of squares that were written as letters, if there are such.
 pub(crate) fn of_letters(text: &str, [low, high]: [DVec2; 2], [columns, rows]: [u32; 2]) -> Option<Partition> {
+    if text.is_empty() || text.starts_with(AXES) {
+        let cut = |cut: &[u8]| {
+            let text = std::str::from_utf8(cut).ok().filter(|text| text.len() == CUT)?;
+            let axis = AXES.iter().position(|axis| text.starts_with(*axis))? as u32;
+            Some(Bisector { axis, at: u32::from_str_radix(&text[1..], 16).ok()? })
+        };
+        let cuts: Option<Vec<Bisector>> = text.as_bytes().chunks(CUT).map(cut).collect();
+        return Partition::bisection(low, high, &cuts?).ok().filter(|tiles| tiles.roots() == [columns, rows]);
+    }
     let levels: Option<Vec<u8>> =
         text.bytes().map(|letter| letter.is_ascii_lowercase().then(|| letter - b'a')).collect();
     Partition::forest(low, high, columns, rows, &levels?).ok()
@@ -78,8 +103,8 @@ impl TilingsFile {
     /// # Errors
     /// What the system says.
     pub(crate) fn append(&mut self, after: u64, partition: &Partition) -> io::Result<()> {
-        let Some(levels) = partition.levels() else { return Ok(()) };
-        self.write(&Line { after, levels: in_letters(levels).into() })
+        let Some(levels) = in_letters(partition) else { return Ok(()) };
+        self.write(&Line { after, levels: levels.into() })
     }
 
     fn write(&mut self, line: &Line<'_>) -> io::Result<()> {
@@ -116,6 +141,25 @@ impl Tilings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cuts_are_letters_and_digits() {
+        let (low, high) = (DVec2::ZERO, DVec2::new(2.0, 1.0));
+        let cuts = [(0, 0x8000_0000), (1, 0x0000_1000), (1, 0xffff_ffff)].map(|(axis, at)| Bisector { axis, at });
+        for (count, text) in [(0, ""), (1, "X80000000"), (3, "X80000000Y00001000Yffffffff")] {
+            let partition = Partition::bisection(low, high, &cuts[..count]).unwrap();
+            assert_eq!(in_letters(&partition).as_deref(), Some(text));
+            assert_eq!(tiles_in_letters(text), count + 1);
+            assert_eq!(of_letters(text, [low, high], [count as u32 + 1, 1]), Some(partition));
+            assert_eq!(of_letters(text, [low, high], [count as u32 + 2, 1]), None);
+        }
+        for damaged in ["X8000000", "X8000000\u{e9}", "X8000000g", "X80000000X", "X80000000Z00001000", "X00000000"] {
+            assert_eq!(of_letters(damaged, [low, high], [2, 1]), None, "{damaged}");
+        }
+        let forest = Partition::forest(low, high, 2, 1, &[0, 1, 1, 1, 1]).unwrap();
+        assert_eq!(in_letters(&forest).map(|text| tiles_in_letters(&text)), Some(5));
+        assert_eq!(in_letters(&Partition::uniform(low, high, 2, 1).unwrap()), None);
+    }
 
     #[test]
     fn what_was_written_is_read_and_cut_off_where_a_run_goes_on() {

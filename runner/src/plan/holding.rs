@@ -23,7 +23,7 @@ impl<'a> Holding<'a> {
     pub(crate) fn new(partition: &'a Partition, tiles: &[TileId]) -> Self {
         let mut is_held = vec![false; partition.tiles()];
         tiles.iter().for_each(|tile| is_held[tile.0 as usize] = true);
-        if partition.levels().is_some() {
+        if !partition.is_uniform() {
             return Self { partition, held: Held::Tiles(is_held) };
         }
         let [columns, rows] = partition.roots().map(|count| count as usize);

@@ -1,10 +1,11 @@
 //! The default tile grid: a function of the scene and the physics alone, so that any number of ranks and threads
 //! computes the same world.
 
-use crate::config::{Config, MOST_TILES};
+use crate::config::{Config, MOST_TILES, Retile, Retiling};
 use crate::error::RunError;
 use crate::scene::Scene;
-use atoll_core::{Adaptive, Kind, Params, Partition};
+use atoll_core::{Adaptive, Census, Kind, Params, Partition, SetupError, Share, Turning, World};
+use bytemuck::AnyBitPattern;
 use glam::DVec2;
 
 /// Bodies in a tile of the default grid, on the average. So many stay in a core's L2 cache for a whole step; half as many
@@ -26,21 +27,112 @@ pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
         }
         let (low, high) = scene.domain();
         let halo_width = halo_width(&scene.kinds(), &config.params);
-        match config.run.adaptive {
-            None => default_counts(scene.bodies() as f64 / BODIES_PER_TILE, high - low, halo_width),
+        let tiles = scene.bodies() as f64 / BODIES_PER_TILE;
+        match config.run.retiling.map(|retiling| retiling.how) {
+            None => default_counts(tiles, high - low, halo_width),
             // Cut from these as often as is usual, evenly spread bodies with some contacts fill tiles by half.
-            Some(adaptive) => {
-                let tiles = scene.bodies() as f64 / (0.25 * adaptive.max_bodies as f64);
+            Some(Retile::Adaptive { max_bodies }) => {
+                let tiles = scene.bodies() as f64 / (0.25 * max_bodies as f64);
                 default_counts(tiles, high - low, halo_width).map(|count| ((count + CUT_IN / 2) / CUT_IN).max(1))
             }
+            Some(Retile::Bisected) => [tiles.round().clamp(1.0, MOST_TILES.into()) as u32, 1],
         }
     })
 }
 
-/// By which rule tiles follow the bodies of such kinds, if they do.
-pub(crate) fn rule(config: &Config, kinds: &[Kind]) -> Option<Adaptive> {
+/// By which rule tiles follow the bodies.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Rule {
+    /// They are cut and joined.
+    Adaptive(Adaptive),
+    /// Their borders move, every so many steps.
+    Bisected { halo_width: f64, every: u64 },
+}
+
+impl Rule {
+    /// How tiles follow the bodies before the next step; nothing if all stay as they are. `gather` has this rank
+    /// count, tells all others what it counted and gives what each of them did, or nothing if that is not to be.
+    ///
+    /// # Errors
+    /// Those of `gather`, and if what was told cannot be read or does not go together.
+    pub(crate) fn follow<E: From<Unfollowed>>(
+        &self,
+        world: &World,
+        mut gather: impl FnMut(&dyn Fn() -> Vec<u8>) -> Result<Option<Vec<Vec<u8>>>, E>,
+    ) -> Result<Option<Partition>, E> {
+        let old = world.partition();
+        match *self {
+            Self::Adaptive(ref rule) => {
+                let Some(told) = gather(&|| bytemuck::cast_slice(&world.census(rule)).to_vec())? else {
+                    return Ok(None);
+                };
+                let mut census: Vec<Census> = records(&told)?;
+                census.sort_by_key(|part| part.tile);
+                Ok(old.adapted(rule, &census).map_err(Unfollowed::Torn)?)
+            }
+            Self::Bisected { halo_width, every } => {
+                let mut followed: Option<Partition> = None;
+                let is_time = (world.step_count() / every).is_multiple_of(TURNED_EVERY);
+                let mut turning = if is_time { Turning::May } else { Turning::Never };
+                // What lies in tiles whose cuts have been turned is only known when it has been counted.
+                for _ in 0..=RECOUNTS {
+                    let cut = followed.as_ref().unwrap_or(old);
+                    let count = || bytemuck::cast_slice(&world.shares(cut, every / 2)).to_vec();
+                    let Some(told) = gather(&count)? else { return Ok(None) };
+                    let torn = Unfollowed::Torn(SetupError::BadBisection { cut: 0 });
+                    let shares = Share::added_up(cut.tiles(), records(&told)?.into_iter()).ok_or(torn)?;
+                    let next = cut.rebisected(&shares, halo_width, turning).map_err(Unfollowed::Torn)?;
+                    let Some((next, has_turned)) = next else { break };
+                    let is_first = followed.is_none();
+                    followed = Some(next);
+                    if is_first && !has_turned {
+                        break;
+                    }
+                    turning = Turning::Has;
+                }
+                Ok(followed)
+            }
+        }
+    }
+}
+
+/// Cuts are turned only every so many times that tiles follow the bodies: all that lies behind them moves.
+const TURNED_EVERY: u64 = 4;
+
+/// Then all is counted so often again.
+const RECOUNTS: u32 = 2;
+
+/// Why nobody knows how tiles follow the bodies.
+#[derive(Debug)]
+pub(crate) enum Unfollowed {
+    /// What the rank of this number told cannot be read.
+    Unreadable(usize),
+    /// It does not go together.
+    Torn(SetupError),
+}
+
+/// What ranks told, as records.
+fn records<T: AnyBitPattern>(told: &[Vec<u8>]) -> Result<Vec<T>, Unfollowed> {
+    let mut all = Vec::new();
+    for (rank, told) in told.iter().enumerate() {
+        let records = told.chunks_exact(size_of::<T>());
+        if !records.remainder().is_empty() {
+            return Err(Unfollowed::Unreadable(rank));
+        }
+        all.extend(records.map(bytemuck::pod_read_unaligned::<T>));
+    }
+    Ok(all)
+}
+
+/// By which rule tiles follow the bodies of such kinds, and every how many steps, if they do.
+pub(crate) fn rule(config: &Config, kinds: &[Kind]) -> Option<(Rule, u64)> {
+    let Retiling { how, every } = config.run.retiling?;
     let halo_width = atoll_core::halo_width(kinds, &config.params);
-    config.run.adaptive.map(|adaptive| Adaptive::new(adaptive.max_bodies, halo_width))
+    let rule = match how {
+        Retile::Adaptive { max_bodies } => Rule::Adaptive(Adaptive::new(max_bodies, halo_width)),
+        Retile::Bisected => Rule::Bisected { halo_width, every },
+    };
+    Some((rule, every))
 }
 
 /// The tiles that a run begins with. Where they follow the bodies, these are counted by a sample: what that misses is put right
@@ -54,7 +146,9 @@ pub(crate) fn first_partition(
     [columns, rows]: [u32; 2],
 ) -> Result<Partition, RunError> {
     let (low, high) = scene.domain();
-    let Some(rule) = rule(config, &scene.kinds()) else { return Ok(Partition::uniform(low, high, columns, rows)?) };
+    let Some((rule, _)) = rule(config, &scene.kinds()) else {
+        return Ok(Partition::uniform(low, high, columns, rows)?);
+    };
     let mut failed = None;
     let places = scene.sample().map_while(|sample| match sample {
         Ok((bodies, place)) => Some((place, bodies)),
@@ -63,7 +157,10 @@ pub(crate) fn first_partition(
             None
         }
     });
-    let partition = Partition::adaptive(low, high, [columns, rows], &rule, places);
+    let partition = match rule {
+        Rule::Adaptive(rule) => Partition::adaptive(low, high, [columns, rows], &rule, places),
+        Rule::Bisected { halo_width, .. } => Partition::bisected(low, high, columns * rows, halo_width, places),
+    };
     match failed {
         Some(error) => Err(error.into()),
         None => Ok(partition?),
@@ -71,10 +168,13 @@ pub(crate) fn first_partition(
 }
 
 /// How the domain is cut.
-pub(crate) fn in_words([columns, rows]: [u32; 2], max_bodies: Option<u64>) -> String {
-    match max_bodies {
+pub(crate) fn in_words([columns, rows]: [u32; 2], how: Option<Retile>) -> String {
+    match how {
         None => format!("{columns} x {rows} tiles"),
-        Some(most) => format!("tiles of {most} bodies at most, cut from {columns} x {rows} squares"),
+        Some(Retile::Adaptive { max_bodies }) => {
+            format!("tiles of {max_bodies} bodies at most, cut from {columns} x {rows} squares")
+        }
+        Some(Retile::Bisected) => format!("{} tiles with borders that follow the bodies", columns * rows),
     }
 }
 

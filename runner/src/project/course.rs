@@ -1,7 +1,8 @@
 //! What a run takes, tile by tile: its steps made here on one thread, each tile's time and what it tells others kept over time.
 
 use crate::error::RunError;
-use crate::plan::{Plan, tiles};
+use crate::plan::Plan;
+use crate::plan::tiles::{self, Unfollowed};
 use crate::rank::balance::thread_time;
 use crate::rank::{Observer, part_of_scene};
 use atoll_core::{Change, Halo, Inbox, Loopback, NotHere, Outbox, Partition, SetupError, StepError, World};
@@ -16,6 +17,9 @@ const MOST_TIMES: u64 = 1 << 26;
 /// What tiles tell each other is kept as the mean over so many steps.
 const TRAFFIC: u64 = 16;
 
+/// With every time that a run is made, the tile that each step begins with is so many further on.
+const FIRST: usize = 31;
+
 /// What a tile tells another: from, to, bytes in a step.
 pub(super) type Told = (u32, u32, f64);
 
@@ -28,8 +32,21 @@ pub(super) struct Course {
     pub windows: Vec<Window>,
     /// How the domain is cut, in the order of steps: at first, and whenever that changes.
     pub tilings: Vec<Tiling>,
+    /// Where tiles follow the bodies, every time that was looked at.
+    pub countings: Vec<Counting>,
     /// Sync points of a step.
     pub syncs: f64,
+}
+
+/// All ranks tell each other what there is to do, and work out the same new tiles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counting {
+    /// Before which step.
+    pub step: u64,
+    /// It took so long to count all, and to work out new tiles, which every rank does.
+    pub seconds: [f64; 2],
+    /// What was told.
+    pub bytes: f64,
 }
 
 /// Tiles from a step on.
@@ -67,17 +84,32 @@ pub(super) struct Moment {
 }
 
 impl Course {
-    /// Makes the steps of a plan of one rank, on this thread. None if somebody asked to stop before all were made.
+    /// Makes the steps of a plan of one rank, on this thread, so many times: the least that a tile took in a step is what it takes
+    /// when nothing disturbs it. None if somebody asked to stop before all were made.
     ///
     /// # Errors
     /// If no world can be made of it, or its state is no longer finite.
-    pub(super) fn run(plan: &Plan, observer: &Observer) -> Result<Option<Self>, RunError> {
+    pub(super) fn run(plan: &Plan, times: u32, observer: &Observer) -> Result<Option<Self>, RunError> {
+        let Some(mut course) = Self::make(plan, 0, observer)? else { return Ok(None) };
+        for time in 1..times {
+            let Some(again) = Self::make(plan, time, observer)? else { return Ok(None) };
+            course.moments.iter_mut().zip(&again.moments).for_each(|(moment, again)| moment.take_least(again));
+            let countings = course.countings.iter_mut().zip(&again.countings);
+            countings.for_each(|(a, b)| a.seconds = [0, 1].map(|part| a.seconds[part].min(b.seconds[part])));
+        }
+        Ok(Some(course))
+    }
+
+    /// Makes the steps of a plan once.
+    fn make(plan: &Plan, time: u32, observer: &Observer) -> Result<Option<Self>, RunError> {
         let mut world = part_of_scene(plan, Rank(0))?;
         world.book_time(thread_time);
+        // Of several times, each has other tiles be the first.
+        world.begin_with(FIRST * time as usize);
         let (steps, partition) = (plan.config.run.steps, world.partition().clone());
         let stride = (steps * partition.tiles() as u64).div_ceil(MOST_TIMES).max(1);
         let tilings = vec![Tiling { step: 0, partition, changes: Vec::new() }];
-        let mut course = Self { moments: Vec::new(), windows: Vec::new(), tilings, syncs: 0.0 };
+        let mut course = Self { moments: Vec::new(), windows: Vec::new(), tilings, countings: Vec::new(), syncs: 0.0 };
         let mut tap = Tap::default();
         let (told, mut before) = (observer.steps(true, 0, steps), thread_time());
         for step in 0..steps {
@@ -107,16 +139,27 @@ impl Course {
         Ok(Some(course))
     }
 
-    /// Lets tiles be cut and joined when it is time to. Says whether any was.
+    /// Lets tiles follow the bodies when it is time to. Says whether any changed.
     fn retile(&mut self, plan: &Plan, step: u64, world: &mut World) -> Result<bool, SetupError> {
-        let Some((rule, adaptive)) = tiles::rule(&plan.config, &plan.blueprint.kinds).zip(plan.config.run.adaptive)
-        else {
-            return Ok(false);
-        };
-        if !step.is_multiple_of(adaptive.retile_every) {
+        let Some((rule, every)) = tiles::rule(&plan.config, &plan.blueprint.kinds) else { return Ok(false) };
+        if !step.is_multiple_of(every) {
             return Ok(false);
         }
-        let Some(partition) = world.partition().adapted(&rule, &world.census(&rule))? else { return Ok(false) };
+        let (begun, mut counted, mut bytes) = (thread_time(), Duration::ZERO, 0);
+        let new = rule.follow(world, |count| {
+            let before = thread_time();
+            let own = count();
+            counted += thread_time() - before;
+            bytes += own.len();
+            Ok::<_, Unfollowed>(Some(vec![own]))
+        });
+        let new = new.map_err(|error| match error {
+            Unfollowed::Unreadable(_) => unreachable!("what a rank tells itself"),
+            Unfollowed::Torn(error) => error,
+        })?;
+        let seconds = [counted, (thread_time() - begun).saturating_sub(counted)].map(|time| time.as_secs_f64());
+        self.countings.push(Counting { step, seconds, bytes: bytes as f64 });
+        let Some(partition) = new else { return Ok(false) };
         let changes = world.partition().changes(&partition).expect("one follows from the other");
         world.retile(&partition)?;
         // What was booked before is another moment's.
@@ -157,6 +200,12 @@ impl Course {
 }
 
 impl Moment {
+    /// Of two runs alike, what took less time.
+    fn take_least(&mut self, other: &Self) {
+        self.tiles.iter_mut().zip(&other.tiles).for_each(|(time, other)| *time = time.min(*other));
+        self.rest = self.rest.min(other.rest);
+    }
+
     /// Makes means of sums.
     fn divide(&mut self) {
         self.tiles.iter_mut().for_each(|time| *time /= self.steps as f32);
@@ -207,6 +256,6 @@ impl Course {
         let tilings = vec![Tiling { step: 0, partition, changes: Vec::new() }];
         let windows = moments.iter().step_by(TRAFFIC as usize);
         let windows = windows.map(|first| Window { step: first.step, told: told.clone(), bodies: bodies.clone() });
-        Self { windows: windows.collect(), moments, tilings, syncs: 1.0 }
+        Self { windows: windows.collect(), moments, tilings, countings: Vec::new(), syncs: 1.0 }
     }
 }

@@ -13,7 +13,7 @@ pub use network::Network;
 pub(crate) use plot::svg;
 pub use predict::Prediction;
 
-use crate::config::Balance;
+use crate::config::{Balance, Retile};
 use crate::error::RunError;
 use crate::plan::Plan;
 use crate::rank::Observer;
@@ -33,6 +33,8 @@ pub struct Wanted {
     pub ranks: Vec<usize>,
     /// Threads of each.
     pub threads: usize,
+    /// How many times the run is made here.
+    pub times: u32,
     /// Between them.
     pub network: Network,
 }
@@ -53,6 +55,9 @@ pub struct Projection {
     /// Bodies that a tile has at most before it is cut, if tiles follow the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_bodies: Option<u64>,
+    /// How tiles follow the bodies, if they do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retile: Option<Retile>,
     /// Of the network, in seconds.
     pub latency_s: f64,
     /// Of a rank, each way, in bytes per second.
@@ -72,8 +77,8 @@ impl Projection {
     pub fn make(plan: &Plan, wanted: &Wanted, observer: &Observer) -> Result<Option<Self>, RunError> {
         let failed = |reason: String| RunError::Threads { rank: Rank(0), threads: 1, reason };
         let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| failed(error.to_string()))?;
-        let Some(course) = pool.install(|| Course::run(plan, observer))? else { return Ok(None) };
-        let &Wanted { ref ranks, threads, network } = wanted;
+        let Some(course) = pool.install(|| Course::run(plan, wanted.times, observer))? else { return Ok(None) };
+        let &Wanted { ref ranks, threads, network, .. } = wanted;
         let one = |ranks: usize, rule| predict(&course, Machine { ranks, threads, network }, rule);
         let rules = |ranks: usize| if ranks == 1 { &RULES[..1] } else { &RULES };
         let predictions = ranks.iter().flat_map(|&ranks| rules(ranks).iter().map(move |&rule| (ranks, rule)));
@@ -84,7 +89,8 @@ impl Projection {
             bodies: plan.scene.bodies(),
             steps: plan.config.run.steps,
             tiles: plan.tiles,
-            max_bodies: plan.config.run.adaptive.map(|adaptive| adaptive.max_bodies),
+            max_bodies: plan.config.run.max_bodies(),
+            retile: plan.config.run.retiling.map(|retiling| retiling.how),
             latency_s: network.latency,
             bandwidth: network.bandwidth,
             ms_per_step_alone: alone.ms_per_step,

@@ -53,6 +53,15 @@ impl Network {
     }
 }
 
+/// How ranks come to know what each of them tells.
+impl Network {
+    /// How long it takes that all have all of so many bytes, of which each tells its part, in seconds: in rounds in which what is known
+    /// doubles.
+    pub(super) fn all_gather(&self, bytes: f64, ranks: usize) -> f64 {
+        if ranks == 1 { 0.0 } else { self.sync(ranks) + bytes * (BYTE + 1.0 / self.bandwidth) }
+    }
+}
+
 impl FromStr for Network {
     type Err = String;
 

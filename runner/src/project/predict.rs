@@ -89,6 +89,7 @@ impl Sums {
 pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Prediction {
     let Machine { ranks, threads, network } = machine;
     let (mut tiling, mut next) = (&course.tilings[0].partition, 1);
+    let mut countings = course.countings.iter().peekable();
     let mut assignment = Assignment::balanced(tiling, &course.windows[0].bodies, ranks);
     let (every, mut since) = (steps_between(ranks) as u64, 0);
     let mut costs = vec![0.0; tiling.tiles()];
@@ -102,6 +103,10 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
             (assignment, moving) = follow(&assignment, new, bodies, &network);
             costs = dealt(&costs, &new.changes);
             (tiling, next, loads_of) = (&new.partition, next + 1, None);
+        }
+        while let Some(counting) = countings.next_if(|counting| counting.step <= moment.step) {
+            let [count, cut] = counting.seconds;
+            moving.1 += count / ranks as f64 + cut + network.all_gather(counting.bytes, ranks);
         }
         let window = course.window(moment.step);
         if loads_of != Some(window) {

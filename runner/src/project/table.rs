@@ -6,7 +6,7 @@ use std::fmt;
 
 impl fmt::Display for Projection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let tiling = tiles::in_words(self.tiles, self.max_bodies);
+        let tiling = tiles::in_words(self.tiles, self.retile);
         let (bodies, steps, alone) = (self.bodies, self.steps, self.ms_per_step_alone);
         writeln!(f, "{}: {bodies} bodies, {tiling}, {steps} steps of {alone:.3} ms on one thread", self.scene)?;
         let (latency, bandwidth) = (self.latency_s * 1e6, self.bandwidth * 1e-9);

@@ -7,6 +7,7 @@ pub(crate) mod trace;
 
 pub use timings::RankTimings;
 
+use crate::config::Retile;
 use crate::plan::Plan;
 use crate::rank::trace::RankTrace;
 use crate::rank::{Gathered, RankFacts};
@@ -56,6 +57,9 @@ pub struct Summary {
     /// Bodies that a tile has at most before it is cut, if tiles follow the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_bodies: Option<u64>,
+    /// How tiles follow the bodies, if they do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retile: Option<Retile>,
     /// How many tiles there are after the last step.
     pub tile_count: u64,
     /// What carried bytes between ranks.
@@ -158,7 +162,8 @@ impl Summary {
             ranks: ranks.len(),
             threads,
             tiles: plan.tiles,
-            max_bodies: plan.config.run.adaptive.map(|adaptive| adaptive.max_bodies),
+            max_bodies: plan.config.run.max_bodies(),
+            retile: plan.config.run.retiling.map(|retiling| retiling.how),
             tile_count: all.tile_count,
             transport: plan.transport.name(),
             machine: machine::words(),

@@ -9,7 +9,7 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
-        let tiling = tiles::in_words(self.tiles, self.max_bodies);
+        let tiling = tiles::in_words(self.tiles, self.retile);
         let seed = if self.is_seeded { format!(", seed {}", self.seed) } else { String::new() };
         writeln!(f, "{}: {} bodies{seed}, {tiling}", self.scene, self.bodies)?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;

@@ -53,6 +53,19 @@ fn a_projection_follows_tiles_that_are_cut_and_joined() {
 }
 
 #[test]
+fn a_projection_follows_borders_that_move() {
+    let desk = Desk::new(SMALL);
+    let tiles = "--bodies 3000 --set tile_count=6 --set retile_every=3";
+    let ended = project(&desk, &format!("{tiles} --steps 50 --times 2 --ranks 1,6 --json p.json --quiet"));
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
+    assert!(ended.stdout.contains("6 tiles with borders that follow the bodies"), "{ended}");
+    let json: Value = serde_json::from_slice(&fs::read(desk.path().join("p.json")).unwrap()).unwrap();
+    assert_eq!(json["retile"], "bisected");
+    let rows = json["predictions"].as_array().unwrap();
+    assert!(rows.iter().all(|row| row["moving_ms"].as_f64().unwrap() > 0.0 && row["tiles_moved"] == 0), "{rows:?}");
+}
+
+#[test]
 fn what_cannot_be_projected_is_refused() {
     let desk = Desk::new(SMALL);
     for (options, expected) in [

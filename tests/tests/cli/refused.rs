@@ -41,11 +41,11 @@ fn sizes_must_be_positive() {
     }
     refused("--bodies 99", "--bodies 99: must be a whole number within 100 to ");
     refused("--seed -1", "--seed -1: must be a whole number within 0 to ");
-    refused("--tiles=-1x2", "--tiles -1x2: must be \"auto\", \"adaptive\", or columns and rows");
+    refused("--tiles=-1x2", "--tiles -1x2: must be \"auto\", \"bisected\", \"adaptive\", or columns and rows");
     for value in ["0x3", "3x0", "3", "axb", "3x2x1", "nan", "70000x1"] {
         refused(
             &format!("--tiles {value}"),
-            &format!("--tiles {value}: must be \"auto\", \"adaptive\", or columns and rows"),
+            &format!("--tiles {value}: must be \"auto\", \"bisected\", \"adaptive\", or columns and rows"),
         );
     }
 }

@@ -29,6 +29,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     }
     tile.counts.migrations = arrivals.len() as u64;
     settle(tile, arrivals);
+    tile.change_statics();
     for message in mail.messages() {
         for record in message.contacts {
             let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };

@@ -155,10 +155,18 @@ impl Partition {
         Forest::new(forest.roots().clone(), &levels).map(|forest| Some(Self(Cut::Forest(forest))))
     }
 
-    /// What of a forest becomes what of another over the same squares, in ascending order, tiles that stay as they are included.
-    /// Nothing if the two do not go together.
+    /// What of a forest becomes what of another over the same squares, in ascending order, tiles that stay as they are included; of a
+    /// bisection all tiles stay, though their borders move. Nothing if the two do not go together.
     pub fn changes(&self, new: &Self) -> Option<Vec<Change>> {
-        let (Cut::Forest(a), Cut::Forest(b)) = (&self.0, &new.0) else { return None };
+        let is_alike = (self.tiles(), self.min(), self.max()) == (new.tiles(), new.min(), new.max());
+        let (a, b) = match (&self.0, &new.0) {
+            (Cut::Forest(a), Cut::Forest(b)) => (a, b),
+            (Cut::Bisection(_), Cut::Bisection(_)) if is_alike => {
+                let same = |tile| Change { old: tile..tile + 1, new: tile..tile + 1 };
+                return Some((0..self.tiles() as u32).map(same).collect());
+            }
+            _ => return None,
+        };
         if a.roots() != b.roots() {
             return None;
         }

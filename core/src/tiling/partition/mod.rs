@@ -1,17 +1,24 @@
 //! Who owns what, and who needs to know: the geometry of tiles.
 
+mod bisect;
+mod bisection;
 mod census;
 mod forest;
 mod grid;
 #[cfg(test)]
 mod tests;
+mod tree;
 
+pub(crate) use bisect::{Counter, GHOST};
+pub use bisect::{Share, Turning};
+use bisection::Bisection;
+pub use bisection::Bisector;
 pub(crate) use census::CONTACT;
 pub use census::{Adaptive, Census, Change};
 
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
-use forest::{Forest, Meeting};
+use forest::Forest;
 use glam::{DVec2, Vec2};
 use grid::{Grid, Span};
 
@@ -28,6 +35,8 @@ enum Cut {
     Uniform(Grid),
     /// Tiles that are cut in four as often as there is reason to.
     Forest(Forest),
+    /// Tiles that are cut in two wherever that shares what there is to do.
+    Bisection(Bisection),
 }
 
 impl Partition {
@@ -50,17 +59,35 @@ impl Partition {
         Forest::new(Grid::new(min, max, columns, rows)?, levels).map(|forest| Self(Cut::Forest(forest)))
     }
 
+    /// Whether all tiles are equal.
+    pub fn is_uniform(&self) -> bool {
+        matches!(self.0, Cut::Uniform(_))
+    }
+
     /// The levels of all tiles, if it is a [`forest`](Self::forest): with [`roots`](Self::roots) they tell all of it.
     pub fn levels(&self) -> Option<&[u8]> {
         match &self.0 {
-            Cut::Uniform(_) => None,
+            Cut::Uniform(_) | Cut::Bisection(_) => None,
             Cut::Forest(forest) => Some(forest.levels()),
         }
     }
 
-    /// Columns and rows of tiles; of a forest those of the squares that are cut further.
+    /// The cuts, if it is a [`bisection`](Self::bisection): they tell all of it.
+    pub fn cuts(&self) -> Option<&[Bisector]> {
+        match &self.0 {
+            Cut::Uniform(_) | Cut::Forest(_) => None,
+            Cut::Bisection(bisection) => Some(bisection.cuts()),
+        }
+    }
+
+    /// Columns and rows of tiles; of a forest those of the squares that are cut further; of a bisection, a row of all.
     pub fn roots(&self) -> [u32; 2] {
-        [self.grid().columns() as u32, self.grid().rows() as u32]
+        let of_grid = |grid: &Grid| [grid.columns() as u32, grid.rows() as u32];
+        match &self.0 {
+            Cut::Uniform(grid) => of_grid(grid),
+            Cut::Forest(forest) => of_grid(forest.roots()),
+            Cut::Bisection(bisection) => [bisection.tiles() as u32, 1],
+        }
     }
 
     /// How many tiles there are.
@@ -68,23 +95,25 @@ impl Partition {
         match &self.0 {
             Cut::Uniform(grid) => grid.cells(),
             Cut::Forest(forest) => forest.levels().len(),
+            Cut::Bisection(bisection) => bisection.tiles(),
         }
     }
 
     /// The low corner of the domain.
     pub fn min(&self) -> DVec2 {
-        self.grid().min()
+        match &self.0 {
+            Cut::Uniform(grid) => grid.min(),
+            Cut::Forest(forest) => forest.roots().min(),
+            Cut::Bisection(bisection) => bisection.min(),
+        }
     }
 
     /// The high corner of the domain.
     pub fn max(&self) -> DVec2 {
-        self.grid().max()
-    }
-
-    fn grid(&self) -> &Grid {
         match &self.0 {
-            Cut::Uniform(grid) => grid,
-            Cut::Forest(forest) => forest.roots(),
+            Cut::Uniform(grid) => grid.max(),
+            Cut::Forest(forest) => forest.roots().max(),
+            Cut::Bisection(bisection) => bisection.max(),
         }
     }
 
@@ -94,6 +123,7 @@ impl Partition {
         match &self.0 {
             Cut::Uniform(grid) => TileId(grid.locate(point)),
             Cut::Forest(forest) => forest.locate(point),
+            Cut::Bisection(bisection) => bisection.locate(point),
         }
     }
 
@@ -103,6 +133,7 @@ impl Partition {
         match &self.0 {
             Cut::Uniform(grid) => grid.region(tile.0),
             Cut::Forest(forest) => forest.region(tile),
+            Cut::Bisection(bisection) => bisection.region(tile),
         }
     }
 
@@ -110,7 +141,7 @@ impl Partition {
     pub fn rectangle(&self, tile: TileId) -> Region {
         match &self.0 {
             Cut::Uniform(grid) => grid.rectangle(tile.0),
-            Cut::Forest(forest) => forest.rectangle(tile),
+            Cut::Forest(_) | Cut::Bisection(_) => self.region(tile).closed(self.min(), self.max()),
         }
     }
 
@@ -120,7 +151,8 @@ impl Partition {
             Cut::Uniform(grid) => {
                 (grid.place(tile.0).map(|place| place as u64), [grid.columns() as u64, grid.rows() as u64])
             }
-            Cut::Forest(forest) => forest.cell(tile),
+            Cut::Forest(forest) => forest.cell(tile, self.rectangle(tile).min),
+            Cut::Bisection(bisection) => (bisection.blocks()[tile.0 as usize].min, [bisection::PARTS; 2]),
         }
     }
 
@@ -144,6 +176,7 @@ impl Partition {
         match &self.0 {
             Cut::Uniform(grid) => Met::Uniform(grid.span(low, high)),
             Cut::Forest(forest) => Met::Forest(forest.meeting(low, high)),
+            Cut::Bisection(bisection) => Met::Bisection(bisection.meeting(low, high)),
         }
     }
 
@@ -165,7 +198,8 @@ impl Partition {
 #[derive(Clone, Debug)]
 enum Met<'a> {
     Uniform(Span),
-    Forest(Meeting<'a>),
+    Forest(forest::Meeting<'a>),
+    Bisection(bisection::Meeting<'a>),
 }
 
 impl Iterator for Met<'_> {
@@ -176,6 +210,7 @@ impl Iterator for Met<'_> {
         match self {
             Met::Uniform(span) => span.next().map(TileId),
             Met::Forest(meeting) => meeting.next(),
+            Met::Bisection(meeting) => meeting.next(),
         }
     }
 }
@@ -193,6 +228,19 @@ impl Region {
     /// The same rectangle moved inward on every side; a point within it is further than `inset` from any other tile.
     pub(crate) fn shrunk(&self, inset: f64) -> Self {
         Self { min: self.min + DVec2::splat(inset), max: self.max - DVec2::splat(inset) }
+    }
+
+    /// A rectangle of a domain, and what lies beyond of that where it is outermost.
+    fn opened(self, low: DVec2, high: DVec2) -> Self {
+        Self {
+            min: DVec2::select(self.min.cmple(low), DVec2::NEG_INFINITY, self.min),
+            max: DVec2::select(self.max.cmpge(high), DVec2::INFINITY, self.max),
+        }
+    }
+
+    /// The part of it that lies in a domain.
+    fn closed(self, low: DVec2, high: DVec2) -> Self {
+        Self { min: self.min.max(low), max: self.max.min(high) }
     }
 
     /// Width and height, in meters.

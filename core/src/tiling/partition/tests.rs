@@ -1,6 +1,7 @@
 //! Owners and regions against each other and against trying every tile.
 
-use super::{Adaptive, Partition, Region};
+use super::bisect::Counter;
+use super::{Adaptive, Bisector, Partition, Region, Turning};
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
 use crate::testing::cases;
@@ -40,7 +41,20 @@ fn any_partition() -> impl Strategy<Value = Partition> {
         let levels = levels(squares.tiles(), &choices);
         Partition::forest(squares.min(), squares.max(), columns, rows, &levels).ok()
     });
-    prop_oneof![any_uniform(40), forest]
+    prop_oneof![any_uniform(40), forest, any_bisection()]
+}
+
+/// A bisection made for bodies that lie anywhere, or all in one place.
+fn any_bisection() -> impl Strategy<Value = Partition> {
+    let places = prop::collection::vec((0.0_f64..1.0, 0.0_f64..1.0, 1_u64..50), 0..60);
+    (any_uniform(1), 1_u32..90, places, any::<bool>()).prop_filter_map(
+        "tiles without a width",
+        |(all, tiles, places, one)| {
+            let (low, size) = (all.min(), all.max() - all.min());
+            let place = |(x, y, bodies)| (low + size * if one { DVec2::splat(0.3) } else { DVec2::new(x, y) }, bodies);
+            Partition::bisected(low, all.max(), tiles, 0.0, places.into_iter().map(place)).ok()
+        },
+    )
 }
 
 fn tiles(partition: &Partition) -> impl Iterator<Item = TileId> + use<> {
@@ -266,4 +280,69 @@ fn grids_without_sense_are_refused() {
     // A million columns between two neighbouring numbers have no width.
     let far = DVec2::splat(1e15);
     assert!(refused(far, far + one, 1_000_000, 1).contains("width"));
+}
+
+/// A square with a dense corner: places of which no two have a coordinate in common.
+fn corner() -> impl Iterator<Item = DVec2> {
+    let spread = |count: u32, side: f64| {
+        let place =
+            move |k: u32| side * DVec2::new((f64::from(k) * 0.618_033_988_75).fract(), f64::from(k) / f64::from(count));
+        (0..count).map(place)
+    };
+    spread(10_000, 0.3).chain(spread(2500, 1.0))
+}
+
+/// How many times the mean the tile with most to do has.
+fn unevenness(partition: &Partition) -> f64 {
+    let mut counts = vec![0_u32; partition.tiles()];
+    corner().for_each(|place| counts[partition.locate(place).0 as usize] += 1);
+    f64::from(counts.iter().copied().max().unwrap()) * counts.len() as f64 / 12_500.0
+}
+
+#[test]
+fn tiles_that_are_bisected_have_as_much_to_do_each() {
+    for tiles in [1, 2, 3, 7, 50, 144] {
+        let partition =
+            Partition::bisected(DVec2::ZERO, DVec2::ONE, tiles, 0.0, corner().map(|place| (place, 1))).unwrap();
+        assert_eq!((partition.tiles(), partition.roots()), (tiles as usize, [tiles, 1]));
+        assert!(unevenness(&partition) < 1.12, "{tiles}: {}", unevenness(&partition));
+    }
+}
+
+#[test]
+fn borders_move_to_where_there_is_much_to_do_and_stay_there() {
+    let even = (0..400).map(|k| (DVec2::new(f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5) / 20.0, 1));
+    let mut partition = Partition::bisected(DVec2::ZERO, DVec2::ONE, 12, 0.0, even).unwrap();
+    assert!(unevenness(&partition) > 3.0);
+    let (mut moves, mut turns) = (0, 0);
+    for _ in 0..20 {
+        let mut counter = Counter::new(&partition);
+        corner().for_each(|place| counter.add(&partition, place, 1));
+        let shares = super::Share::added_up(12, counter.shares().into_iter()).unwrap();
+        let Some((next, has_turned)) = partition.rebisected(&shares, 0.0, Turning::May).unwrap() else { break };
+        (partition, moves, turns) = (next, moves + 1, turns + u32::from(has_turned));
+    }
+    assert!(unevenness(&partition) < 1.12 && (1..20).contains(&moves), "{moves} {turns} {}", unevenness(&partition));
+    let cuts = partition.cuts().unwrap().to_vec();
+    assert_eq!(Partition::bisection(DVec2::ZERO, DVec2::ONE, &cuts).unwrap(), partition);
+    // Shares of other tiles are refused.
+    assert!(partition.rebisected(&[], 0.0, Turning::Never).is_err());
+}
+
+#[test]
+fn cuts_must_lie_within_what_they_cut() {
+    let cut = |axis, at| Bisector { axis, at };
+    let refused = |cuts: &[Bisector]| match Partition::bisection(DVec2::ZERO, DVec2::ONE, cuts) {
+        Err(SetupError::BadBisection { cut }) => cut,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(refused(&[cut(0, 0)]), 0);
+    assert_eq!(refused(&[cut(2, 7)]), 0);
+    // Of three tiles one lies before the first cut; the second is of the other part.
+    assert_eq!(refused(&[cut(0, 1 << 31), cut(0, 1 << 31)]), 1);
+    assert!(Partition::bisection(DVec2::ZERO, DVec2::ONE, &[cut(0, 1 << 31), cut(0, (1 << 31) + 1)]).is_ok());
+    assert!(Partition::bisection(DVec2::ZERO, DVec2::new(1.0, f64::NAN), &[]).is_err());
+    // So near to each other that no number lies between.
+    let (low, high) = (DVec2::splat(1e15), DVec2::splat(1e15 + 1.0));
+    assert!(Partition::bisection(low, high, &[cut(0, 1), cut(0, 2)]).is_err());
 }

@@ -21,6 +21,9 @@ pub struct ProjectArgs {
     /// Threads of each rank.
     #[arg(long, value_name = "T", default_value_t = 1, value_parser = threads)]
     pub threads: usize,
+    /// Makes the run so many times: what a tile takes in a step is the least that it took.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub times: u32,
     /// What is between ranks: node, cluster, ethernet, or a latency and a bandwidth such as 2us,10GB/s.
     #[arg(long, value_name = "NETWORK", default_value = "cluster")]
     pub network: Network,
@@ -33,7 +36,7 @@ pub struct ProjectArgs {
     /// Chooses among the random variants of the scene.
     #[arg(long, value_name = "N")]
     pub seed: Option<String>,
-    /// Columns and rows of tiles, such as 17x17; auto, or adaptive: they follow the bodies.
+    /// Columns and rows of tiles, such as 17x17; auto; bisected or adaptive: they follow the bodies.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
     /// Any key of the configuration, by its full path or an unambiguous last part; may be repeated.

@@ -17,7 +17,7 @@ pub struct RunArgs {
     /// What wins over the file's values.
     #[command(flatten)]
     pub values: ValueArgs,
-    /// Columns and rows of tiles, such as 17x17; auto, or adaptive: they follow the bodies.
+    /// Columns and rows of tiles, such as 17x17; auto; bisected or adaptive: they follow the bodies.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
     /// Write the summary to this file, as JSON.

@@ -16,7 +16,7 @@ pub struct ViewArgs {
     /// What wins over the values of a configuration.
     #[command(flatten)]
     pub values: ValueArgs,
-    /// Columns and rows of tiles, such as 17x17; auto, or adaptive; of a configuration.
+    /// Columns and rows of tiles, such as 17x17; auto, bisected or adaptive; of a configuration.
     #[arg(long, value_name = "CxR")]
     pub tiles: Option<String>,
     /// Write configuration, summary, log and what hands do to this folder, which must be new or empty; of a configuration.

@@ -3,7 +3,7 @@
 use super::{SnapshotError, SnapshotFile, store};
 use crate::command::State;
 use crate::config::other_run;
-use crate::folder::tilings::of_letters;
+use crate::folder::tilings::{of_letters, tiles_in_letters};
 use atoll_core::{Hashes, Partition, SetupError, TileId, World};
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ impl Snapshot {
         let (first, ranks) = (&files[0].facts, files.len() as u32);
         let tiles: usize = files.iter().map(|file| file.blocks.len()).sum();
         let [columns, rows] = first.tiles.map(u64::from);
-        if first.levels.as_ref().map_or(columns * rows, |levels| levels.len() as u64) != tiles as u64 {
+        if first.levels.as_deref().map_or(columns * rows, |text| tiles_in_letters(text) as u64) != tiles as u64 {
             return Err(SnapshotError::damaged(folder, format!("its files have {tiles} tiles, not those of its grid")));
         }
         let mut places = vec![None; tiles];
@@ -84,7 +84,7 @@ impl Snapshot {
     pub fn partition(&self, first: &Partition) -> Result<Partition, SnapshotError> {
         let facts = &self.files[0].facts;
         let damaged = || SnapshotError::damaged(&self.folder, "its tiles are not those of its run");
-        if facts.levels.is_some() != first.levels().is_some() {
+        if facts.levels.is_none() != first.is_uniform() {
             return Err(damaged());
         }
         let Some(levels) = &facts.levels else { return Ok(first.clone()) };

@@ -7,7 +7,6 @@ use super::protocol::{Gaze, Picture, Say, Tiles};
 use super::question::{Found, Question, answer, portion};
 use super::sketch::{Paper, compose, rectangle};
 use super::{figures, scenery};
-use crate::folder::in_letters;
 use crate::folder::recording::RunFacts;
 use crate::look::frame::Setting;
 use crate::look::picture::{ColorBy, Range};
@@ -147,10 +146,10 @@ impl Viewer {
 
     /// Tells pages if tiles are others, or held by others, than they know.
     fn tell_of_tiles(&self, desk: &Desk, held: &Held<'_>) {
-        let (ranks, levels) = (held.assignment.ranks_of_tiles(), held.world.partition().levels());
+        let now = Tiles::new(held.world.partition(), held.assignment.ranks_of_tiles().to_vec());
         let mut state = lock(&self.state);
-        if state.tiles.rank_of_tile != ranks || state.tiles.levels != levels.map(in_letters) {
-            state.tiles = Tiles::new(held.world.partition(), ranks.to_vec());
+        if state.tiles != now {
+            state.tiles = now;
             desk.greet(Say::Tiles { worlds: vec![state.tiles.clone()] });
         }
     }

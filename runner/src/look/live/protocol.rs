@@ -20,7 +20,7 @@ use super::super::picture::{ColorBy, View};
 use crate::command::{Word, word};
 use crate::folder::in_letters;
 use crate::scene::record::PathText;
-use atoll_core::Partition;
+use atoll_core::{Partition, Region, TileId};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -221,17 +221,25 @@ pub(crate) struct Fixed {
 }
 
 /// The tiles of a world.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct Tiles {
-    /// How often each was cut from its square, a letter for each, if they are not all equal.
+    /// How often each was cut from its square, a letter for each, if squares were cut.
     pub levels: Option<String>,
+    /// The low and the high corner of each, as parts of the domain, if their borders move.
+    pub corners: Option<Vec<[f32; 4]>>,
     /// For each tile its rank.
     pub rank_of_tile: Vec<u32>,
 }
 
 impl Tiles {
     pub(crate) fn new(partition: &Partition, rank_of_tile: Vec<u32>) -> Self {
-        Self { levels: partition.levels().map(in_letters), rank_of_tile }
+        let corners = |tile| {
+            let (Region { min, max }, size) = (partition.rectangle(TileId(tile)), partition.max() - partition.min());
+            let [low, high] = [min, max].map(|corner| ((corner - partition.min()) / size).as_vec2());
+            [low.x, low.y, high.x, high.y]
+        };
+        let corners = partition.cuts().map(|_| (0..partition.tiles() as u32).map(corners).collect());
+        Self { levels: partition.levels().and_then(|_| in_letters(partition)), corners, rank_of_tile }
     }
 }
 

@@ -58,9 +58,10 @@ impl Legend {
         };
         if by == ColorBy::Tile {
             let [columns, lines] = setting.partition.roots();
-            let count = match setting.partition.levels() {
-                Some(_) => "as many as are needed, told apart by color".to_owned(),
-                None => format!("{columns} × {lines}, told apart by color"),
+            let count = if setting.partition.is_uniform() {
+                format!("{columns} × {lines}, told apart by color")
+            } else {
+                "that follow the bodies, told apart by color".to_owned()
             };
             rows.push((Sign::Square(colors::tile(0, 0)), count));
         }

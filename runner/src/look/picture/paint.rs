@@ -134,7 +134,7 @@ impl Tint {
     /// Of a body in a tile.
     pub(crate) fn tile(tile: TileId, partition: &Partition) -> Rgb {
         // Equal tiles are told apart by columns and rows; others, which have none, by their names.
-        let columns = if partition.levels().is_some() { u32::MAX } else { partition.roots()[0] };
+        let columns = if partition.is_uniform() { partition.roots()[0] } else { u32::MAX };
         colors::tile((tile.0 % columns) as usize, (tile.0 / columns) as usize)
     }
 

@@ -72,7 +72,7 @@ impl<'a> Edges<'a> {
         let [columns, rows] = self.partition.roots();
         let last = TileId(self.partition.tiles() as u32 - 1);
         let ([[left, _], [_, bottom]], [[_, top], [right, _]]) = (self.corners(TileId(0)), self.corners(last));
-        if self.partition.levels().is_some() {
+        if !self.partition.is_uniform() {
             for tile in self.tiles() {
                 let [[x, top], [_, bottom]] = self.corners(tile);
                 upright(x, top, bottom, part(tile));
@@ -84,7 +84,7 @@ impl<'a> Edges<'a> {
         let mut level = |y: f64, left, right, part| {
             canvas.draw(&Form::rectangle([left, y - half], [right, y + half]), colors::INK, part)
         };
-        if self.partition.levels().is_some() {
+        if !self.partition.is_uniform() {
             for tile in self.tiles() {
                 let [[left, _], [right, y]] = self.corners(tile);
                 level(y, left, right, part(tile));

@@ -162,7 +162,7 @@ fn fill(Part { frame: part, tiles }: &mut Part, world: &World, live: bool) {
     tiles.clear();
     tiles.extend(world.tiles());
     part.step = world.step_count();
-    part.tiling = world.partition().levels().map(|_| Arc::new(world.partition().clone()));
+    part.tiling = (!world.partition().is_uniform()).then(|| Arc::new(world.partition().clone()));
     let bodies: usize = world.views().map(|tile| tile.bodies().len()).sum();
     // Bodies come and go a few at a time, and twice the memory would be much.
     if part.bodies.capacity() < bodies {

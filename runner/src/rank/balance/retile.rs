@@ -1,5 +1,4 @@
-//! Tiles that are cut and joined as bodies come and go. Every so many steps all ranks tell each other how many bodies their tiles
-//! have, and all come to the same new partition: it is part of the result, so times have no say in it.
+//! Tiles that follow the bodies. Every so many steps all ranks tell each other how much their tiles have to do, and all come to the same new partition: it is part of the result, so times have no say in it.
 
 use super::super::halo::RankHalo;
 use super::super::recorder::Recorder;
@@ -7,8 +6,9 @@ use super::super::{RankError, unreadable};
 use super::handover::{self, Move};
 use crate::error::RunError;
 use crate::folder::TilingsFile;
-use crate::plan::{Plan, tiles};
-use atoll_core::{Adaptive, Census, World};
+use crate::plan::Plan;
+use crate::plan::tiles::{self, Rule, Unfollowed};
+use atoll_core::{Partition, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use std::io;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use tracing::info;
 
 /// Sees to it that tiles follow the bodies.
 pub(crate) struct Retiler {
-    rule: Adaptive,
+    rule: Rule,
     every: u64,
     /// How long that took this rank.
     time: Duration,
@@ -35,8 +35,7 @@ impl Retiler {
         rank: Rank,
         recorder: Option<&Recorder<'_>>,
     ) -> Option<Self> {
-        let rule = tiles::rule(&plan.config, &plan.blueprint.kinds)?;
-        let every = plan.config.run.adaptive?.retile_every;
+        let (rule, every) = tiles::rule(&plan.config, &plan.blueprint.kinds)?;
         let file = recorder.filter(|_| rank == Rank(0)).and_then(|recorder| {
             let started = TilingsFile::start(recorder.output().folder.tilings(), world.partition(), resumed);
             let shared = started.and_then(|file| Ok((file.shared()?, file)));
@@ -66,10 +65,10 @@ impl Retiler {
             return Ok(());
         }
         let (begun, sent) = (Instant::now(), halo.transport().stats());
-        if self.retile(world, halo)?
+        if let Some(new) = self.retile(world, halo)?
             && let (Some(file), Some(recorder)) = (&mut self.file, recorder)
         {
-            let written = file.append(world.step_count(), world.partition());
+            let written = file.append(world.step_count(), &new);
             written.unwrap_or_else(|error| fail(recorder, &error));
         }
         self.time += begun.elapsed();
@@ -77,28 +76,26 @@ impl Retiler {
         Ok(())
     }
 
-    /// Says whether any tile changed.
-    fn retile<T: Transport>(&self, world: &mut World, halo: &mut RankHalo<Counting<T>>) -> Result<bool, RankError> {
-        // Where a rank has failed, its state is not fit to be moved; with the next step all ranks hear of it.
-        let mut own = vec![u8::from(world.has_failed())];
-        own.extend_from_slice(bytemuck::cast_slice(&world.census(&self.rule)));
-        let told = halo.transport().all_gather(&own).map_err(RankError::Transport)?;
-        let (mut census, mut failed) = (Vec::<Census>::new(), false);
-        for (rank, told) in told.iter().enumerate() {
-            let parts =
-                told.split_first().map(|(has_failed, parts)| (has_failed, parts.chunks_exact(size_of::<Census>())));
-            let (has_failed, parts) = parts
-                .filter(|(_, parts)| parts.remainder().is_empty())
-                .ok_or_else(|| RankError::Transport(unreadable(Rank::from_index(rank))))?;
-            failed |= *has_failed != 0;
-            census.extend(parts.map(bytemuck::pod_read_unaligned::<Census>));
-        }
-        if failed {
-            return Ok(false);
-        }
-        census.sort_by_key(|part| part.tile);
+    /// The new tiles, if any changed.
+    fn retile<T: Transport>(
+        &self,
+        world: &mut World,
+        halo: &mut RankHalo<Counting<T>>,
+    ) -> Result<Option<Partition>, RankError> {
+        let transport = halo.transport();
+        let new = self.rule.follow(world, |count| {
+            let mut own = count();
+            // Where a rank has failed, its state is not fit to be moved; with the next step all ranks hear of it.
+            own.push(u8::from(world.has_failed()));
+            let mut told = transport.all_gather(&own).map_err(RankError::Transport)?;
+            let mut failed = false;
+            for (rank, told) in told.iter_mut().enumerate() {
+                failed |= told.pop().ok_or(Unfollowed::Unreadable(rank))? != 0;
+            }
+            Ok::<_, RankError>((!failed).then_some(told))
+        })?;
+        let Some(new) = new else { return Ok(None) };
         let old = world.partition();
-        let Some(new) = old.adapted(&self.rule, &census).map_err(RankError::Setup)? else { return Ok(false) };
         let changes = old.changes(&new).expect("one follows from the other");
         let joined = halo.assignment().joined(&changes);
         let moves: Vec<Move> = halo.assignment().moves(&joined).collect();
@@ -107,13 +104,18 @@ impl Retiler {
         }
         world.retile(&new).map_err(RankError::Setup)?;
         halo.assign(joined.followed(&changes));
-        info!(
-            step = world.step_count(),
-            changed = changes.iter().filter(|change| !change.is_none()).count(),
-            to = new.tiles(),
-            "tiles cut and joined"
-        );
-        Ok(true)
+        let changed = changes.iter().filter(|change| !change.is_none()).count();
+        info!(step = world.step_count(), changed, to = new.tiles(), "tiles follow the bodies");
+        Ok(Some(new))
+    }
+}
+
+impl From<Unfollowed> for RankError {
+    fn from(unfollowed: Unfollowed) -> Self {
+        match unfollowed {
+            Unfollowed::Unreadable(rank) => Self::Transport(unreadable(Rank::from_index(rank))),
+            Unfollowed::Torn(error) => Self::Setup(error),
+        }
     }
 }
 

@@ -44,7 +44,7 @@ impl Saved {
     pub(super) fn fill(&mut self, world: &World, commands: Option<&State>) {
         self.commands = commands.cloned();
         self.step = world.step_count();
-        self.levels = world.partition().levels().map(in_letters);
+        self.levels = in_letters(world.partition());
         self.tiles = world.save(&mut self.blocks);
     }
 }

@@ -134,14 +134,34 @@ export class Drawing {
   }
 
   /// Lines between tiles, and around what each rank holds: ranks by tile, in the order of `leaves`, or row by row from the lower left.
-  grid(source, { tiles: [columns, rows], levels, rank_of_tile: ranks }, colors) {
+  grid(source, { tiles: [columns, rows], levels, corners, rank_of_tile: ranks }, colors) {
     const { gl } = this;
     const lines = [];
     const add = (x0, y0, x1, y1, [r, g, b], thickness) => lines.push(x0, y0, x1, y1, r / 255, g / 255, b / 255, thickness);
     const gray = [128, 135, 148];
     const several = ranks.some((of) => of !== ranks[0]);
     const color = (a, b) => colors[Math.max(a, b) % colors.length];
-    if (levels) {
+    if (corners) {
+      const scale = ([x0, y0, x1, y1]) => [x0 * columns, y0 * rows, x1 * columns, y1 * rows];
+      const all = corners.map(scale);
+      add(0, 0, columns, 0, gray, 1);
+      add(0, 0, 0, rows, gray, 1);
+      for (const [x0, y0, x1, y1] of all) {
+        add(x1, y0, x1, y1, gray, 1);
+        add(x0, y1, x1, y1, gray, 1);
+      }
+      // Along the part of an edge that two tiles share.
+      for (const [i, [x0, y0, x1, y1]] of several ? all.entries() : []) {
+        for (const [j, [low_x, low_y, high_x, high_y]] of all.entries()) {
+          if (ranks[i] === ranks[j]) continue;
+          const [from_x, to_x] = [Math.max(x0, low_x), Math.min(x1, high_x)];
+          const [from_y, to_y] = [Math.max(y0, low_y), Math.min(y1, high_y)];
+          const between = color(ranks[i], ranks[j]);
+          if (x1 === low_x && from_y < to_y) add(x1, from_y, x1, to_y, between, 3);
+          if (y1 === low_y && from_x < to_x) add(from_x, y1, to_x, y1, between, 3);
+        }
+      }
+    } else if (levels) {
       const all = leaves(columns, rows, levels);
       add(0, 0, columns, 0, gray, 1);
       add(0, 0, 0, rows, gray, 1);
@@ -181,7 +201,7 @@ export class Drawing {
     source.lines.count = lines.length / 8;
     source.lines.tiles = [columns, rows];
     // How wide a tile is, on the average.
-    source.lines.side = levels ? Math.sqrt((columns * rows) / levels.length) : 1;
+    source.lines.side = corners ? Math.sqrt(columns) : levels ? Math.sqrt((columns * rows) / levels.length) : 1;
     gl.bindVertexArray(source.lines.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, source.lines.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(lines), gl.STATIC_DRAW);
