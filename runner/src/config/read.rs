@@ -68,7 +68,7 @@ impl Config {
         check(&config, &settings, has)?;
         settings.finish(|key| match key {
             "run.max_bodies" => "tiles that are bisected have as much to do as each other; leave it out".to_owned(),
-            "run.tile_count" => "goes with tiles = \"bisected\" alone; leave one of them out".to_owned(),
+            "run.tile_count" => "goes with tiles = \"bisected\" alone: say that, or leave it out".to_owned(),
             key if key.starts_with("scene.") => format!("scenes of this kind have no {key}; leave it out"),
             _ => "tiles stay as they are here; add tiles = \"bisected\" or \"adaptive\", or leave it out".to_owned(),
         })?;

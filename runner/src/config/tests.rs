@@ -179,7 +179,7 @@ fn overrides_win_and_the_last_of_them_most() {
     }
     for both in [("tiles", "3x2"), ("tiles", "adaptive"), ("max_bodies", "70")] {
         let error = read(ROOMS, &[both, ("tile_count", "7")]).unwrap_err();
-        assert_eq!(error, "--set run.tile_count=7: goes with tiles = \"bisected\" alone; leave one of them out");
+        assert_eq!(error, "--set run.tile_count=7: goes with tiles = \"bisected\" alone: say that, or leave it out");
     }
     let error = read(ROOMS, &[("tiles", "bisected"), ("max_bodies", "70")]).unwrap_err();
     assert!(error.contains("tiles that are bisected have as much to do as each other; leave it out"), "{error}");

@@ -55,7 +55,7 @@ fn a_projection_follows_tiles_that_are_cut_and_joined() {
 #[test]
 fn a_projection_follows_borders_that_move() {
     let desk = Desk::new(SMALL);
-    let tiles = "--bodies 3000 --set tile_count=6 --set retile_every=3";
+    let tiles = "--bodies 3000 --tiles bisected --set tile_count=6 --set retile_every=3";
     let ended = project(&desk, &format!("{tiles} --steps 50 --times 2 --ranks 1,6 --json p.json --quiet"));
     assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
     assert!(ended.stdout.contains("6 tiles with borders that follow the bodies"), "{ended}");
