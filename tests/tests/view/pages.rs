@@ -175,6 +175,24 @@ fn a_recording_is_drawn_played_scrubbed_zoomed_and_its_bodies_picked() {
 }
 
 #[test]
+fn borders_that_move_are_drawn() {
+    let Some(program) = browser::find() else { return };
+    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/skewed.toml");
+    let tiles = "--tiles bisected --set tile_count=12 --ranks 3";
+    let served = serve(&format!("{config} --bodies 3000 --steps 100000 {tiles}"));
+    let mut browser = show(&program, &served);
+    browser.wait_for("atoll.state.step > 40");
+    assert_eq!(number(&mut browser, "atoll.state.hello.sources[0].corners.length"), 12.0);
+    // A line on two sides of each tile and around all, and more where ranks meet.
+    let lines = number(&mut browser, "atoll.state.sources[0].lines.count") - 2.0 - 24.0;
+    assert!((2.0..40.0).contains(&lines), "{lines} lines where ranks meet");
+    browser.screenshot("bisected");
+    assert_well(&browser, &served);
+    served.interrupt();
+    assert_eq!(served.end().code, Some(130));
+}
+
+#[test]
 fn a_run_is_paused_stepped_and_its_bodies_followed() {
     let Some(program) = browser::find() else { return };
     let served = serve("world.toml --steps 100000");
