@@ -62,23 +62,28 @@ impl Way {
     }
 
     fn run(self, ranks: usize, what: &[&str]) -> Command {
-        let mut command = match self {
+        let mut command = self.program(ranks);
+        command.arg("run").args(what).args(["--transport", self.transport()]);
+        match self {
+            Self::Mpi(exchange) => command.args(["--set", &format!("mpi_exchange={exchange}")]),
+            _ => command.args(["--ranks", &ranks.to_string()]),
+        };
+        command
+    }
+
+    /// The program, as a user would start it for so many ranks. A verb and its options are to follow.
+    #[cfg_attr(not(feature = "mpi"), expect(unused_variables, reason = "only a launcher is told here"))]
+    pub fn program(self, ranks: usize) -> Command {
+        match self {
             #[cfg(feature = "mpi")]
-            Self::Mpi(exchange) => {
+            Self::Mpi(_) => {
                 let mut command = crate::mpi::mpirun(ranks);
-                command.arg(program::atoll(program::Profile::CURRENT)).arg("run").args(what);
-                command.args(["--set", &format!("mpi_exchange={exchange}")]);
+                command.arg(program::atoll(program::Profile::CURRENT));
                 program::at_home(&mut command);
                 command
             }
-            _ => {
-                let mut command = program::command();
-                command.arg("run").args(what).args(["--ranks", &ranks.to_string()]);
-                command
-            }
-        };
-        command.args(["--transport", self.transport()]);
-        command
+            _ => program::command(),
+        }
     }
 }
 

@@ -5,17 +5,20 @@ use super::outcome::{Ends, outcome, told};
 use super::rank_report;
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
+use crate::project::{Network, measured};
 use crate::rank::handshake::agree;
 use crate::rank::trouble::Refusal;
 use crate::rank::{self, Observer, RankEnd, RankError, StopFlag};
 use crate::summary::Summary;
 use atoll_transport::iceoryx2::{self, Control, LaunchError, LaunchOptions, RankExit};
 use atoll_transport::{Rank, RankFailure, Transport};
+use std::fmt::Display;
 use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 use std::{env, io};
 
 /// Tells the ranks what they must find in the configuration that they read for themselves.
@@ -54,8 +57,7 @@ pub(crate) fn check(plan: &Plan, config: &Path) -> Result<(), RunError> {
 /// # Errors
 /// The one that ended the run, whichever and however many ranks it ended.
 pub(crate) fn run(plan: &Plan, wishes: &Wishes, goes_on: bool) -> Result<Summary, RunError> {
-    let program = env::current_exe()
-        .map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))?;
+    let program = program()?;
     let control = || match (wishes.quit.is_requested(), wishes.stop.is_requested()) {
         (true, _) => Control::Quit,
         (false, true) => Control::Stop,
@@ -78,6 +80,34 @@ pub(crate) fn run(plan: &Plan, wishes: &Wishes, goes_on: bool) -> Result<Summary
     }
     let (ends, before): (Ends, Vec<u64>) = exits.iter().map(end).unzip();
     outcome(plan, ends, before.into_iter().max().unwrap_or(0))
+}
+
+/// Starts this program once more for each of so many ranks, with the arguments it was started with, so that they measure what is
+/// between them.
+///
+/// # Errors
+/// If they cannot be started, or one is lost.
+pub(crate) fn fit(ranks: usize, peer_timeout: Duration) -> Result<Network, RunError> {
+    iceoryx2::check(ranks).map_err(|error| RunError::Ranks(error.to_string()))?;
+    let program = program()?;
+    let command = |_: Rank| {
+        let mut command = Command::new(&program);
+        command.args(env::args_os().skip(1));
+        command
+    };
+    let options = LaunchOptions { peer_timeout, ..LaunchOptions::default() };
+    let exits = iceoryx2::launch(ranks, options, &|| Control::Run, command)
+        .map_err(|error: LaunchError| RunError::Ranks(error.to_string()))?;
+    let told = exits.iter().find(|exit| exit.rank == Rank(0)).and_then(|exit| Network::of_bits(&exit.stdout));
+    told.ok_or_else(|| {
+        let failed = exits.iter().find(|exit| !exit.status.success()).unwrap_or(&exits[0]);
+        RunError::Ranks(format!("--fit: rank {} did not measure what is between ranks, {}", failed.rank, failed.status))
+    })
+}
+
+/// This program's own file.
+fn program() -> Result<PathBuf, RunError> {
+    env::current_exe().map_err(|error| RunError::Ranks(format!("this program's own file cannot be found: {error}")))
 }
 
 /// What the process of a rank has to say, or what is to be said of it, and as in [`rank_report::read`].
@@ -111,6 +141,23 @@ impl RankProcess {
     /// Whether it is the one that speaks for all.
     pub(crate) fn speaks(&self) -> bool {
         iceoryx2::process_rank() == Some(Rank(0))
+    }
+
+    /// Measures what is between the ranks, tells the launcher, and says with which exit code to end. What goes wrong is said with
+    /// `complain`.
+    pub(crate) fn measure(self, complain: fn(&dyn Display)) -> Exit {
+        let told = iceoryx2::join().and_then(measured).map_err(|error| error.to_string());
+        let told = told.and_then(|network| {
+            let mut out = io::stdout();
+            out.write_all(&network.to_bits()).and_then(|()| out.flush()).map_err(|error| error.to_string())
+        });
+        match told {
+            Ok(()) => Exit::Done,
+            Err(error) => {
+                complain(&error);
+                Exit::PeerLost
+            }
+        }
     }
 
     /// Does the rank's work, reports to the launcher, which tells the user, and says with which exit code to end. The plan

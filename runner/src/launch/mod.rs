@@ -3,6 +3,7 @@
 //! Where ranks are threads, [`run`] does all of it. Where they are processes, each of them is this program: see
 //! [`crate::cli`].
 
+mod fit;
 #[cfg(feature = "iceoryx2")]
 pub(crate) mod iceoryx2;
 mod in_process;
@@ -17,6 +18,9 @@ use crate::error::RunError;
 use crate::plan::Plan;
 use crate::rank::Observer;
 use crate::summary::Summary;
+pub(crate) use fit::fit;
+#[cfg(feature = "mpi")]
+pub(crate) use fit::fit_job;
 use outcome::{Ends, outcome};
 use std::sync::atomic::Ordering;
 

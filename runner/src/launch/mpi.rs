@@ -4,6 +4,7 @@ use super::outcome::told;
 use crate::config::{Config, MpiExchange};
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
+use crate::project::{Network, measured};
 use crate::rank::handshake::agree;
 use crate::rank::trouble::{Refusal, all_well};
 use crate::rank::{self, Observer, RankError};
@@ -129,11 +130,7 @@ impl Job {
     /// What ended the run on every rank alike, told by rank 0. Anything else ends the job.
     pub(crate) fn run(&mut self, plan: &Plan, observer: &Observer) -> Result<Option<Summary>, RunError> {
         let run = &plan.config.run;
-        self.set_peer_timeout(run.peer_timeout);
-        self.endpoint.set_method(match run.mpi_exchange {
-            MpiExchange::Alltoallv => Method::Alltoallv,
-            MpiExchange::Sparse => Method::Sparse,
-        });
+        self.set_exchange(&plan.config);
         // Not given away: while a panic unwinds, the endpoint stays and can end the job.
         let endpoint = &mut self.endpoint;
         let end = catch_unwind(AssertUnwindSafe(|| rank::drive(endpoint, plan, observer, true)));
@@ -153,6 +150,22 @@ impl Job {
                 self.fail(&error, error.exit())
             }
         }
+    }
+
+    /// What is between the ranks, measured by all of them together. Where ranks cannot talk, the job ends.
+    pub(crate) fn measured(&mut self, config: &Config) -> Network {
+        self.set_exchange(config);
+        measured(&mut self.endpoint)
+            .unwrap_or_else(|error| self.fail(&RunError::Ranks(error.to_string()), Exit::PeerLost))
+    }
+
+    /// Has ranks exchange as the configuration says.
+    fn set_exchange(&mut self, config: &Config) {
+        self.set_peer_timeout(config.run.peer_timeout);
+        self.endpoint.set_method(match config.run.mpi_exchange {
+            MpiExchange::Alltoallv => Method::Alltoallv,
+            MpiExchange::Sparse => Method::Sparse,
+        });
     }
 
     fn set_peer_timeout(&mut self, timeout: Duration) {

@@ -4,11 +4,13 @@
 //! What is left out: ranks whose cores are slower for what others on the same processor do, and the noise of an operating system.
 
 mod course;
+mod fit;
 mod network;
 mod plot;
 mod predict;
 mod table;
 
+pub(crate) use fit::measured;
 pub use network::Network;
 pub(crate) use plot::svg;
 pub use predict::Prediction;
@@ -37,6 +39,17 @@ pub struct Wanted {
     pub times: u32,
     /// Between them.
     pub network: Network,
+    /// Where that was measured, if it was.
+    pub measured: Option<Measured>,
+}
+
+/// Where a network was measured. The fields are keys of the JSON file.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Measured {
+    /// By which transport, as in `run.transport`.
+    pub transport: &'static str,
+    /// Among how many ranks.
+    pub ranks: usize,
 }
 
 /// What some numbers of ranks would take. The fields are the keys of the JSON file.
@@ -62,6 +75,9 @@ pub struct Projection {
     pub latency_s: f64,
     /// Of a rank, each way, in bytes per second.
     pub bandwidth: f64,
+    /// Where these were measured, if they were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured: Option<Measured>,
     /// Mean of a step here, on one thread, in milliseconds.
     pub ms_per_step_alone: f64,
     /// By ranks, and for each by rule.
@@ -78,7 +94,7 @@ impl Projection {
         let failed = |reason: String| RunError::Threads { rank: Rank(0), threads: 1, reason };
         let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| failed(error.to_string()))?;
         let Some(course) = pool.install(|| Course::run(plan, wanted.times, observer))? else { return Ok(None) };
-        let &Wanted { ref ranks, threads, network, .. } = wanted;
+        let &Wanted { ref ranks, threads, network, measured, .. } = wanted;
         let one = |ranks: usize, rule| predict(&course, Machine { ranks, threads, network }, rule);
         let rules = |ranks: usize| if ranks == 1 { &RULES[..1] } else { &RULES };
         let predictions = ranks.iter().flat_map(|&ranks| rules(ranks).iter().map(move |&rule| (ranks, rule)));
@@ -93,6 +109,7 @@ impl Projection {
             retile: plan.config.run.retiling.map(|retiling| retiling.how),
             latency_s: network.latency,
             bandwidth: network.bandwidth,
+            measured,
             ms_per_step_alone: alone.ms_per_step,
             predictions: predictions.map(|(ranks, rule)| one(ranks, rule)).collect(),
         }))

@@ -38,6 +38,19 @@ pub(super) struct Load {
 }
 
 impl Network {
+    /// As bytes that another process reads.
+    #[cfg(feature = "iceoryx2")]
+    pub(crate) fn to_bits(self) -> [u8; 16] {
+        bytemuck::cast([self.latency, self.bandwidth])
+    }
+
+    /// What such bytes say.
+    #[cfg(feature = "iceoryx2")]
+    pub(crate) fn of_bits(bytes: &[u8]) -> Option<Self> {
+        let [latency, bandwidth] = bytemuck::try_pod_read_unaligned(bytes).ok()?;
+        Some(Self { latency, bandwidth })
+    }
+
     /// How long a rank is busy with its messages, in seconds.
     pub(super) fn busy(&self, load: &Load) -> f64 {
         let [sent, received] = load.bytes;
@@ -48,18 +61,25 @@ impl Network {
     /// How long a sync point takes beside, in seconds: a message's way, and the word that all ranks must hear, which goes
     /// through a tree.
     pub(super) fn sync(&self, ranks: usize) -> f64 {
-        let rounds = f64::from(usize::BITS - (ranks - 1).leading_zeros());
-        if ranks == 1 { 0.0 } else { self.latency + rounds * (self.latency + OVERHEAD) }
+        if ranks == 1 { 0.0 } else { self.latency + rounds(ranks) * (self.latency + OVERHEAD) }
     }
-}
 
-/// How ranks come to know what each of them tells.
-impl Network {
+    /// The latency with which a sync point takes so long.
+    pub(super) fn latency_of(ranks: usize, sync: f64) -> f64 {
+        let rounds = rounds(ranks);
+        ((sync - rounds * OVERHEAD) / (1.0 + rounds)).max(0.0)
+    }
+
     /// How long it takes that all have all of so many bytes, of which each tells its part, in seconds: in rounds in which what is known
     /// doubles.
     pub(super) fn all_gather(&self, bytes: f64, ranks: usize) -> f64 {
         if ranks == 1 { 0.0 } else { self.sync(ranks) + bytes * (BYTE + 1.0 / self.bandwidth) }
     }
+}
+
+/// In which what one knows is known to all.
+fn rounds(ranks: usize) -> f64 {
+    f64::from(usize::BITS - (ranks - 1).leading_zeros())
 }
 
 impl FromStr for Network {

@@ -1,6 +1,6 @@
 //! A projection as people read it.
 
-use super::Projection;
+use super::{Measured, Projection};
 use crate::plan::tiles;
 use std::fmt;
 
@@ -10,7 +10,14 @@ impl fmt::Display for Projection {
         let (bodies, steps, alone) = (self.bodies, self.steps, self.ms_per_step_alone);
         writeln!(f, "{}: {bodies} bodies, {tiling}, {steps} steps of {alone:.3} ms on one thread", self.scene)?;
         let (latency, bandwidth) = (self.latency_s * 1e6, self.bandwidth * 1e-9);
-        writeln!(f, "between ranks {latency} us and {bandwidth} GB/s; times in ms per step")?;
+        match self.measured {
+            None => write!(f, "between ranks {latency} us and {bandwidth} GB/s")?,
+            Some(Measured { transport, ranks }) => write!(
+                f,
+                "between ranks {latency:.2} us and {bandwidth:.2} GB/s, measured among {ranks} with transport {transport}"
+            )?,
+        }
+        writeln!(f, "; times in ms per step")?;
         writeln!(f)?;
         writeln!(
             f,

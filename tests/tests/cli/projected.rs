@@ -2,6 +2,7 @@
 
 use crate::{Desk, SMALL, assert_refused};
 use atoll_tests::program::{self, run};
+use atoll_tests::ways::Way;
 use serde_json::Value;
 use std::fs;
 
@@ -66,6 +67,24 @@ fn a_projection_follows_borders_that_move() {
 }
 
 #[test]
+fn a_projection_measures_what_is_between_ranks() {
+    let desk = Desk::new(SMALL);
+    for way in Way::all().into_iter().filter(|&way| way.supports(2)) {
+        let (transport, mut command) = (way.transport(), way.program(2));
+        command.current_dir(desk.path()).args(["project", "world.toml", "--fit", "--set"]);
+        let options = format!("transport={transport} --bodies 300 --steps 5 --ranks 1,4 --json p.json --quiet");
+        let ended = run(command.args(options.split_whitespace()));
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
+        assert!(ended.stdout.contains(&format!("measured among 2 with transport {transport};")), "{ended}");
+        let json: Value = serde_json::from_slice(&fs::read(desk.path().join("p.json")).unwrap()).unwrap();
+        assert_eq!(json["measured"], serde_json::json!({"transport": transport, "ranks": 2}));
+        // Neither nothing nor beyond what any machine has.
+        let number = |key: &str| json[key].as_f64().unwrap();
+        assert!(number("bandwidth") > 1e6 && number("bandwidth") <= 1e12 && number("latency_s") < 1.0, "{json}");
+    }
+}
+
+#[test]
 fn what_cannot_be_projected_is_refused() {
     let desk = Desk::new(SMALL);
     for (options, expected) in [
@@ -76,6 +95,7 @@ fn what_cannot_be_projected_is_refused() {
             "--network lan",
             "invalid value 'lan' for '--network <NETWORK>': a network is one of node, cluster, ethernet, or",
         ),
+        ("--fit --network node", "the argument '--fit' cannot be used with '--network <NETWORK>'"),
         ("--bodies -5", "--bodies -5: must be a whole number"),
         ("--json no/such/x.json", "--json no/such/x.json: "),
         ("--plot world.toml", "--plot world.toml: "),

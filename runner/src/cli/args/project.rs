@@ -27,6 +27,10 @@ pub struct ProjectArgs {
     /// What is between ranks: node, cluster, ethernet, or a latency and a bandwidth such as 2us,10GB/s.
     #[arg(long, value_name = "NETWORK", default_value = "cluster")]
     pub network: Network,
+    /// Measures what is between ranks first: those of `run.transport`, as many as `run.ranks` and cores, or two; with MPI,
+    /// those that mpirun has started.
+    #[arg(long, conflicts_with = "network")]
+    pub fit: bool,
     /// Dynamic bodies.
     #[arg(long, value_name = "N")]
     pub bodies: Option<String>,
