@@ -102,5 +102,5 @@ pub use state::view::{ContactView, TileView};
 pub use step::phase::{Phase, Timings};
 pub use step::{StepReport, finish, measure, step};
 pub use tiling::blueprint::{Blueprint, halo_width};
-pub use tiling::partition::{Adaptive, Bisector, Census, Change, Partition, Region, Share, Turning};
+pub use tiling::partition::{Adaptive, Bisecting, Bisector, Census, Change, Decision, Load, Partition, Region, Tally};
 pub use world::{Clock, Command, World};

@@ -124,7 +124,8 @@ fn project(file: File, tiles: &str, steps: u64) -> Result<Vec<Point>, String> {
     let overrides = [("steps", steps.as_str()), ("tiles", tiles), ("ranks", "1"), ("threads", "1")];
     let config = Config::from_toml_str(file.name, file.text, &overrides).map_err(|error| error.to_string())?;
     let plan = Plan::new(&config).map_err(|error| error.to_string())?;
-    let wanted = Wanted { ranks: PROJECTED.to_vec(), threads: 1, times: 1, network: "cluster".parse()? };
+    let network = "cluster".parse()?;
+    let wanted = Wanted { ranks: PROJECTED.to_vec(), threads: 1, times: 1, network, measured: None };
     let projection = Projection::make(&plan, &wanted, &Observer::default()).map_err(|error| error.to_string())?;
     let predictions = projection.expect("nobody stops it").predictions;
     let best = predictions.iter().filter(|one| one.ranks == 1 || one.balance == "measured");

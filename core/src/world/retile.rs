@@ -4,7 +4,7 @@ use super::World;
 use crate::exchange::mail::Inbox;
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
-use crate::tiling::partition::{Adaptive, CONTACT, Census, Counter, GHOST, Partition, Share};
+use crate::tiling::partition::{Adaptive, CONTACT, Census, Load, Partition, Tally};
 use crate::tiling::regroup::{Renaming, regroup};
 use crate::tiling::tile::Tile;
 use glam::DVec2;
@@ -35,28 +35,32 @@ impl World {
         census
     }
 
-    /// Counts what there is to do of this world's bodies and contacts in each tile of a bisection where there is any, ascending: that
-    /// of all ranks, added up by tile, is what [`Partition::rebisected`] asks for. Everything counts where it will be so many steps
-    /// later, if nothing stops it.
-    pub fn shares(&self, partition: &Partition, later: u64) -> Vec<Share> {
-        let later = later as f32 * self.setup.params.dt;
-        let is_current = std::ptr::eq(partition, self.partition());
-        let of_tile = |mut counter: Counter, tile: &Tile| {
+    /// What there is to do in each tile, which [`Partition::bisect`] asks for from all ranks.
+    pub fn loads(&self) -> Vec<Load> {
+        let load = |tile: &Tile| {
             let tile = tile.settled(&self.setup);
-            let place = |body: usize| tile.bodies.position[body] + (later * tile.bodies.velocity[body]).as_dvec2();
-            (0..tile.owned).for_each(|body| counter.add(partition, place(body), 1));
-            let own = tile.contacts.own();
-            tile.contacts.keys[..own]
-                .iter()
-                .for_each(|key| counter.add(partition, place(tile.index(key.low())), CONTACT));
-            if is_current {
-                let for_others = (tile.contacts.len() - own) as u64;
-                counter.add_others(tile.id, GHOST * (tile.ghosts() as u64 + for_others));
-            }
-            counter
+            let (tiles, own) = (self.setup.partition.tiles(), tile.contacts.own());
+            Load::new(tiles, tile.id, [tile.owned, own, tile.contacts.len() - own], &tile.ghost_owners)
         };
-        let busy = self.tiles.iter().filter(|tile| !tile.is_bare() || tile.changes.is_some());
-        busy.fold(Counter::new(partition), of_tile).shares()
+        self.tiles.iter().map(load).collect()
+    }
+
+    /// The bodies of each tile that has any, where they will be so many steps later if nothing stops them, with their contacts:
+    /// what each rank brings to [`Bisecting`](crate::Bisecting).
+    pub fn tallies(&self, later: u64) -> Vec<Tally> {
+        let later = later as f32 * self.setup.params.dt;
+        let tally = |tile: &Tile| {
+            let tile = tile.settled(&self.setup);
+            let mut contacts = vec![0; tile.owned];
+            for key in &tile.contacts.keys[..tile.contacts.own()] {
+                if let Some(count) = contacts.get_mut(tile.index(key.low())) {
+                    *count += 1;
+                }
+            }
+            let place = |body: usize| tile.bodies.position[body] + (later * tile.bodies.velocity[body]).as_dvec2();
+            Tally::new(&self.setup.partition, (0..tile.owned).map(place).zip(contacts))
+        };
+        self.tiles.par_iter().filter(|tile| !tile.is_bare() || tile.changes.is_some()).map(tally).collect()
     }
 
     /// Moves the borders that are to be moved. Takes time for each tile. Says whether there were any.

@@ -194,7 +194,7 @@ impl Retiling {
     pub const ADAPTIVE: Self = Self { how: Retile::Adaptive { max_bodies: 48_000 }, every: 32 };
 
     /// As often as is usual where borders move.
-    pub const BISECTED: Self = Self { how: Retile::Bisected, every: 16 };
+    pub const BISECTED: Self = Self { how: Retile::Bisected, every: 24 };
 }
 
 impl Default for OutputConfig {

@@ -12,6 +12,9 @@ use atoll_transport::channel::{self, ChannelOptions};
 use std::fmt::Display;
 use std::thread;
 
+/// What is between ranks, and where that was measured.
+pub(crate) type Fit = (Network, Measured);
+
 /// Fewer ranks have nobody to send to.
 const LEAST: usize = 2;
 
@@ -20,7 +23,7 @@ const LEAST: usize = 2;
 ///
 /// # Errors
 /// If they cannot be started, or one is lost.
-pub(crate) fn fit(config: &Config) -> Result<(Network, Measured), RunError> {
+pub(crate) fn fit(config: &Config) -> Result<Fit, RunError> {
     // What more than that wait for is a core.
     let most = thread::available_parallelism().map_or(LEAST, usize::from).max(LEAST);
     let (ranks, peer_timeout) = (config.run.ranks.clamp(LEAST, most), config.run.peer_timeout);
@@ -44,7 +47,7 @@ pub(crate) fn fit(config: &Config) -> Result<(Network, Measured), RunError> {
 pub(crate) fn fit_job(
     config: Result<Config, RunError>,
     complain: fn(&dyn Display),
-) -> Result<Option<(Config, (Network, Measured))>, RunError> {
+) -> Result<Option<(Config, Fit)>, RunError> {
     let mut job = Job::join(complain)?;
     let config = config.and_then(|config| {
         let config = job.adapt(config)?;

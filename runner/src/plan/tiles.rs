@@ -4,9 +4,10 @@
 use crate::config::{Config, MOST_TILES, Retile, Retiling};
 use crate::error::RunError;
 use crate::scene::Scene;
-use atoll_core::{Adaptive, Census, Kind, Params, Partition, SetupError, Share, Turning, World};
+use atoll_core::{Adaptive, Census, Kind, Params, Partition, SetupError, TileId, World};
 use bytemuck::AnyBitPattern;
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Bodies in a tile of the default grid, on the average. So many stay in a core's L2 cache for a whole step; half as many
 /// cost a tenth more for their ghosts, and more leave fewer tiles to share among ranks.
@@ -49,21 +50,35 @@ pub(crate) enum Rule {
     Bisected { halo_width: f64, every: u64 },
 }
 
-impl Rule {
-    /// How tiles follow the bodies before the next step; nothing if all stay as they are. `gather` has this rank
-    /// count, tells all others what it counted and gives what each of them did, or nothing if that is not to be.
+/// All ranks, as one of them speaks to them to find out how tiles follow the bodies.
+pub(crate) trait Council {
+    /// Why that may fail.
+    type Error: From<Unfollowed>;
+
+    /// Tells all ranks something, and gives what each of them told, or nothing if tiles are not to follow now.
     ///
     /// # Errors
-    /// Those of `gather`, and if what was told cannot be read or does not go together.
-    pub(crate) fn follow<E: From<Unfollowed>>(
-        &self,
-        world: &World,
-        mut gather: impl FnMut(&dyn Fn() -> Vec<u8>) -> Result<Option<Vec<Vec<u8>>>, E>,
-    ) -> Result<Option<Partition>, E> {
+    /// If a rank is lost.
+    fn tell_all(&mut self, own: Vec<u8>) -> Result<Option<Vec<Vec<u8>>>, Self::Error>;
+
+    /// Tells the holders of some tiles something, and gives what each rank told this one, one after the other.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    fn tell_holders(&mut self, own: Vec<(TileId, Vec<u32>)>) -> Result<Vec<Vec<u8>>, Self::Error>;
+}
+
+impl Rule {
+    /// How tiles follow the bodies before the next step; nothing if all stay as they are. Every rank must ask for this at the same
+    /// step.
+    ///
+    /// # Errors
+    /// Those of the council, and if what was told cannot be read or does not go together.
+    pub(crate) fn follow<C: Council>(&self, world: &World, council: &mut C) -> Result<Option<Partition>, C::Error> {
         let old = world.partition();
         match *self {
             Self::Adaptive(ref rule) => {
-                let Some(told) = gather(&|| bytemuck::cast_slice(&world.census(rule)).to_vec())? else {
+                let Some(told) = council.tell_all(bytemuck::cast_slice(&world.census(rule)).to_vec())? else {
                     return Ok(None);
                 };
                 let mut census: Vec<Census> = records(&told)?;
@@ -71,36 +86,30 @@ impl Rule {
                 Ok(old.adapted(rule, &census).map_err(Unfollowed::Torn)?)
             }
             Self::Bisected { halo_width, every } => {
-                let mut followed: Option<Partition> = None;
-                let is_time = (world.step_count() / every).is_multiple_of(TURNED_EVERY);
-                let mut turning = if is_time { Turning::May } else { Turning::Never };
-                // What lies in tiles whose cuts have been turned is only known when it has been counted.
-                for _ in 0..=RECOUNTS {
-                    let cut = followed.as_ref().unwrap_or(old);
-                    let count = || bytemuck::cast_slice(&world.shares(cut, every / 2)).to_vec();
-                    let Some(told) = gather(&count)? else { return Ok(None) };
-                    let torn = Unfollowed::Torn(SetupError::BadBisection { cut: 0 });
-                    let shares = Share::added_up(cut.tiles(), records(&told)?.into_iter()).ok_or(torn)?;
-                    let next = cut.rebisected(&shares, halo_width, turning).map_err(Unfollowed::Torn)?;
-                    let Some((next, has_turned)) = next else { break };
-                    let is_first = followed.is_none();
-                    followed = Some(next);
-                    if is_first && !has_turned {
-                        break;
+                let Some(told) = council.tell_all(bytemuck::cast_slice(&world.loads()).to_vec())? else {
+                    return Ok(None);
+                };
+                let Some(mut bisecting) = old.bisect(&records(&told)?, halo_width).map_err(Unfollowed::Torn)? else {
+                    return Ok(None);
+                };
+                // Until they are next looked at, bodies are there on the average.
+                let mut tallies = world.tallies(every / 2);
+                while !bisecting.is_done() {
+                    if bisecting.is_clear() {
+                        bisecting.cut(&[], &mut tallies).map_err(Unfollowed::Torn)?;
+                        continue;
                     }
-                    turning = Turning::Has;
+                    let counts = tallies.par_iter().flat_map(|tally| bisecting.counts(tally)).collect();
+                    let counts: Vec<u32> = records(&council.tell_holders(counts)?)?;
+                    let own = bisecting.decide(&counts).map_err(Unfollowed::Torn)?;
+                    let Some(told) = council.tell_all(bytemuck::cast_slice(&own).to_vec())? else { return Ok(None) };
+                    bisecting.cut(&records(&told)?, &mut tallies).map_err(Unfollowed::Torn)?;
                 }
-                Ok(followed)
+                Ok(bisecting.partition().map_err(Unfollowed::Torn)?)
             }
         }
     }
 }
-
-/// Cuts are turned only every so many times that tiles follow the bodies: all that lies behind them moves.
-const TURNED_EVERY: u64 = 4;
-
-/// Then all is counted so often again.
-const RECOUNTS: u32 = 2;
 
 /// Why nobody knows how tiles follow the bodies.
 #[derive(Debug)]

@@ -1,5 +1,6 @@
 //! What a run takes, tile by tile: its steps made here on one thread, each tile's time and what it tells others kept over time.
 
+use super::counting::{Alone, Counting};
 use crate::error::RunError;
 use crate::plan::Plan;
 use crate::plan::tiles::{self, Unfollowed};
@@ -32,21 +33,10 @@ pub(super) struct Course {
     pub windows: Vec<Window>,
     /// How the domain is cut, in the order of steps: at first, and whenever that changes.
     pub tilings: Vec<Tiling>,
-    /// Where tiles follow the bodies, every time that was looked at.
-    pub countings: Vec<Counting>,
+    /// Where tiles follow the bodies, every time that was looked at, before which step.
+    pub countings: Vec<(u64, Counting)>,
     /// Sync points of a step.
     pub syncs: f64,
-}
-
-/// All ranks tell each other what there is to do, and work out the same new tiles.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Counting {
-    /// Before which step.
-    pub step: u64,
-    /// It took so long to count all, and to work out new tiles, which every rank does.
-    pub seconds: [f64; 2],
-    /// What was told.
-    pub bytes: f64,
 }
 
 /// Tiles from a step on.
@@ -95,7 +85,7 @@ impl Course {
             let Some(again) = Self::make(plan, time, observer)? else { return Ok(None) };
             course.moments.iter_mut().zip(&again.moments).for_each(|(moment, again)| moment.take_least(again));
             let countings = course.countings.iter_mut().zip(&again.countings);
-            countings.for_each(|(a, b)| a.seconds = [0, 1].map(|part| a.seconds[part].min(b.seconds[part])));
+            countings.for_each(|((_, counting), (_, again))| counting.take_least(again));
         }
         Ok(Some(course))
     }
@@ -111,7 +101,7 @@ impl Course {
         let tilings = vec![Tiling { step: 0, partition, changes: Vec::new() }];
         let mut course = Self { moments: Vec::new(), windows: Vec::new(), tilings, countings: Vec::new(), syncs: 0.0 };
         let mut tap = Tap::default();
-        let (told, mut before) = (observer.steps(true, 0, steps), thread_time());
+        let told = observer.steps(true, 0, steps);
         for step in 0..steps {
             if observer.stop.is_requested() {
                 return Ok(None);
@@ -121,6 +111,8 @@ impl Course {
                 course.end_window(&mut tap);
                 course.windows.push(Window { step, told: Vec::new(), bodies: bodies(&world) });
             }
+            // What was done until here is none of the step's.
+            let before = thread_time();
             atoll_core::step(&mut world, &mut tap).map_err(|error| match error {
                 StepError::NonFinite { step, id } => RunError::NonFinite { step, id },
                 StepError::Protocol { step, tile } => RunError::Protocol { step, tile },
@@ -128,8 +120,6 @@ impl Course {
                 StepError::Halo(NotHere { tile }) => RunError::Protocol { step, tile },
             })?;
             course.add((step, stride), thread_time().saturating_sub(before), &mut world);
-            // What was done here is none of the step's.
-            before = thread_time();
             observer.complete.store(step + 1, Ordering::Relaxed);
             told.made(step + 1);
         }
@@ -145,20 +135,12 @@ impl Course {
         if !step.is_multiple_of(every) {
             return Ok(false);
         }
-        let (begun, mut counted, mut bytes) = (thread_time(), Duration::ZERO, 0);
-        let new = rule.follow(world, |count| {
-            let before = thread_time();
-            let own = count();
-            counted += thread_time() - before;
-            bytes += own.len();
-            Ok::<_, Unfollowed>(Some(vec![own]))
-        });
-        let new = new.map_err(|error| match error {
+        let mut alone = Alone::begin();
+        let new = rule.follow(world, &mut alone).map_err(|error| match error {
             Unfollowed::Unreadable(_) => unreachable!("what a rank tells itself"),
             Unfollowed::Torn(error) => error,
         })?;
-        let seconds = [counted, (thread_time() - begun).saturating_sub(counted)].map(|time| time.as_secs_f64());
-        self.countings.push(Counting { step, seconds, bytes: bytes as f64 });
+        self.countings.push((step, alone.end()));
         let Some(partition) = new else { return Ok(false) };
         let changes = world.partition().changes(&partition).expect("one follows from the other");
         world.retile(&partition)?;

@@ -3,6 +3,7 @@
 //!
 //! What is left out: ranks whose cores are slower for what others on the same processor do, and the noise of an operating system.
 
+mod counting;
 mod course;
 mod fit;
 mod network;

@@ -75,6 +75,12 @@ impl Network {
     pub(super) fn all_gather(&self, bytes: f64, ranks: usize) -> f64 {
         if ranks == 1 { 0.0 } else { self.sync(ranks) + bytes * (BYTE + 1.0 / self.bandwidth) }
     }
+
+    /// How long it takes until one rank has so many bytes in so many messages of others.
+    pub(super) fn gather(&self, bytes: f64, messages: f64, ranks: usize) -> f64 {
+        let messages = messages.min(ranks as f64 - 1.0);
+        if ranks == 1 { 0.0 } else { self.all_gather(bytes, ranks) + OVERHEAD * messages }
+    }
 }
 
 /// In which what one knows is known to all.

@@ -104,9 +104,8 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
             costs = dealt(&costs, &new.changes);
             (tiling, next, loads_of) = (&new.partition, next + 1, None);
         }
-        while let Some(counting) = countings.next_if(|counting| counting.step <= moment.step) {
-            let [count, cut] = counting.seconds;
-            moving.1 += count / ranks as f64 + cut + network.all_gather(counting.bytes, ranks);
+        while let Some((_, counting)) = countings.next_if(|(step, _)| *step <= moment.step) {
+            moving.1 += counting.seconds(ranks, &network);
         }
         let window = course.window(moment.step);
         if loads_of != Some(window) {

@@ -9,8 +9,7 @@ mod grid;
 mod tests;
 mod tree;
 
-pub(crate) use bisect::{Counter, GHOST};
-pub use bisect::{Share, Turning};
+pub use bisect::{Bisecting, Decision, Load, Tally};
 use bisection::Bisection;
 pub use bisection::Bisector;
 pub(crate) use census::CONTACT;

@@ -1,7 +1,6 @@
 //! Owners and regions against each other and against trying every tile.
 
-use super::bisect::Counter;
-use super::{Adaptive, Bisector, Partition, Region, Turning};
+use super::{Adaptive, Bisector, Load, Partition, Region, Tally};
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
 use crate::testing::cases;
@@ -309,24 +308,84 @@ fn tiles_that_are_bisected_have_as_much_to_do_each() {
     }
 }
 
+/// What each tile has to do for the places of [`corner`], some of which are ghosts of others.
+fn loads(partition: &Partition, halo: f64) -> Vec<Load> {
+    let load = |tile| {
+        let reached = |place: &DVec2| partition.reached(*place, Vec2::ZERO, halo).any(|other| other == tile);
+        let mut owners: Vec<_> = corner().filter(reached).map(|place| partition.locate(place)).collect();
+        let near = owners.len();
+        owners.retain(|&owner| owner != tile);
+        owners.sort_unstable();
+        Load::new(partition.tiles(), tile, [near - owners.len(), 0, 0], &owners)
+    };
+    tiles(partition).map(load).collect()
+}
+
+/// What becomes of a partition by the places of [`corner`], counted by those of each tile, where anything does.
+fn rebisected(partition: &Partition, halo: f64) -> Option<Partition> {
+    let of_tile = |tile| corner().filter(move |&place| partition.locate(place) == tile);
+    let tally = |tile| Tally::new(partition, of_tile(tile).map(|place| (place, 0)));
+    let mut tallies: Vec<Tally> = tiles(partition).map(tally).collect();
+    let mut bisecting = partition.bisect(&loads(partition, halo), halo).unwrap().unwrap();
+    while !bisecting.is_done() {
+        let counts = tallies.iter().rev().flat_map(|tally| bisecting.counts(tally)).flat_map(|(_, words)| words);
+        let decisions = bisecting.decide(&counts.collect::<Vec<_>>()).unwrap();
+        bisecting.cut(&decisions, &mut tallies).unwrap();
+    }
+    bisecting.partition().unwrap()
+}
+
+#[test]
+fn what_comes_of_ghosts_is_shared_too() {
+    let halo = 0.006;
+    let all = |load: &Load| u64::from(load.own) + load.others.iter().copied().map(u64::from).sum::<u64>();
+    let unevenness = |partition: &Partition| {
+        let loads: Vec<u64> = loads(partition, halo).iter().map(all).collect();
+        loads.iter().copied().max().unwrap() as f64 * loads.len() as f64 / loads.iter().sum::<u64>() as f64
+    };
+    // By bodies alone, those in the dense corner have more to do. What that is is known when it is done, so it takes some times.
+    let mut partition = Partition::bisected(DVec2::ZERO, DVec2::ONE, 24, 0.0, corner().map(|at| (at, 1))).unwrap();
+    let (before, mut moves) = (unevenness(&partition), 0);
+    while let Some(next) = rebisected(&partition, halo) {
+        (partition, moves) = (next, moves + 1);
+        assert!(moves < 20);
+    }
+    assert!(before > 1.15 && unevenness(&partition) < 1.08, "{before} {}", unevenness(&partition));
+    // Of those of a tile, what the first cut has cut off is told first.
+    let loads = loads(&partition, halo);
+    let told: Vec<bool> = loads.iter().map(|load| load.others[0] > 0).collect();
+    assert!(told[..12].contains(&true) && told[12..].contains(&true) && told.contains(&false), "{told:?}");
+}
+
 #[test]
 fn borders_move_to_where_there_is_much_to_do_and_stay_there() {
     let even = (0..400).map(|k| (DVec2::new(f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5) / 20.0, 1));
     let mut partition = Partition::bisected(DVec2::ZERO, DVec2::ONE, 12, 0.0, even).unwrap();
     assert!(unevenness(&partition) > 3.0);
-    let (mut moves, mut turns) = (0, 0);
-    for _ in 0..20 {
-        let mut counter = Counter::new(&partition);
-        corner().for_each(|place| counter.add(&partition, place, 1));
-        let shares = super::Share::added_up(12, counter.shares().into_iter()).unwrap();
-        let Some((next, has_turned)) = partition.rebisected(&shares, 0.0, Turning::May).unwrap() else { break };
-        (partition, moves, turns) = (next, moves + 1, turns + u32::from(has_turned));
+    let mut moves = 0;
+    while let Some(next) = rebisected(&partition, 0.0) {
+        (partition, moves) = (next, moves + 1);
+        assert!(moves < 4);
     }
-    assert!(unevenness(&partition) < 1.12 && (1..20).contains(&moves), "{moves} {turns} {}", unevenness(&partition));
+    assert!(unevenness(&partition) < 1.12 && moves > 0, "{moves} {}", unevenness(&partition));
     let cuts = partition.cuts().unwrap().to_vec();
     assert_eq!(Partition::bisection(DVec2::ZERO, DVec2::ONE, &cuts).unwrap(), partition);
-    // Shares of other tiles are refused.
-    assert!(partition.rebisected(&[], 0.0, Turning::Never).is_err());
+    // What is told of other tiles is refused, and so is what cannot be read, or cuts what is elsewhere.
+    let load = |tile| Load::new(12, TileId(tile), [1, 0, 0], &[]);
+    assert!(partition.bisect(&[load(12)], 0.0).is_err());
+    let mut bisecting = partition.bisect(&[load(11)], 0.0).unwrap().unwrap();
+    for words in [&[1, 0, 0, 0, 0][..], &[0, 0, 0, 0], &[0, 60, 5, 0, 0], &[0, 0, 1, 7, 7, 0, 0], &[0, 0, 0, 0, 0, 0]] {
+        assert!(bisecting.decide(words).is_err(), "{words:?}");
+    }
+    let decided = |words: [u32; 3]| bytemuck::cast::<_, super::Decision>(words);
+    assert!(bisecting.cut(&[decided([1, 0, 7])], &mut []).is_err());
+    assert!(bisecting.cut(&[decided([0, 2, 7])], &mut []).is_err());
+    assert!(bisecting.cut(&[decided([0, 1, 0])], &mut []).is_err());
+    // Where nobody is, nothing is changed.
+    while !bisecting.is_done() {
+        bisecting.cut(&[], &mut []).unwrap();
+    }
+    assert_eq!(bisecting.partition().unwrap(), None);
 }
 
 #[test]

@@ -72,7 +72,11 @@ fn blocks<'a>(mut bytes: &'a [u8], expected: &mut VecDeque<TileId>) -> Option<Ve
 }
 
 /// Brings each rank what is for it, and says whether there is more.
-fn send(parcels: &[Vec<u8>], more: bool, transport: &mut impl Transport) -> Result<Incoming, TransportError> {
+pub(super) fn send(
+    parcels: &[Vec<u8>],
+    more: bool,
+    transport: &mut impl Transport,
+) -> Result<Incoming, TransportError> {
     let lengths: Vec<usize> = parcels.iter().map(Vec::len).collect();
     let outgoing = transport.prepare(&lengths)?;
     if more {

@@ -6,9 +6,9 @@ use super::super::{RankError, unreadable};
 use super::handover::{self, Move};
 use crate::error::RunError;
 use crate::folder::TilingsFile;
-use crate::plan::Plan;
-use crate::plan::tiles::{self, Rule, Unfollowed};
-use atoll_core::{Partition, World};
+use crate::plan::tiles::{self, Council, Rule, Unfollowed};
+use crate::plan::{Assignment, Plan};
+use atoll_core::{Partition, TileId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use std::io;
 use std::time::{Duration, Instant};
@@ -82,18 +82,8 @@ impl Retiler {
         world: &mut World,
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<Option<Partition>, RankError> {
-        let transport = halo.transport();
-        let new = self.rule.follow(world, |count| {
-            let mut own = count();
-            // Where a rank has failed, its state is not fit to be moved; with the next step all ranks hear of it.
-            own.push(u8::from(world.has_failed()));
-            let mut told = transport.all_gather(&own).map_err(RankError::Transport)?;
-            let mut failed = false;
-            for (rank, told) in told.iter_mut().enumerate() {
-                failed |= told.pop().ok_or(Unfollowed::Unreadable(rank))? != 0;
-            }
-            Ok::<_, RankError>((!failed).then_some(told))
-        })?;
+        let (assignment, transport) = halo.parts();
+        let new = self.rule.follow(world, &mut Ranks { transport, assignment, has_failed: world.has_failed() })?;
         let Some(new) = new else { return Ok(None) };
         let old = world.partition();
         let changes = old.changes(&new).expect("one follows from the other");
@@ -107,6 +97,37 @@ impl Retiler {
         let changed = changes.iter().filter(|change| !change.is_none()).count();
         info!(step = world.step_count(), changed, to = new.tiles(), "tiles follow the bodies");
         Ok(Some(new))
+    }
+}
+
+/// All ranks, over a transport.
+struct Ranks<'a, T> {
+    transport: &'a mut T,
+    assignment: &'a Assignment,
+    /// Whether this one has failed: its state is not fit to be moved, and with the next step all ranks hear of it.
+    has_failed: bool,
+}
+
+impl<T: Transport> Council for Ranks<'_, T> {
+    type Error = RankError;
+
+    fn tell_all(&mut self, mut own: Vec<u8>) -> Result<Option<Vec<Vec<u8>>>, RankError> {
+        own.push(u8::from(self.has_failed));
+        let mut told = self.transport.all_gather(&own).map_err(RankError::Transport)?;
+        let mut failed = false;
+        for (rank, told) in told.iter_mut().enumerate() {
+            failed |= told.pop().ok_or(Unfollowed::Unreadable(rank))? != 0;
+        }
+        Ok((!failed).then_some(told))
+    }
+
+    fn tell_holders(&mut self, own: Vec<(TileId, Vec<u32>)>) -> Result<Vec<Vec<u8>>, RankError> {
+        let mut parcels = vec![Vec::new(); self.transport.size()];
+        for (tile, words) in own {
+            parcels[self.assignment.rank_of(tile)].extend_from_slice(bytemuck::cast_slice(&words));
+        }
+        let incoming = handover::send(&parcels, false, self.transport).map_err(RankError::Transport)?;
+        Ok(incoming.iter().map(|(_, bytes)| bytes.to_vec()).collect())
     }
 }
 
