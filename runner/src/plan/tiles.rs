@@ -66,6 +66,9 @@ pub(crate) trait Council {
     /// # Errors
     /// If a rank is lost.
     fn tell_holders(&mut self, own: Vec<(TileId, Vec<u32>)>) -> Result<Vec<Vec<u8>>, Self::Error>;
+
+    /// Hears that this rank is done with what only concerns its own tiles, and all are about to do the same.
+    fn has_counted(&mut self) {}
 }
 
 impl Rule {
@@ -105,6 +108,8 @@ impl Rule {
                     let Some(told) = council.tell_all(bytemuck::cast_slice(&own).to_vec())? else { return Ok(None) };
                     bisecting.cut(&records(&told)?, &mut tallies).map_err(Unfollowed::Torn)?;
                 }
+                drop(tallies);
+                council.has_counted();
                 Ok(bisecting.partition().map_err(Unfollowed::Torn)?)
             }
         }
