@@ -54,9 +54,14 @@ impl Alone {
         Self { counting: Counting::default(), before: thread_time(), deciding: None }
     }
 
-    /// What this came to.
-    pub(super) fn end(mut self) -> Counting {
+    /// All know the new tiles now, and change their own.
+    pub(super) fn has_agreed(&mut self) {
         self.counting.by_all += self.lap();
+    }
+
+    /// What all of it came to.
+    pub(super) fn end(mut self) -> Counting {
+        self.counting.shared += self.lap();
         self.counting
     }
 
@@ -89,8 +94,8 @@ impl Council for Alone {
             *messages += 1.0;
         }
         self.deciding = Some(told.len());
-        let most = |told: &BTreeMap<_, (f64, f64)>| told.values().copied().max_by(|a, b| a.0.total_cmp(&b.0));
-        self.counting.told_one.push(most(&told).unwrap_or_default());
+        let most = told.into_values().max_by(|a, b| a.0.total_cmp(&b.0));
+        self.counting.told_one.push(most.unwrap_or_default());
         let all: Vec<u32> = own.into_iter().flat_map(|(_, words)| words).collect();
         // What is booked begins with what was heard.
         self.lap();

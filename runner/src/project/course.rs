@@ -140,13 +140,16 @@ impl Course {
             Unfollowed::Unreadable(_) => unreachable!("what a rank tells itself"),
             Unfollowed::Torn(error) => error,
         })?;
+        alone.has_agreed();
+        let changed = new.map(|partition| {
+            let changes = world.partition().changes(&partition).expect("one follows from the other");
+            world.retile(&partition).map(|()| Tiling { step, partition, changes })
+        });
         self.countings.push((step, alone.end()));
-        let Some(partition) = new else { return Ok(false) };
-        let changes = world.partition().changes(&partition).expect("one follows from the other");
-        world.retile(&partition)?;
+        let Some(tiling) = changed.transpose()? else { return Ok(false) };
         // What was booked before is another moment's.
         world.take_booked_times().for_each(drop);
-        self.tilings.push(Tiling { step, partition, changes });
+        self.tilings.push(tiling);
         Ok(true)
     }
 

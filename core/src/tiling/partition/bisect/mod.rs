@@ -122,7 +122,7 @@ impl Bisecting {
             let node = &self.nodes[group.block as usize];
             let mut words = vec![group.block];
             Counts::new(node.block, &group.points).write(&mut words);
-            (TileId((node.first + node.tiles / 2) as u32), words)
+            (TileId((node.first + tiles_of_first(node.tiles)) as u32), words)
         };
         let open = tally.groups.iter().filter(|group| self.settled(&self.nodes[group.block as usize]).is_none());
         open.map(counts).collect()

@@ -81,11 +81,6 @@ impl Tally {
             let (axis, halo) = (axis as usize, halo[axis as usize] as u32);
             let (low, high) = (at.saturating_sub(halo), at.saturating_add(halo));
             let [min, max] = group.extent[axis];
-            let mut add = |number: Option<u32>, points: Vec<Point>| {
-                if let Some(block) = number.filter(|_| !points.is_empty()) {
-                    self.groups.push(Group::new(block, points));
-                }
-            };
             if max < low || min >= high {
                 // All of them lie on one side, and are no ghosts of the other.
                 self.groups.extend(numbers[usize::from(max >= low)].map(|block| Group { block, ..group }));
@@ -106,8 +101,11 @@ impl Tally {
                     of_high.push(as_ghost(point));
                 }
             }
-            add(numbers[0], of_low);
-            add(numbers[1], of_high);
+            for (number, points) in numbers.into_iter().zip([of_low, of_high]) {
+                if let Some(block) = number.filter(|_| !points.is_empty()) {
+                    self.groups.push(Group::new(block, points));
+                }
+            }
         }
     }
 }
