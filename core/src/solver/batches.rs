@@ -3,7 +3,7 @@
 //! A batch is one or several whole islands. Within an island the order of constraints follows from its contacts alone
 //! (see [`super::coloring`]), so how islands are put into batches changes no bit.
 
-use super::constraint::columns::Each;
+use super::constraint::columns::{Each, Members};
 use super::index::{GraphNode, SolverIndex, place_all};
 use crate::collide::broad_phase::Pair;
 use crate::model::params::Parallel;
@@ -36,13 +36,20 @@ pub(crate) struct Batch {
     pub(crate) large: bool,
     /// Whether other tiles are to hear of some of its bodies within the step, or this tile of theirs.
     pub(crate) at_border: bool,
+    /// Whether it goes from contacts to impulses before the next one begins: its rows lie where those of the batch before lay, in the
+    /// cache. The others keep theirs until the step ends.
+    pub(crate) at_once: bool,
     pub(crate) colors: Range<usize>,
+    /// Among the rows of batches that keep them, or else from zero.
     pub(crate) groups: Each<Range<usize>>,
+    /// Where the members of its groups begin.
+    pub(crate) members: Each<usize>,
 }
 
 impl Batch {
-    fn new(large: bool, at_border: bool) -> Self {
-        Self { large, at_border, statics: if large { MOST_SLICES } else { 1 }, ..Self::default() }
+    /// The members of its groups.
+    pub(crate) fn members_of<'a>(&self, all: &'a Each<Vec<Members>>) -> Each<&'a [Members]> {
+        std::array::from_fn(|column| &all[column][self.members[column]..][..self.groups[column].len()])
     }
 
     /// Into how many pieces to cut so many groups of one color.
@@ -66,6 +73,8 @@ pub(crate) struct Graph<'a> {
     pub(crate) sent: &'a [u32],
     /// For each root whether its island sleeps. None where nobody may.
     pub(crate) sleeps: Option<&'a [bool]>,
+    /// Whether rows are asked for when all is solved.
+    pub(crate) keeps_rows: bool,
 }
 
 /// How a tile's contacts are put into batches.
@@ -80,6 +89,8 @@ pub(crate) struct Batches {
     at_border: Vec<bool>,
     /// Whether there is more than one thread to solve a batch.
     crews: bool,
+    /// Whether every batch keeps its rows.
+    keeps_rows: bool,
 }
 
 /// An island without contacts that are to be solved.
@@ -96,7 +107,7 @@ impl Batches {
         team: Team,
     ) -> Vec<SolverIndex> {
         let Graph { contacts, roots, largest, sleeps, .. } = graph;
-        self.crews = !team.is_alone();
+        (self.crews, self.keeps_rows) = (!team.is_alone(), graph.keeps_rows);
         self.all.clear();
         self.contacts.clear();
         if contacts.is_empty() {
@@ -118,6 +129,13 @@ impl Batches {
         }
     }
 
+    /// A batch of nothing yet, for a crew if there is one and it is worth it.
+    fn begin(&self, crew: bool, at_border: bool) -> Batch {
+        let large = self.crews && crew;
+        let at_once = !(self.crews || at_border || self.keeps_rows);
+        Batch { large, at_border, at_once, statics: if large { MOST_SLICES } else { 1 }, ..Batch::default() }
+    }
+
     /// Everything in one batch.
     fn put_together(
         &mut self,
@@ -126,7 +144,7 @@ impl Batches {
         moving: usize,
         [crew, at_border]: [bool; 2],
     ) -> Vec<SolverIndex> {
-        let mut batch = Batch::new(self.crews && crew, at_border);
+        let mut batch = self.begin(crew, at_border);
         let statics = batch.statics;
         batch.contacts = 0..contacts;
         batch.bodies = 0..(statics as usize + moving).next_multiple_of(LANES);
@@ -217,7 +235,7 @@ impl Batches {
     fn choose(&mut self, graph: Graph<'_>, parallel: Parallel, together: Option<bool>) {
         let Graph { roots, sleeps, .. } = graph;
         if let Some(crew) = together {
-            self.all.push(Batch::new(self.crews && crew, self.at_border.contains(&true)));
+            self.all.push(self.begin(crew, self.at_border.contains(&true)));
         }
         // The batch that is being filled, and its contacts: of islands within the tile, and of those at its border.
         let mut open = [(NO_BATCH, 0); 2];
@@ -231,13 +249,13 @@ impl Batches {
             } else if together.is_some() {
                 0
             } else if parallel == Parallel::Auto && weight >= LARGE {
-                self.all.push(Batch::new(self.crews, self.at_border[node as usize]));
+                self.all.push(self.begin(true, self.at_border[node as usize]));
                 self.all.len() as u32 - 1
             } else {
                 let at_border = self.at_border[node as usize];
                 let (batch, filled) = &mut open[usize::from(at_border)];
                 if *batch == NO_BATCH || *filled >= SMALL {
-                    self.all.push(Batch::new(false, at_border));
+                    self.all.push(self.begin(false, at_border));
                     (*batch, *filled) = (self.all.len() as u32 - 1, 0);
                 }
                 *filled += weight;
@@ -286,7 +304,7 @@ mod tests {
             let asleep: Vec<bool> = (0..count).map(|root| root % 3 == 0).collect();
             let sleeps = sleep.then_some(&asleep[..]);
             let ghosts = count - count / 8..count;
-            let graph = Graph { contacts: &contacts, roots, largest, ghosts, sent: &[2], sleeps };
+            let graph = Graph { contacts: &contacts, roots, largest, ghosts, sent: &[2], sleeps, keeps_rows: false };
             for parallel in [Parallel::Serial, Parallel::Islands, Parallel::Coloring, Parallel::Auto] {
                 for team in [Team::ALONE, Team::of_pool()] {
                     let mut batches = Batches::default();

@@ -1,6 +1,6 @@
 //! The bodies a solver works on: those with contacts, compacted.
 
-use super::batches::{Batches, Graph};
+use super::batches::{Batch, Batches, Graph};
 use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
@@ -49,6 +49,48 @@ pub(crate) struct SolverBodies {
     frozen: bool,
 }
 
+/// The bodies of some batches that lie in order, or of one of them.
+pub(crate) struct Parts<'a> {
+    /// Where the first of them is.
+    first: usize,
+    pub(crate) velocity: &'a mut [Quad],
+    pub(crate) pose: &'a mut [Quad],
+    pub(crate) start: &'a mut [Quad],
+    pub(crate) weight: &'a [Quad],
+    /// Empty where all move alike by themselves.
+    pub(crate) factors: &'a [Quad],
+    pub(crate) ghosts: &'a [Ghost],
+}
+
+impl<'a> Parts<'a> {
+    /// Takes the bodies of a batch out. What lies before them is passed over.
+    pub(crate) fn split_off(&mut self, batch: &Batch) -> Self {
+        const IN_ORDER: &str = "batches lie in order";
+        let (skipped, count) = (batch.bodies.start - self.first, batch.bodies.len());
+        self.first = batch.bodies.end;
+        let take = |column: &mut &'a mut [Quad]| {
+            column.split_off_mut(..skipped).expect(IN_ORDER);
+            column.split_off_mut(..count).expect(IN_ORDER)
+        };
+        let take_fixed = |column: &mut &'a [Quad]| {
+            column.split_off(..skipped).expect(IN_ORDER);
+            column.split_off(..count).expect(IN_ORDER)
+        };
+        let before = |ghosts: &[Ghost], place: usize| ghosts.partition_point(|ghost| ghost.place.get() < place);
+        self.ghosts.split_off(..before(self.ghosts, batch.bodies.start)).expect(IN_ORDER);
+        let own_ghosts = before(self.ghosts, batch.bodies.end);
+        Self {
+            first: batch.bodies.start,
+            velocity: take(&mut self.velocity),
+            pose: take(&mut self.pose),
+            start: take(&mut self.start),
+            weight: take_fixed(&mut self.weight),
+            factors: if self.factors.is_empty() { &[] } else { take_fixed(&mut self.factors) },
+            ghosts: self.ghosts.split_off(..own_ghosts).expect(IN_ORDER),
+        }
+    }
+}
+
 /// A body of the solver whose velocity is given from outside: a ghost, or a [`Carrier`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ghost {
@@ -79,6 +121,12 @@ pub(crate) const LIGHTEST: f32 = 2.0 / CARRIER;
 const ZERO: Quad = [0.0; 4];
 
 impl SolverBodies {
+    /// For each batch to take its own.
+    pub(crate) fn parts(&mut self) -> Parts<'_> {
+        let Self { velocity, pose, start, weight, factors, ghosts, .. } = self;
+        Parts { first: 0, velocity, pose, start, weight, factors, ghosts }
+    }
+
     /// Numbers the bodies that have contacts: the nodes of the contact graph.
     pub(crate) fn number(&mut self, tile: &Tile, contacts: &[Pair], setup: &Setup) {
         let dynamic = tile.owned + tile.ghosts();

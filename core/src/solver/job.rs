@@ -1,8 +1,8 @@
 //! A batch with its part of the solver's buffers, for one thread or a crew of them.
 
-use super::bodies::Ghost;
-use super::constraint::columns::Color;
-use super::constraint::columns::SharedColumns;
+use super::batches::Batch;
+use super::bodies::{Ghost, Parts};
+use super::constraint::columns::{Color, SharedColumns, Slices};
 use super::constraint::kernels::{Pass, Table};
 use super::motion::Motion;
 use crate::parallel::crew::Member;
@@ -37,6 +37,25 @@ pub(crate) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
+    /// Of a batch with its bodies and its groups; `colors` are those of all batches.
+    pub(crate) fn new(batch: &Batch, bodies: Parts<'a>, groups: Slices<'a>, colors: &'a [Color]) -> Self {
+        let Parts { velocity, pose, start, weight, factors, ghosts, .. } = bodies;
+        let colors = &colors[batch.colors.clone()];
+        Self {
+            velocity: Shared::new(velocity),
+            pose: Shared::new(pose),
+            start: Shared::new(start),
+            weight,
+            factors,
+            groups: groups.share(),
+            colors,
+            ghosts,
+            base: batch.bodies.start,
+            at_border: batch.at_border,
+            large: batch.large && colors.iter().any(|color| color.slices > 1),
+        }
+    }
+
     /// One pass over all contacts, color by color. Colors of one slice that follow each other are one stage, done by one
     /// member: meeting costs more than they do.
     #[inline(always)]

@@ -34,7 +34,6 @@ use crate::collide::narrow_phase::Contacts;
 use crate::islands::{IslandSizes, Islands};
 use crate::model::params::{Exchange, Parallel};
 use crate::parallel::crew::{Crew, Member, Needed};
-use crate::parallel::shared::Shared;
 use crate::parallel::team::Team;
 use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
@@ -71,6 +70,7 @@ struct Arranged {
     counts: [usize; 3],
     /// Bodies that others hear of within the step.
     sent: Vec<u32>,
+    keeps_rows: bool,
     team: Team,
     islands: IslandSizes,
 }
@@ -78,24 +78,27 @@ struct Arranged {
 impl Solver {
     /// Finds the islands of a tile's contacts, and puts those that do not sleep into batches; where contacts are between the same
     /// bodies as before, those of before serve. Whoever finds contacts for this solver anew arranges them once. `sent` are the
-    /// bodies that others hear of within the step.
+    /// bodies that others hear of within the step; `keeps_rows` tells that somebody asks for rows when all is solved.
     pub(crate) fn arrange(
         &mut self,
         tile: &mut Tile,
         contacts: &Contacts,
         sent: &[u32],
+        keeps_rows: bool,
         setup: &Setup,
         team: Team,
     ) -> IslandSizes {
         let counts = [tile.owned, tile.ghosts(), tile.bodies.len()];
-        let is_same = |arranged: &Arranged| arranged.counts == counts && arranged.sent == sent && arranged.team == team;
+        let is_same = |arranged: &Arranged| {
+            (arranged.counts, arranged.keeps_rows, arranged.team) == (counts, keeps_rows, team) && arranged.sent == sent
+        };
         // Who sleeps may change though contacts do not.
         match self.arranged.as_ref().filter(|_| !setup.params.sleep && contacts.are_between_the_same()) {
             Some(arranged) if is_same(arranged) => arranged.islands,
             _ => {
-                let islands = self.arrange_anew(tile, &contacts.bodies, sent, setup, team);
+                let islands = self.arrange_anew(tile, &contacts.bodies, sent, keeps_rows, setup, team);
                 self.colors = 0;
-                self.arranged = Some(Arranged { counts, sent: sent.to_vec(), team, islands });
+                self.arranged = Some(Arranged { counts, sent: sent.to_vec(), keeps_rows, team, islands });
                 islands
             }
         }
@@ -106,6 +109,7 @@ impl Solver {
         tile: &mut Tile,
         contacts: &[Pair],
         sent: &[u32],
+        keeps_rows: bool,
         setup: &Setup,
         team: Team,
     ) -> IslandSizes {
@@ -130,7 +134,7 @@ impl Solver {
             carried_roots.extend(roots.iter().copied().chain(bodies.carried().map(|node| roots[node as usize])));
             carried_roots
         };
-        let graph = Graph { contacts, roots, largest: sizes.largest, ghosts, sent, sleeps };
+        let graph = Graph { contacts, roots, largest: sizes.largest, ghosts, sent, sleeps, keeps_rows };
         bodies.arrange(batches, graph, setup.params.parallel, team);
         IslandSizes { islands: own, ..sizes }
     }
@@ -151,17 +155,49 @@ impl Solver {
         self.colors
     }
 
-    /// Writes the rows of all contacts.
+    /// Writes the rows of all contacts but those of batches that are solved at once.
     pub(crate) fn prepare(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, team: Team) {
         let source = Source { tile, contacts, bodies: &self.bodies, setup };
-        self.groups.write(&self.batches, source, team);
+        self.groups.write_kept(&self.batches, source, team);
         if setup.bouncy {
             self.groups.find_bounces(source);
         }
     }
 
-    /// Makes some substeps of all batches. Those away from borders have no word to wait for, and make all of them with the
-    /// first, while they are in the cache.
+    /// How many batches there are.
+    pub(crate) fn batches(&self) -> usize {
+        self.batches.all.len()
+    }
+
+    /// Whether a batch goes from contacts to impulses before the next one begins: [`write_rows`](Self::write_rows),
+    /// [`solve_at_once`](Self::solve_at_once), [`store_impulses_of`](Self::store_impulses_of).
+    pub(crate) fn is_at_once(&self, batch: usize) -> bool {
+        self.batches.all[batch].at_once
+    }
+
+    /// Writes the rows of one batch that is solved at once.
+    pub(crate) fn write_rows(&mut self, batch: usize, tile: &Tile, contacts: &Contacts, setup: &Setup) {
+        let Self { bodies, groups, batches, .. } = self;
+        groups.write_at_once(&batches.all[batch], Source { tile, contacts, bodies, setup });
+    }
+
+    /// Makes all substeps of such a batch.
+    pub(crate) fn solve_at_once(&mut self, batch: usize, setup: &Setup) {
+        let Self { bodies, groups, batches, .. } = self;
+        let batch = &batches.all[batch];
+        let (groups, colors) = groups.at_once(batch);
+        let job = &Job::new(batch, bodies.parts().split_off(batch), groups, colors);
+        let substeps = 0..setup.params.integrations();
+        setup.lanes.run(Run { job, member: Member::alone(), substeps, setup });
+    }
+
+    /// Copies the impulses of the last substep of such a batch back to its contacts.
+    pub(crate) fn store_impulses_of(&self, batch: usize, contacts: &mut Contacts) {
+        self.groups.store_impulses(&self.batches.all[batch], &mut contacts.cache.contacts);
+    }
+
+    /// Makes some substeps of all batches that keep their rows. Those away from borders have no word to wait for, and make all of them
+    /// with the first, while they are in the cache.
     pub(crate) fn solve(&mut self, substeps: Range<u32>, setup: &Setup, team: Team) {
         let substeps = |job: &Job<'_>| match substeps.start {
             _ if job.at_border => substeps.clone(),
@@ -185,31 +221,13 @@ impl Solver {
         team.for_each(small, alone);
     }
 
-    /// The batches, each with its part of the buffers.
+    /// The batches that keep their rows, each with its part of the buffers.
     fn jobs(&mut self) -> impl Iterator<Item = Job<'_>> {
-        const IN_ORDER: &str = "batches lie in order";
-        let SolverBodies { velocity, pose, start, weight, factors, ghosts, .. } = &mut self.bodies;
-        let (mut groups, colors) = self.groups.parts();
-        let (mut velocity, mut pose, mut start) = (&mut velocity[..], &mut pose[..], &mut start[..]);
-        let mut ghosts = &ghosts[..];
-        let (weight, factors) = (&weight[..], &factors[..]);
-        self.batches.all.iter().map(move |batch| {
-            let bodies = batch.bodies.len();
-            let own_ghosts = ghosts.partition_point(|ghost| ghost.place.get() < batch.bodies.end);
-            let colors = &colors[batch.colors.clone()];
-            Job {
-                velocity: Shared::new(velocity.split_off_mut(..bodies).expect(IN_ORDER)),
-                pose: Shared::new(pose.split_off_mut(..bodies).expect(IN_ORDER)),
-                start: Shared::new(start.split_off_mut(..bodies).expect(IN_ORDER)),
-                weight: &weight[batch.bodies.clone()],
-                factors: if factors.is_empty() { &[] } else { &factors[batch.bodies.clone()] },
-                groups: groups.split_off(lengths(&batch.groups)).share(),
-                colors,
-                ghosts: ghosts.split_off(..own_ghosts).expect(IN_ORDER),
-                base: batch.bodies.start,
-                at_border: batch.at_border,
-                large: batch.large && colors.iter().any(|color| color.slices > 1),
-            }
+        let Self { bodies, groups, batches, .. } = self;
+        let (mut groups, colors) = groups.kept();
+        let mut bodies = bodies.parts();
+        batches.all.iter().filter(|batch| !batch.at_once).map(move |batch| {
+            Job::new(batch, bodies.split_off(batch), groups.split_off(lengths(&batch.groups)), colors)
         })
     }
 
@@ -220,18 +238,10 @@ impl Solver {
         }
     }
 
-    /// Copies the impulses of the last substep back to the contacts.
+    /// Copies the impulses of the last substep back to the contacts, but of batches that were solved at once.
     pub(crate) fn store_impulses(&self, contacts: &mut Contacts) {
-        let contacts = &mut contacts.cache.contacts;
-        self.groups.each(|rows, members| {
-            for (lane, &contact) in members.iter().enumerate() {
-                let Some(contact) = contacts.get_mut(contact as usize) else { continue };
-                for (point, rows) in contact.points.iter_mut().zip(rows) {
-                    point.normal_impulse = rows.normal_impulse[lane];
-                    point.tangent_impulse = rows.tangent_impulse[lane];
-                }
-            }
-        });
+        let batches = self.batches.all.iter().filter(|batch| !batch.at_once);
+        batches.for_each(|batch| self.groups.store_impulses(batch, &mut contacts.cache.contacts));
     }
 
     /// Brings a contact's separations up to date after its bodies were placed anew.
@@ -284,14 +294,17 @@ mod tests {
 
     #[test]
     fn what_is_kept_while_contacts_stay_the_same_shows_in_no_bit() {
-        let (mut keeps, mut forgets) = (towers(), towers());
+        // One more where batches keep their rows, which a measure asks for, in some steps.
+        let (mut keeps, mut forgets, mut measures) = (towers(), towers(), towers());
         let mut counts = Vec::new();
         for at in 0..150 {
             forgets.forget_works();
-            let (kept, forgotten) =
-                (step(&mut keeps, &mut Loopback).unwrap(), step(&mut forgets, &mut Loopback).unwrap());
-            assert_eq!(kept, forgotten, "step {at}");
+            measures.measures = at % 3 > 0;
+            let [kept, forgotten, measured] =
+                [&mut keeps, &mut forgets, &mut measures].map(|world| step(world, &mut Loopback).unwrap());
+            assert_eq!((kept, kept), (forgotten, measured), "step {at}");
             assert!(keeps.hashes() == forgets.hashes(), "step {at}: the batches of other contacts were taken");
+            assert!(keeps.hashes() == measures.hashes(), "step {at}: who keeps rows solves otherwise");
             counts.push(kept.contacts);
         }
         assert!(counts[0] < counts[149] && counts[140..].iter().all(|&count| count == counts[149]), "{counts:?}");

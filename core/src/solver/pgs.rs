@@ -30,7 +30,7 @@ pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep:
     }
     let iterations = setup.params.iterations.div_ceil(setup.params.integrations());
     for k in 0..iterations {
-        job.each_color::<V>(member, Iterate::new(setup, substep > 0 && k == 0, k + 1 == iterations));
+        job.each_color::<V>(member, Iterate::new(setup, substep > 0 && k == 0, setup.bouncy && k + 1 == iterations));
     }
     job.integrate_positions::<V>(member, &motion);
 }
@@ -40,7 +40,8 @@ pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep:
 struct Iterate {
     /// Whether bodies have moved since the iteration before.
     moved: bool,
-    last: bool,
+    /// Whether it is the last of a half in which something bounces.
+    ends_bouncy: bool,
     inv_h: f32,
     rate: f32,
     slop: f32,
@@ -48,10 +49,10 @@ struct Iterate {
 }
 
 impl Iterate {
-    fn new(setup: &Setup, moved: bool, last: bool) -> Self {
+    fn new(setup: &Setup, moved: bool, ends_bouncy: bool) -> Self {
         let params = &setup.params;
         let (inv_h, rate) = (1.0 / setup.h, params.baumgarte / params.dt);
-        Self { moved, last, inv_h, rate, slop: params.linear_slop, push_out_speed: params.push_out_speed }
+        Self { moved, ends_bouncy, inv_h, rate, slop: params.linear_slop, push_out_speed: params.push_out_speed }
     }
 }
 
@@ -83,10 +84,8 @@ impl Pass for Iterate {
                 pressing(V::load(&rows.normal_impulse).sub(wanted))
             },
         );
-        if self.last {
-            for rows in &mut group.points {
-                rows.add_to_totals::<V>();
-            }
+        if self.ends_bouncy {
+            group.add_to_pressed::<V>();
         }
         V::scatter(a, bodies.velocity, &group.sides.a);
         V::scatter(b, bodies.velocity, &group.sides.b);

@@ -23,7 +23,7 @@ pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep:
     }
     job.each_color::<V>(member, Solve::new(setup));
     job.integrate_positions::<V>(member, &motion);
-    if setup.totals {
+    if setup.bouncy {
         job.each_color::<V>(member, Relax::<true>::new(setup));
     } else {
         job.each_color::<V>(member, Relax::<false>::new(setup));
@@ -88,19 +88,19 @@ impl Pass for Solve {
 }
 
 /// Friction and normal impulses without the push, at the poses after the substep. Keeps the separations, which hold
-/// until bodies move again: in the next substep's solve. With `TOTALS`, sums impulses over the step.
+/// until bodies move again: in the next substep's solve. With `PRESSED`, sums normal impulses over the step.
 #[derive(Clone, Copy)]
-struct Relax<const TOTALS: bool> {
+struct Relax<const PRESSED: bool> {
     inv_h: f32,
 }
 
-impl<const TOTALS: bool> Relax<TOTALS> {
+impl<const PRESSED: bool> Relax<PRESSED> {
     fn new(setup: &Setup) -> Self {
         Self { inv_h: 1.0 / setup.h }
     }
 }
 
-impl<const TOTALS: bool> Pass for Relax<TOTALS> {
+impl<const PRESSED: bool> Pass for Relax<PRESSED> {
     #[inline(always)]
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
@@ -123,10 +123,8 @@ impl<const TOTALS: bool> Pass for Relax<TOTALS> {
                 pressing(V::load(&rows.normal_impulse).sub(wanted))
             },
         );
-        if TOTALS {
-            for rows in &mut group.points {
-                rows.add_to_totals::<V>();
-            }
+        if PRESSED {
+            group.add_to_pressed::<V>();
         }
         V::scatter(a, bodies.velocity, &group.sides.a);
         V::scatter(b, bodies.velocity, &group.sides.b);

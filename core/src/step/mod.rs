@@ -86,6 +86,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                 let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
                 world.each_tile_apart(|bench| {
                     solve(bench, substep..substep + 1);
+                    bench.stage(Phase::Border, |b| b.work.border.add_impulses(&b.work.solver, &b.work.contacts));
                     if refreshed {
                         bench.stage(Phase::Border, send_refresh);
                     }
@@ -96,7 +97,10 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                 }
             }
             world.each_tile_apart(|bench| {
-                bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution(b.setup));
+                if bench.setup.bouncy {
+                    bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution(b.setup));
+                    bench.stage(Phase::Border, |b| b.work.border.add_bounces(&b.work.solver, &b.work.contacts));
+                }
                 bench.stage(Phase::Border, send_impulses);
             });
             world.exchange(halo)?;
@@ -194,7 +198,8 @@ fn prepare(bench: &mut Bench<'_>) {
     bench.stage(Phase::Islands, |b| {
         let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
         let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
-        let islands = solver.arrange(b.tile, contacts, sent, b.setup, b.team);
+        let keeps_rows = b.measures || b.setup.bouncy;
+        let islands = solver.arrange(b.tile, contacts, sent, keeps_rows, b.setup, b.team);
         solver.load(b.tile, contacts, b.setup);
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
@@ -205,7 +210,21 @@ fn prepare(bench: &mut Bench<'_>) {
 }
 
 fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
+    if substeps.start == 0 {
+        for batch in 0..bench.work.solver.batches() {
+            if bench.work.solver.is_at_once(batch) {
+                solve_at_once(bench, batch);
+            }
+        }
+    }
     bench.stage(Phase::Substeps, |b| b.work.solver.solve(substeps, b.setup, b.team));
+}
+
+/// A batch that nobody waits for, while it is in the cache.
+fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
+    bench.stage(Phase::Prepare, |b| b.work.solver.write_rows(batch, b.tile, &b.work.contacts, b.setup));
+    bench.stage(Phase::Substeps, |b| b.work.solver.solve_at_once(batch, b.setup));
+    bench.stage(Phase::Finalize, |b| b.work.solver.store_impulses_of(batch, &mut b.work.contacts));
 }
 
 /// Restitution where it has not been, and everything written back.

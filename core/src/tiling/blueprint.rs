@@ -6,7 +6,7 @@ use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::kind::{Dynamics, Filter, Kind, KindRow};
 use crate::model::math::{self, Rot};
-use crate::model::params::{Exchange, Params};
+use crate::model::params::Params;
 use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
@@ -91,8 +91,6 @@ pub(crate) struct Setup {
     pub(crate) lanes: LaneSet,
     pub(crate) softness: Softness,
     pub(crate) static_softness: Softness,
-    /// Whether the impulses of a whole step must be summed: for restitution, and to average border contacts.
-    pub(crate) totals: bool,
     /// Whether anything bounces.
     pub(crate) bouncy: bool,
     /// Whether there are bodies that do not touch all others.
@@ -161,7 +159,6 @@ impl Setup {
                 .ok_or(SetupError::NoInstructions { wanted: params.instructions.name() })?,
             softness: Softness::contact(&params),
             static_softness: Softness::static_contact(&params),
-            totals: bouncy || params.exchange == Exchange::Substep,
             bouncy,
             filters,
             compounds,
@@ -190,7 +187,6 @@ impl Setup {
         setup.dynamic_kinds += 1;
         setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
         setup.bouncy |= kind.material.restitution > 0.0;
-        setup.totals |= setup.bouncy;
         setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
         setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
         setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);

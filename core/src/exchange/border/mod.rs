@@ -35,6 +35,8 @@ pub(crate) struct Border {
     scratch: Range<u32>,
     /// Border contacts by the names of their bodies, sorted.
     contacts: Vec<BorderContact>,
+    /// For each of these and each of its points the impulses of the step so far, along the normal and the tangent.
+    totals: Vec<[[f32; 2]; 2]>,
     /// Places in `sends` in the order they are sent: by peer, and for each as its ghosts are ordered.
     send_order: Vec<u32>,
     /// Places in `contacts` in the order they are sent: by peer.
@@ -106,6 +108,8 @@ impl Border {
         self.ghosts.sort_unstable();
         self.ghosts.dedup();
         self.contacts.sort_unstable();
+        self.totals.clear();
+        self.totals.resize(self.contacts.len(), [[0.0; 2]; 2]);
         let Self { sends, contacts: by_pair, send_order, contact_order, .. } = self;
         send_order.clear();
         send_order.extend(0..sends.len() as u32);
@@ -239,12 +243,34 @@ impl Border {
         }
     }
 
+    /// Adds what border contacts did in a substep to what they did in the step.
+    pub(crate) fn add_impulses(&mut self, solver: &Solver, contacts: &Contacts) {
+        for (border, totals) in self.contacts.iter().zip(&mut self.totals) {
+            let count = contacts.cache.contacts[border.contact as usize].point_count();
+            for (k, total) in totals[..count].iter_mut().enumerate() {
+                let now = solver.groups.impulses(border.contact, k);
+                *total = [total[0] + now[0], total[1] + now[1]];
+            }
+        }
+    }
+
+    /// Takes in what border contacts that bounced did then.
+    pub(crate) fn add_bounces(&mut self, solver: &Solver, contacts: &Contacts) {
+        let both = self.contacts.iter().zip(&mut self.totals);
+        for (border, totals) in both.filter(|(border, _)| solver.groups.may_bounce(border.contact)) {
+            let count = contacts.cache.contacts[border.contact as usize].point_count();
+            for (k, total) in totals[..count].iter_mut().enumerate() {
+                total[0] = solver.groups.pressed(border.contact, k);
+            }
+        }
+    }
+
     /// Tells every peer what this tile's copies of their common contacts did in the whole step.
     pub(crate) fn send_impulses(&self, tile: &Tile, solver: &Solver, contacts: &Contacts, bag: &mut Mailbag) {
         for &i in &self.contact_order {
             let border = &self.contacts[i as usize];
             let (low, high) = border.pair;
-            let points = solver.border_points(contacts, border.contact);
+            let points = solver.border_points(contacts, border.contact, &self.totals[i as usize]);
             bag.address(tile.id, border.peer);
             bag.impulses.push(BorderImpulse { low, high, points });
         }
@@ -261,9 +287,9 @@ impl Border {
             if of_pair.clone().next().is_none() {
                 tile.counts.fault = Some(Fault::Protocol);
             }
-            for border in of_pair {
+            for (border, totals) in of_pair.zip(&self.totals[first..]) {
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                    solver.move_together(contacts, border, theirs);
+                    solver.move_together(contacts, border, totals, theirs);
                 }
             }
         }
@@ -290,42 +316,47 @@ impl Solver {
         let mut current = contacts.cache.contacts[contact as usize];
         let count = current.point_count();
         for (k, point) in current.points[..count].iter_mut().enumerate() {
-            let now = self.groups.point(contact, k);
-            (point.normal_impulse, point.tangent_impulse) = (now.normal, now.tangent);
+            [point.normal_impulse, point.tangent_impulse] = self.groups.impulses(contact, k);
         }
         current
     }
 
-    fn border_points(&self, contacts: &Contacts, contact: u32) -> [BorderPoint; 2] {
+    fn border_points(&self, contacts: &Contacts, contact: u32, totals: &[[f32; 2]; 2]) -> [BorderPoint; 2] {
         let points = &contacts.cache.contacts[contact as usize].points;
         let count = contacts.cache.contacts[contact as usize].point_count();
         std::array::from_fn(|k| {
-            let now = if k < count { self.groups.point(contact, k) } else { BorderPoint::NONE };
-            BorderPoint { feature: points[k].feature, ..now }
+            let [normal, tangent] = if k < count { self.groups.impulses(contact, k) } else { [0.0; 2] };
+            let ([total_normal, total_tangent], feature) = (totals[k], points[k].feature);
+            BorderPoint { feature, total_normal, total_tangent, normal, tangent, ..BorderPoint::NONE }
         })
     }
 
-    fn move_together(&mut self, contacts: &Contacts, border: &BorderContact, theirs: &BorderPoint) {
+    fn move_together(
+        &mut self,
+        contacts: &Contacts,
+        border: &BorderContact,
+        totals: &[[f32; 2]; 2],
+        theirs: &BorderPoint,
+    ) {
         let BorderContact { contact, owns_a, far, .. } = *border;
         // Each owner may know others with whom its body bounces, or whom it meets first. The lesser impulse is the one that is sure:
         // it gives nobody more energy than there was.
         let lesser = far || self.groups.may_bounce(contact);
         let points = contacts.cache.contacts[contact as usize].points();
         if let Some(k) = points.iter().position(|point| point.feature == theirs.feature) {
-            let mine = self.groups.point(contact, k);
+            let ([normal, tangent], now) = (totals[k], self.groups.impulses(contact, k));
             // Both owners must come to the same: of equal ones that of body A's.
-            let (less, equal) = (theirs.total_normal < mine.total_normal, theirs.total_normal == mine.total_normal);
+            let (less, equal) = (theirs.total_normal < normal, theirs.total_normal == normal);
             let theirs_counts = less || equal && !owns_a;
             let common = |mine: f32, theirs: f32| match (lesser, theirs_counts) {
                 (false, _) => 0.5 * (mine + theirs),
                 (true, true) => theirs,
                 (true, false) => mine,
             };
-            let normal = common(mine.total_normal, theirs.total_normal) - mine.total_normal;
-            let tangent = common(mine.total_tangent, theirs.total_tangent) - mine.total_tangent;
-            self.apply_impulse(contact, k, owns_a, normal, tangent);
-            let last = [common(mine.normal, theirs.normal), common(mine.tangent, theirs.tangent)];
-            self.groups.set_impulses(contact, k, last[0], last[1]);
+            let (more_normal, more_tangent) =
+                (common(normal, theirs.total_normal) - normal, common(tangent, theirs.total_tangent) - tangent);
+            self.apply_impulse(contact, k, owns_a, more_normal, more_tangent);
+            self.groups.set_impulses(contact, k, [common(now[0], theirs.normal), common(now[1], theirs.tangent)]);
         }
     }
 }

@@ -7,7 +7,8 @@
 use super::group::{Group, PointRows, Sides};
 use super::kernels::{Pass, Table};
 use crate::model::contact::Contact;
-use crate::parallel::lanes::{WIDE, Wide};
+use crate::parallel::ahead::fetch_whole;
+use crate::parallel::lanes::{WIDE, Wide, WideRow};
 use crate::parallel::shared::Shared;
 use std::ops::Range;
 
@@ -67,11 +68,35 @@ impl Columns {
         }
     }
 
-    /// Shows each group's points with its members.
-    pub(crate) fn each(&self, members: &Each<Vec<Members>>, mut show: impl FnMut(&[PointRows], &Members)) {
-        let [single, double] = members;
-        self.single.iter().zip(single).for_each(|(group, members)| show(&group.points, members));
-        self.double.iter().zip(double).for_each(|(group, members)| show(&group.points, members));
+    /// The rows of a group, and how its points have pressed in the step.
+    pub(crate) fn pressed_mut(&mut self, column: usize, group: usize) -> (&Sides, &[PointRows], &mut [WideRow]) {
+        fn all<const N: usize>(group: &mut Group<N>) -> (&Sides, &[PointRows], &mut [WideRow]) {
+            (&group.sides, &group.points, &mut group.pressed)
+        }
+        match column {
+            0 => all(&mut self.single[group]),
+            _ => all(&mut self.double[group]),
+        }
+    }
+
+    /// How a point of a group has pressed in the step.
+    pub(crate) fn pressed(&self, column: usize, group: usize, point: usize) -> &WideRow {
+        match column {
+            0 => &self.single[group].pressed[point],
+            _ => &self.double[group].pressed[point],
+        }
+    }
+
+    /// Shows the points of some groups with their members.
+    pub(crate) fn each(
+        &self,
+        [single, double]: &Each<Range<usize>>,
+        members: Each<&[Members]>,
+        mut show: impl FnMut(&[PointRows], &Members),
+    ) {
+        let (single, double) = (&self.single[single.clone()], &self.double[double.clone()]);
+        single.iter().zip(members[0]).for_each(|(group, members)| show(&group.points, members));
+        double.iter().zip(members[1]).for_each(|(group, members)| show(&group.points, members));
     }
 
     /// All groups.
@@ -88,7 +113,7 @@ pub(crate) struct Slices<'a> {
 
 /// What is written into a group of any column.
 pub(crate) trait Visitor {
-    fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members);
+    fn group<const N: usize>(&mut self, group: &mut Group<N>, members: &Members);
 }
 
 impl<'a> Slices<'a> {
@@ -103,7 +128,7 @@ impl<'a> Slices<'a> {
 
     /// Shows each group to a visitor, with its members.
     #[inline(always)]
-    pub(crate) fn visit(self, members: Each<&[Members]>, visitor: &impl Visitor) {
+    pub(crate) fn visit(self, members: Each<&[Members]>, visitor: &mut impl Visitor) {
         for (group, members) in self.single.iter_mut().zip(members[0]) {
             visitor.group(group, members);
         }
@@ -116,9 +141,11 @@ impl<'a> Slices<'a> {
     #[inline(always)]
     pub(crate) fn pass<V: Wide>(self, pass: impl Pass, bodies: Table<'_>) {
         for group in self.single {
+            fetch_rows_behind(group);
             pass.group::<V, 1>(group, bodies);
         }
         for group in self.double {
+            fetch_rows_behind(group);
             pass.group::<V, 2>(group, bodies);
         }
     }
@@ -127,6 +154,13 @@ impl<'a> Slices<'a> {
     pub(crate) fn share(self) -> SharedColumns<'a> {
         SharedColumns { single: Shared::new(self.single), double: Shared::new(self.double) }
     }
+}
+
+/// Asks for the rows that a pass comes to next. The processor foresees where they lie, but too late.
+#[inline(always)]
+fn fetch_rows_behind<const N: usize>(group: &Group<N>) {
+    let next = std::ptr::from_ref(group).wrapping_add(1);
+    fetch_whole(next.cast::<(Sides, [PointRows; N])>());
 }
 
 /// Groups that several threads work on at once, each on some of its own.

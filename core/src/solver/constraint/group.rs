@@ -10,6 +10,8 @@ use crate::parallel::lanes::{Quad, WIDE, WideRow};
 pub(crate) struct Group<const N: usize> {
     pub(crate) sides: Sides,
     pub(crate) points: [PointRows; N],
+    /// The sum of each point's normal impulses over the step's substeps, kept only where something bounces.
+    pub(crate) pressed: [WideRow; N],
 }
 
 /// What the points of a contact have in common, of sixteen contacts.
@@ -50,9 +52,6 @@ pub(crate) struct PointRows {
     /// Accumulated impulses of the substep.
     pub(crate) normal_impulse: WideRow,
     pub(crate) tangent_impulse: WideRow,
-    /// Their sums over the step's substeps, kept only where somebody asks.
-    pub(crate) total_normal: WideRow,
-    pub(crate) total_tangent: WideRow,
 }
 
 const ZERO: WideRow = [0.0; WIDE];
@@ -71,13 +70,11 @@ impl PointRows {
         separation: ZERO,
         normal_impulse: ZERO,
         tangent_impulse: ZERO,
-        total_normal: ZERO,
-        total_tangent: ZERO,
     };
 }
 
 impl<const N: usize> Group<N> {
-    pub(crate) const EMPTY: Self = Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N] };
+    pub(crate) const EMPTY: Self = Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], pressed: [ZERO; N] };
 }
 
 /// The speed of a body along a row.
@@ -113,36 +110,48 @@ impl Sides {
 
     /// Gives the points of a contact that pressed what they are to have. Two that part do so at once: one after the other, the first
     /// would turn a box that falls flat, and the second not turn it back.
-    pub(crate) fn bounce(&self, points: &mut [PointRows], lane: usize, answers: [Answer; 2], velocity: &mut [Quad]) {
-        if let ([one, two], [Answer::Part(first), Answer::Part(second)]) = (&mut *points, answers)
-            && one.total_normal[lane] > 0.0
-            && two.total_normal[lane] > 0.0
-            && self.bounce_together([one, two], lane, [first, second], velocity)
+    pub(crate) fn bounce(
+        &self,
+        points: &[PointRows],
+        pressed: &mut [WideRow],
+        lane: usize,
+        answers: [Answer; 2],
+        velocity: &mut [Quad],
+    ) {
+        if let ([one, two], [pressed_one, pressed_two], [Answer::Part(first), Answer::Part(second)]) =
+            (points, &mut *pressed, answers)
         {
-            return;
+            let pressed = [&mut pressed_one[lane], &mut pressed_two[lane]];
+            if *pressed[0] > 0.0
+                && *pressed[1] > 0.0
+                && self.bounce_together([one, two], pressed, lane, [first, second], velocity)
+            {
+                return;
+            }
         }
-        for (point, answer) in points.iter_mut().zip(answers) {
-            let pressed = point.total_normal[lane];
+        for ((point, pressed), answer) in points.iter().zip(pressed).zip(answers) {
+            let pressed = &mut pressed[lane];
             let wanted = match answer {
-                Answer::Part(speed) if pressed > 0.0 => {
+                Answer::Part(speed) if *pressed > 0.0 => {
                     point.normal_mass[lane] * (speed - self.normal_speed(point, lane, velocity))
                 }
-                Answer::NotYet(most) if pressed > most * point.normal_mass[lane] => -pressed,
+                Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
             };
-            self.add_normal_impulse(point, lane, max(wanted, -pressed), velocity);
+            self.add_normal_impulse(point, pressed, lane, max(wanted, -*pressed), velocity);
         }
     }
 
     /// Two points at once, if that takes no pull from either.
     fn bounce_together(
         &self,
-        points: [&mut PointRows; 2],
+        points: [&PointRows; 2],
+        pressed: [&mut f32; 2],
         lane: usize,
         speeds: [f32; 2],
         velocity: &mut [Quad],
     ) -> bool {
-        let [one, two] = &points;
+        let [one, two] = points;
         let ([one_a, one_b], [two_a, two_b]) = (self.normal_rows(one, lane), self.normal_rows(two, lane));
         let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
         // How much speed an impulse at one of them gives each.
@@ -154,21 +163,28 @@ impl Sides {
             (own[1] * lacks[0] - other * lacks[1]) / determinant,
             (own[0] * lacks[1] - other * lacks[0]) / determinant,
         ];
-        let pulls = |k: usize| impulses[k] < -points[k].total_normal[lane];
+        let pulls = |k: usize| impulses[k] < -*pressed[k];
         // Points that are nearly one leave nothing to tell them apart by.
         let is_regular = determinant > 1e-3 * own[0] * own[1];
         if !is_regular || pulls(0) || pulls(1) {
             return false;
         }
-        for (point, impulse) in points.into_iter().zip(impulses) {
-            self.add_normal_impulse(point, lane, impulse, velocity);
+        for ((point, pressed), impulse) in points.into_iter().zip(pressed).zip(impulses) {
+            self.add_normal_impulse(point, pressed, lane, impulse, velocity);
         }
         true
     }
 
     /// Gives both bodies some more impulse along the normal of a point.
-    fn add_normal_impulse(&self, point: &mut PointRows, lane: usize, impulse: f32, velocity: &mut [Quad]) {
-        point.total_normal[lane] += impulse;
+    fn add_normal_impulse(
+        &self,
+        point: &PointRows,
+        pressed: &mut f32,
+        lane: usize,
+        impulse: f32,
+        velocity: &mut [Quad],
+    ) {
+        *pressed += impulse;
         let ([row_a, row_b], a, b) = (self.normal_rows(point, lane), self.a[lane] as usize, self.b[lane] as usize);
         for k in 0..3 {
             velocity[a][k] -= row_a[k] * impulse;

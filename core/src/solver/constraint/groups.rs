@@ -1,17 +1,21 @@
 //! All constraints of a tile, and how to find that of a contact.
 
-use super::columns::{Color, Columns, Each, Members, Slices};
+use super::columns::{Color, Columns, Each, Members, Slices, lengths};
 use super::group::{PointRows, Sides};
-use crate::exchange::record::BorderPoint;
+use crate::model::contact::Contact;
 use crate::model::math::max;
-use crate::parallel::lanes::Quad;
+use crate::parallel::lanes::{Quad, WideRow};
+use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
 
 /// All constraints of a tile, batch by batch and color by color.
 #[derive(Default, Debug)]
 pub(crate) struct Groups {
-    pub(super) columns: Columns,
-    /// For each group of each column.
+    /// Of all batches that keep theirs.
+    pub(super) kept: Columns,
+    /// Of those that are solved at once, one after another.
+    pub(super) at_once: Columns,
+    /// For each group of each column, batch by batch.
     pub(super) members: Each<Vec<Members>>,
     pub(super) colors: Vec<Color>,
     /// For each contact, in canonical order.
@@ -77,6 +81,11 @@ impl Lane {
         (sides, points, self.lane.into())
     }
 
+    pub(super) fn pressed_mut(self, columns: &mut Columns) -> (&Sides, &[PointRows], &mut [WideRow], usize) {
+        let (sides, points, pressed) = columns.pressed_mut(self.column.into(), self.group as usize);
+        (sides, points, pressed, self.lane.into())
+    }
+
     pub(super) fn rows_mut(self, columns: &mut Columns) -> (&Sides, &mut [PointRows], usize) {
         let (sides, points) = columns.rows_mut(self.column.into(), self.group as usize);
         (sides, points, self.lane.into())
@@ -84,14 +93,28 @@ impl Lane {
 }
 
 impl Groups {
-    /// All groups, and the colors of all batches.
-    pub(crate) fn parts(&mut self) -> (Slices<'_>, &[Color]) {
-        (self.columns.slices(), &self.colors)
+    /// The groups of all batches that keep theirs, and the colors of all batches.
+    pub(crate) fn kept(&mut self) -> (Slices<'_>, &[Color]) {
+        (self.kept.slices(), &self.colors)
     }
 
-    /// Shows the points of each group with the group's members.
-    pub(crate) fn each(&self, show: impl FnMut(&[PointRows], &Members)) {
-        self.columns.each(&self.members, show);
+    /// The groups of a batch that is solved at once, and the colors of all batches.
+    pub(crate) fn at_once(&mut self, batch: &Batch) -> (Slices<'_>, &[Color]) {
+        (self.at_once.slices().split_off(lengths(&batch.groups)), &self.colors)
+    }
+
+    /// Copies the impulses of the last substep back to the contacts of a batch.
+    pub(crate) fn store_impulses(&self, batch: &Batch, contacts: &mut [Contact]) {
+        let columns = if batch.at_once { &self.at_once } else { &self.kept };
+        columns.each(&batch.groups, batch.members_of(&self.members), |rows, members| {
+            for (lane, &contact) in members.iter().enumerate() {
+                let Some(contact) = contacts.get_mut(contact as usize) else { continue };
+                for (point, rows) in contact.points.iter_mut().zip(rows) {
+                    point.normal_impulse = rows.normal_impulse[lane];
+                    point.tangent_impulse = rows.tangent_impulse[lane];
+                }
+            }
+        });
     }
 
     /// Whether a contact has a constraint: not while its island sleeps.
@@ -99,22 +122,21 @@ impl Groups {
         self.lanes[contact as usize] != Lane::NONE
     }
 
-    /// What one point of a contact did: its impulses now, and their sums over the step.
-    pub(crate) fn point(&self, contact: u32, point: usize) -> BorderPoint {
-        let (_, points, lane) = self.lanes[contact as usize].rows(&self.columns);
-        let point = &points[point];
-        BorderPoint {
-            total_normal: point.total_normal[lane],
-            total_tangent: point.total_tangent[lane],
-            normal: point.normal_impulse[lane],
-            tangent: point.tangent_impulse[lane],
-            ..BorderPoint::NONE
-        }
+    /// The impulses now at one point of a contact, along the normal and the tangent. Here and below it is one whose batch keeps its rows.
+    pub(crate) fn impulses(&self, contact: u32, point: usize) -> [f32; 2] {
+        let (_, points, lane) = self.lanes[contact as usize].rows(&self.kept);
+        [points[point].normal_impulse[lane], points[point].tangent_impulse[lane]]
+    }
+
+    /// What one point of a contact that may bounce has pressed in the step, its bounce included.
+    pub(crate) fn pressed(&self, contact: u32, point: usize) -> f32 {
+        let Lane { column, lane, group, .. } = self.lanes[contact as usize];
+        self.kept.pressed(column.into(), group as usize, point)[usize::from(lane)]
     }
 
     /// Overwrites the accumulated impulses of one point.
-    pub(crate) fn set_impulses(&mut self, contact: u32, point: usize, normal: f32, tangent: f32) {
-        let (_, points, lane) = self.lanes[contact as usize].rows_mut(&mut self.columns);
+    pub(crate) fn set_impulses(&mut self, contact: u32, point: usize, [normal, tangent]: [f32; 2]) {
+        let (_, points, lane) = self.lanes[contact as usize].rows_mut(&mut self.kept);
         points[point].normal_impulse[lane] = normal;
         points[point].tangent_impulse[lane] = tangent;
     }
@@ -122,7 +144,7 @@ impl Groups {
     /// Brings a contact's separations up to date after its bodies were placed anew.
     pub(crate) fn refresh_separation(&mut self, contact: u32, bodies: &SolverBodies) {
         let at = self.lanes[contact as usize];
-        let (sides, points, lane) = at.rows_mut(&mut self.columns);
+        let (sides, points, lane) = at.rows_mut(&mut self.kept);
         for point in points {
             point.separation[lane] = sides.separation(point, lane, at.bodies(&bodies.pose));
         }
@@ -138,14 +160,14 @@ impl Groups {
         bodies: &mut SolverBodies,
     ) {
         let at = self.lanes[contact as usize];
-        let (sides, points, lane) = at.rows(&self.columns);
+        let (sides, points, lane) = at.rows(&self.kept);
         sides.apply_impulse(&points[point], lane, upon_a, impulse, at.bodies_mut(&mut bodies.velocity));
     }
 
     /// How fast the surfaces of a contact's point come nearer than they may, in m/s; negative or zero: they do not.
     pub(crate) fn violation(&self, contact: u32, point: usize, bodies: &SolverBodies, h: f32) -> f32 {
         let at = self.lanes[contact as usize];
-        let (sides, points, lane) = at.rows(&self.columns);
+        let (sides, points, lane) = at.rows(&self.kept);
         let speed = sides.normal_speed(&points[point], lane, at.bodies(&bodies.velocity));
         -speed - max(points[point].separation[lane], 0.0) / h
     }

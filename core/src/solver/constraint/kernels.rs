@@ -158,12 +158,13 @@ impl<V: Wide> Normals<V> {
     }
 }
 
-impl PointRows {
-    /// Adds the impulses of a substep to those of the step.
+impl<const N: usize> Group<N> {
+    /// Adds the normal impulses of a substep to those of the step.
     #[inline(always)]
-    pub(crate) fn add_to_totals<V: Wide>(&mut self) {
-        V::load(&self.total_normal).add(V::load(&self.normal_impulse)).store(&mut self.total_normal);
-        V::load(&self.total_tangent).add(V::load(&self.tangent_impulse)).store(&mut self.total_tangent);
+    pub(crate) fn add_to_pressed<V: Wide>(&mut self) {
+        for (rows, pressed) in self.points.iter().zip(&mut self.pressed) {
+            V::load(pressed).add(V::load(&rows.normal_impulse)).store(pressed);
+        }
     }
 }
 

@@ -24,21 +24,33 @@ impl Groups {
         self.members.iter_mut().for_each(Vec::clear);
         self.lanes.clear();
         self.lanes.resize(contacts.len(), Lane::NONE);
-        let mut most_colors = 0;
+        let (mut most_colors, mut at_once, mut kept) = (0, [0; COLUMNS], [0; COLUMNS]);
         for batch in &mut batches.all {
             let first = self.colors.len();
             let range = batch.contacts.clone();
-            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch);
+            let (mut place, end) = if batch.at_once { ([0; COLUMNS], &mut at_once) } else { (kept, &mut kept) };
+            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch, &mut place);
+            end.iter_mut().zip(place).for_each(|(end, place)| *end = place.max(*end));
             batch.colors = first..self.colors.len();
             // All that overflows counts as one color.
             most_colors = most_colors.max(batch.colors.len().min(COLORS + 1));
         }
-        self.columns.resize(self.members.each_ref().map(Vec::len));
+        self.kept.resize(kept);
+        self.at_once.resize(at_once);
         most_colors
     }
 
-    fn lay_out_batch(&mut self, contacts: &[Contact], own: &[u32], colors: &[u8], batch: &mut Batch) {
-        let first = self.members.each_ref().map(Vec::len);
+    /// `place` is where its groups begin, and then where they end.
+    fn lay_out_batch(
+        &mut self,
+        contacts: &[Contact],
+        own: &[u32],
+        colors: &[u8],
+        batch: &mut Batch,
+        place: &mut Each<usize>,
+    ) {
+        batch.members = self.members.each_ref().map(Vec::len);
+        let (first, first_member) = (*place, batch.members);
         let column_of = |contact: u32| column_of(&contacts[contact as usize]);
         let mut counts = [[0; COLUMNS]; COLORS + 1];
         for (&contact, &color) in own.iter().zip(colors) {
@@ -67,8 +79,9 @@ impl Groups {
             }
         }
         for (column, members) in self.members.iter_mut().enumerate() {
-            members.resize(first[column] + end[column], [NO_CONTACT; WIDE]);
-            batch.groups[column] = first[column]..members.len();
+            members.resize(first_member[column] + end[column], [NO_CONTACT; WIDE]);
+            place[column] = first[column] + end[column];
+            batch.groups[column] = first[column]..place[column];
         }
         for (&contact, &color) in own.iter().zip(colors) {
             let column = column_of(contact);
@@ -76,10 +89,10 @@ impl Groups {
                 Some(next) => (&mut next[column], 1),
                 None => (&mut overflow[column], WIDE),
             };
-            let (lane, group) = (*next % WIDE, first[column] + *next / WIDE);
+            let (lane, group) = (*next % WIDE, *next / WIDE);
             *next += step;
-            self.members[column][group][lane] = contact;
-            self.lanes[contact as usize] = Lane::new(column, group, lane, batch.bodies.start);
+            self.members[column][first_member[column] + group][lane] = contact;
+            self.lanes[contact as usize] = Lane::new(column, first[column] + group, lane, batch.bodies.start);
         }
     }
 }

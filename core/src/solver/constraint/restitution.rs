@@ -48,8 +48,8 @@ impl Groups {
         for _ in 0..PASSES {
             for bounce in &self.bounces {
                 let at = self.lanes[bounce.contact as usize];
-                let (sides, points, lane) = at.rows_mut(&mut self.columns);
-                sides.bounce(points, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
+                let (sides, points, pressed, lane) = at.pressed_mut(&mut self.kept);
+                sides.bounce(points, pressed, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
             }
         }
     }

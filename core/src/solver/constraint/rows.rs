@@ -1,6 +1,6 @@
 //! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
 
-use super::columns::{Each, Members, NO_CONTACT, Slices, Visitor, lengths};
+use super::columns::{Color, Each, Members, NO_CONTACT, Slices, Visitor, lengths};
 use super::group::Group;
 use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
@@ -43,7 +43,8 @@ impl Kernel for Write<'_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Unit { groups, members, local } = self.unit;
-        groups.visit(members, &WriteRows::<V::Wide> { source: self.source, local, lanes: PhantomData });
+        let inputs = Inputs::nothing(local);
+        groups.visit(members, &mut WriteRows::<V::Wide> { source: self.source, local, inputs, lanes: PhantomData });
     }
 }
 
@@ -51,13 +52,16 @@ impl Kernel for Write<'_> {
 struct WriteRows<'a, V> {
     source: Source<'a>,
     local: Local,
+    /// Of the group before, and then of this.
+    inputs: Inputs,
     lanes: PhantomData<V>,
 }
 
 impl<V: Wide> Visitor for WriteRows<'_, V> {
     #[inline(always)]
-    fn group<const N: usize>(&self, group: &mut Group<N>, members: &Members) {
-        write::<V, N>(group, &Inputs::collect(members, self.source, self.local));
+    fn group<const N: usize>(&mut self, group: &mut Group<N>, members: &Members) {
+        self.inputs.collect(members, self.source, self.local);
+        write::<V, N>(group, &self.inputs);
     }
 }
 
@@ -128,11 +132,11 @@ impl<V: Wide> Numbers<V> {
 }
 
 impl Inputs {
-    #[inline(always)]
-    fn collect(members: &Members, source: Source<'_>, local: Local) -> Self {
+    /// Sixteen lanes without a contact.
+    fn nothing(local: Local) -> Self {
         const NONE: [Quad; WIDE] = [[0.0; 4]; WIDE];
         const ZERO: WideRow = [0.0; WIDE];
-        let mut inputs = Self {
+        Self {
             a: [local.slice; WIDE],
             b: [local.slice; WIDE],
             contact: [NONE; QUADS],
@@ -143,33 +147,41 @@ impl Inputs {
             friction_b: ZERO,
             not_round_a: ZERO,
             not_round_b: ZERO,
-        };
+        }
+    }
+
+    /// Takes in the contacts of a group.
+    #[inline(always)]
+    fn collect(&mut self, members: &Members, source: Source<'_>, local: Local) {
+        // Groups that are not full are the last of their colors.
+        if members.contains(&NO_CONTACT) {
+            *self = Self::nothing(local);
+        }
         let Source { tile, contacts, bodies, setup } = source;
         let carried = bodies.have_carriers();
         for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
             let contact = contact as usize;
             let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
-            for (lanes, &quad) in inputs.contact.iter_mut().zip(quads) {
+            for (lanes, &quad) in self.contact.iter_mut().zip(quads) {
                 lanes[lane] = quad;
             }
             let separation = contacts.separation[contact];
-            (inputs.separation[0][lane], inputs.separation[1][lane]) = (separation[0], separation[1]);
+            (self.separation[0][lane], self.separation[1][lane]) = (separation[0], separation[1]);
             let [a, b] = contacts.bodies[contact];
             let (mut place_a, mut place_b) = (bodies.place_of(a), bodies.place_of(b));
             if carried {
                 [place_a, place_b] = bodies.carried_in(contact as u32, [place_a, place_b]);
             }
-            (inputs.a[lane], inputs.b[lane]) = (local.place(place_a), local.place(place_b));
-            inputs.weight_a[lane] = bodies.weight[place_a.get()];
-            inputs.weight_b[lane] = bodies.weight[place_b.get()];
+            (self.a[lane], self.b[lane]) = (local.place(place_a), local.place(place_b));
+            self.weight_a[lane] = bodies.weight[place_a.get()];
+            self.weight_b[lane] = bodies.weight[place_b.get()];
             let kind_a = setup.kind(tile.bodies.kind[a as usize]);
             let kind_b = setup.kind(tile.bodies.kind[b as usize]);
-            inputs.friction_a[lane] = kind_a.material.friction;
-            inputs.friction_b[lane] = kind_b.material.friction;
-            inputs.not_round_a[lane] = kind_a.not_round;
-            inputs.not_round_b[lane] = kind_b.not_round;
+            self.friction_a[lane] = kind_a.material.friction;
+            self.friction_b[lane] = kind_b.material.friction;
+            self.not_round_a[lane] = kind_a.not_round;
+            self.not_round_b[lane] = kind_b.not_round;
         }
-        inputs
     }
 }
 
@@ -226,34 +238,52 @@ fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
         rows.separation = inputs.separation[k];
         normal_impulse.store(&mut rows.normal_impulse);
         tangent_impulse.store(&mut rows.tangent_impulse);
-        zero.store(&mut rows.total_normal);
-        zero.store(&mut rows.total_tangent);
     }
+    group.pressed.iter_mut().for_each(|pressed| zero.store(pressed));
 }
 
 impl Groups {
-    /// Writes the rows of all contacts where [`Groups::lay_out`] has put them.
-    pub(crate) fn write(&mut self, batches: &Batches, source: Source<'_>, team: Team) {
-        let Self { columns, members, colors, .. } = self;
-        let (mut groups, colors) = (columns.slices(), &*colors);
-        let mut members = members.each_ref().map(|members| &members[..]);
-        let mut next = |batch: &Batch, color: usize, slice: u32| {
-            let counts = lengths(&colors[color].slice(slice));
+    /// Writes the rows of the contacts of all batches that keep them, where [`Groups::lay_out`] has put them.
+    pub(crate) fn write_kept(&mut self, batches: &Batches, source: Source<'_>, team: Team) {
+        let Self { kept, members, colors, .. } = self;
+        let mut groups = kept.slices();
+        let mut units = Vec::new();
+        let write = |unit| source.setup.lanes.run(Write { unit, source });
+        for batch in batches.all.iter().filter(|batch| !batch.at_once) {
+            let groups = groups.split_off(lengths(&batch.groups));
+            each_unit(
+                batch,
+                groups,
+                members,
+                colors,
+                |unit| if team.is_alone() { write(unit) } else { units.push(unit) },
+            );
+        }
+        team.for_each(units, write);
+    }
+
+    /// Writes the rows of the contacts of a batch that is solved at once.
+    pub(crate) fn write_at_once(&mut self, batch: &Batch, source: Source<'_>) {
+        let Self { at_once, members, colors, .. } = self;
+        each_unit(batch, at_once.slices(), members, colors, |unit| source.setup.lanes.run(Write { unit, source }));
+    }
+}
+
+/// Shows the groups of a batch, the first of those, in pieces that threads may write side by side.
+fn each_unit<'a>(
+    batch: &Batch,
+    mut groups: Slices<'a>,
+    members: &'a Each<Vec<Members>>,
+    colors: &[Color],
+    mut show: impl FnMut(Unit<'a>),
+) {
+    let mut members = batch.members_of(members);
+    for color in &colors[batch.colors.clone()] {
+        for slice in 0..color.slices {
+            let counts = lengths(&color.slice(slice));
             let own = |column: usize| members[column].split_off(..counts[column]).expect("as many as groups");
             let (groups, members) = (groups.split_off(counts), std::array::from_fn(own));
-            Unit { groups, members, local: Local { base: batch.bodies.start as u32, slice } }
-        };
-        let each = batches.all.iter().flat_map(|batch| {
-            let slices = move |color: usize| (0..colors[color].slices).map(move |slice| (batch, color, slice));
-            batch.colors.clone().flat_map(slices)
-        });
-        if team.is_alone() {
-            each.for_each(|(batch, color, slice)| {
-                source.setup.lanes.run(Write { unit: next(batch, color, slice), source })
-            });
-        } else {
-            let units = each.map(|(batch, color, slice)| next(batch, color, slice)).collect();
-            team.for_each(units, |unit| source.setup.lanes.run(Write { unit, source }));
+            show(Unit { groups, members, local: Local { base: batch.bodies.start as u32, slice } });
         }
     }
 }
