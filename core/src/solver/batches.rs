@@ -97,6 +97,11 @@ pub(crate) struct Batches {
 const NO_BATCH: u32 = u32::MAX;
 
 impl Batches {
+    /// The batch that has one of the solver's bodies.
+    pub(crate) fn of_body(&self, place: usize) -> &Batch {
+        &self.all[self.all.partition_point(|batch| batch.bodies.end <= place)]
+    }
+
     /// Puts islands into batches, but those that sleep. `nodes` gives for each body of the tile what it is in the graph;
     /// returns which of the solver's bodies it is.
     pub(crate) fn divide(

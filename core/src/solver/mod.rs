@@ -160,7 +160,7 @@ impl Solver {
         let source = Source { tile, contacts, bodies: &self.bodies, setup };
         self.groups.write_kept(&self.batches, source, team);
         if setup.bouncy {
-            self.groups.find_bounces(source);
+            self.groups.find_bounces(&self.batches, source);
         }
     }
 
@@ -189,6 +189,11 @@ impl Solver {
         let job = &Job::new(batch, bodies.parts().split_off(batch), groups, colors);
         let substeps = 0..setup.params.integrations();
         setup.lanes.run(Run { job, member: Member::alone(), substeps, setup });
+    }
+
+    /// Bounces of such a batch: see [`apply_restitution`](Self::apply_restitution).
+    pub(crate) fn bounce_at_once(&mut self, batch: usize) {
+        self.groups.apply_restitution_at_once(&self.batches.all[batch], &mut self.bodies);
     }
 
     /// Copies the impulses of the last substep of such a batch back to its contacts.
@@ -276,11 +281,13 @@ mod tests {
     use glam::{DVec2, Vec2};
 
     /// Two towers, one of them on the border of two tiles, and a box that falls onto the other.
-    fn towers() -> World {
+    fn towers(restitution: f32) -> World {
         let params = Params { exchange: Exchange::Substep, gravity: Vec2::new(0.0, -10.0), ..Params::default() };
         let partition = Partition::uniform(DVec2::ZERO, DVec2::new(20.0, 10.0), 2, 1).unwrap();
         let floor = StaticBody::new(GlobalId(0), rectangle(20.0, 1.0), DVec2::new(10.0, 0.0));
-        let blueprint = Blueprint { params, partition, kinds: vec![rectangle(1.0, 1.0)], statics: vec![floor] };
+        let mut kind = rectangle(1.0, 1.0);
+        kind.material.restitution = restitution;
+        let blueprint = Blueprint { params, partition, kinds: vec![kind], statics: vec![floor] };
         let mut world = World::new(&blueprint, &[TileId(0), TileId(1)]).unwrap();
         for i in 0..5 {
             for (tower, x) in [(0, 4.0), (1, 10.0)] {
@@ -294,19 +301,24 @@ mod tests {
 
     #[test]
     fn what_is_kept_while_contacts_stay_the_same_shows_in_no_bit() {
-        // One more where batches keep their rows, which a measure asks for, in some steps.
-        let (mut keeps, mut forgets, mut measures) = (towers(), towers(), towers());
-        let mut counts = Vec::new();
-        for at in 0..150 {
-            forgets.forget_works();
-            measures.measures = at % 3 > 0;
-            let [kept, forgotten, measured] =
-                [&mut keeps, &mut forgets, &mut measures].map(|world| step(world, &mut Loopback).unwrap());
-            assert_eq!((kept, kept), (forgotten, measured), "step {at}");
-            assert!(keeps.hashes() == forgets.hashes(), "step {at}: the batches of other contacts were taken");
-            assert!(keeps.hashes() == measures.hashes(), "step {at}: who keeps rows solves otherwise");
-            counts.push(kept.contacts);
+        let (mut counts, mut states) = (Vec::new(), Vec::new());
+        for restitution in [0.5, 0.0] {
+            // One more where batches keep their rows, which a measure asks for, in some steps.
+            let [mut keeps, mut forgets, mut measures] = [(); 3].map(|()| towers(restitution));
+            counts.clear();
+            for at in 0..150 {
+                forgets.forget_works();
+                measures.measures = at % 3 > 0;
+                let [kept, forgotten, measured] =
+                    [&mut keeps, &mut forgets, &mut measures].map(|world| step(world, &mut Loopback).unwrap());
+                assert_eq!((kept, kept), (forgotten, measured), "step {at}");
+                assert!(keeps.hashes() == forgets.hashes(), "step {at}: the batches of other contacts were taken");
+                assert!(keeps.hashes() == measures.hashes(), "step {at}: who keeps rows solves otherwise");
+                counts.push(kept.contacts);
+            }
+            states.push(keeps.hashes().state);
         }
+        assert!(states[0] != states[1], "nothing has bounced");
         assert!(counts[0] < counts[149] && counts[140..].iter().all(|&count| count == counts[149]), "{counts:?}");
     }
 }

@@ -198,8 +198,7 @@ fn prepare(bench: &mut Bench<'_>) {
     bench.stage(Phase::Islands, |b| {
         let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
         let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
-        let keeps_rows = b.measures || b.setup.bouncy;
-        let islands = solver.arrange(b.tile, contacts, sent, keeps_rows, b.setup, b.team);
+        let islands = solver.arrange(b.tile, contacts, sent, b.measures, b.setup, b.team);
         solver.load(b.tile, contacts, b.setup);
         let counts = &mut b.tile.counts;
         (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
@@ -224,7 +223,12 @@ fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
 fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
     bench.stage(Phase::Prepare, |b| b.work.solver.write_rows(batch, b.tile, &b.work.contacts, b.setup));
     bench.stage(Phase::Substeps, |b| b.work.solver.solve_at_once(batch, b.setup));
-    bench.stage(Phase::Finalize, |b| b.work.solver.store_impulses_of(batch, &mut b.work.contacts));
+    bench.stage(Phase::Finalize, |b| {
+        if b.setup.bouncy {
+            b.work.solver.bounce_at_once(batch);
+        }
+        b.work.solver.store_impulses_of(batch, &mut b.work.contacts);
+    });
 }
 
 /// Restitution where it has not been, and everything written back.

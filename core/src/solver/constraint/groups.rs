@@ -20,8 +20,10 @@ pub(crate) struct Groups {
     pub(super) colors: Vec<Color>,
     /// For each contact, in canonical order.
     pub(super) lanes: Vec<Lane>,
-    /// Contacts that may bounce.
+    /// Contacts that may bounce, of batches that keep their rows.
     pub(super) bounces: Vec<Bounce>,
+    /// The same of batches that are solved at once: batch by batch.
+    pub(super) bounces_at_once: Vec<Bounce>,
 }
 
 /// A contact that may bounce.
@@ -51,7 +53,7 @@ pub(crate) struct Lane {
     lane: u8,
     group: u32,
     /// The first body of its batch.
-    base: u32,
+    pub(super) base: u32,
 }
 
 impl Lane {

@@ -1,17 +1,20 @@
 //! Restitution: points that came in fast and pressed get part of their speed back, once, after the last substep.
 
-use super::groups::{Answer, Bounce, Groups};
+use super::columns::Columns;
+use super::groups::{Answer, Bounce, Groups, Lane};
 use super::rows::Source;
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
 use crate::model::math::{dot, max, turn};
+use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use glam::Vec2;
 
 impl Groups {
-    /// Finds the contacts that may bounce, in canonical order.
-    pub(crate) fn find_bounces(&mut self, source: Source<'_>) {
+    /// Finds the contacts that may bounce, in canonical order in each batch.
+    pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
         self.bounces.clear();
+        self.bounces_at_once.clear();
         for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
             let sides = source.contacts.bodies[i];
             let [a, b] =
@@ -29,28 +32,47 @@ impl Groups {
                     }
                 }
                 if answers != [Answer::Rest; 2] {
-                    self.bounces.push(Bounce { contact: i as u32, answers });
+                    let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
+                    let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
+                    bounces.push(Bounce { contact: i as u32, answers });
                 }
             }
         }
+        let lanes = &self.lanes;
+        self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
     }
 
-    /// Whether a contact is among those.
+    /// Whether a contact whose batch keeps its rows is among those.
     pub(crate) fn may_bounce(&self, contact: u32) -> bool {
         self.bounces.binary_search_by_key(&contact, |bounce| bounce.contact).is_ok()
     }
 
-    /// Some passes over them, in canonical order: who bounces off two others at once comes to the speeds that both want after
-    /// several. An impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and
-    /// after. So with restitution 1 nothing is lost or gained where each point parts as fast as it came.
+    /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        const PASSES: usize = 8;
-        for _ in 0..PASSES {
-            for bounce in &self.bounces {
-                let at = self.lanes[bounce.contact as usize];
-                let (sides, points, pressed, lane) = at.pressed_mut(&mut self.kept);
-                sides.bounce(points, pressed, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
-            }
+        let Self { bounces, lanes, kept, .. } = self;
+        bounce(bounces, lanes, kept, bodies);
+    }
+
+    /// Bounces of a batch that is solved at once.
+    pub(crate) fn apply_restitution_at_once(&mut self, batch: &Batch, bodies: &mut SolverBodies) {
+        let Self { bounces_at_once: bounces, lanes, at_once, .. } = self;
+        let before =
+            |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
+        let own = before(batch.bodies.start)..before(batch.bodies.end);
+        bounce(&bounces[own], lanes, at_once, bodies);
+    }
+}
+
+/// Some passes over contacts that may bounce, in canonical order: who bounces off two others at once comes to the speeds that both want
+/// after several. An impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and
+/// after. So with restitution 1 nothing is lost or gained where each point parts as fast as it came.
+fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mut SolverBodies) {
+    const PASSES: usize = 8;
+    for _ in 0..PASSES {
+        for bounce in bounces {
+            let at = lanes[bounce.contact as usize];
+            let (sides, points, pressed, lane) = at.pressed_mut(columns);
+            sides.bounce(points, pressed, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
         }
     }
 }
