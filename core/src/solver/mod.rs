@@ -237,10 +237,8 @@ impl Solver {
     }
 
     /// Bounces: contacts that pressed and came in fast get their approach speed back, in part.
-    pub(crate) fn apply_restitution(&mut self, setup: &Setup) {
-        if setup.bouncy {
-            self.groups.apply_restitution(&mut self.bodies);
-        }
+    pub(crate) fn apply_restitution(&mut self) {
+        self.groups.apply_restitution(&mut self.bodies);
     }
 
     /// Copies the impulses of the last substep back to the contacts, but of batches that were solved at once.

@@ -98,7 +98,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
             }
             world.each_tile_apart(|bench| {
                 if bench.setup.bouncy {
-                    bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution(b.setup));
+                    bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution());
                     bench.stage(Phase::Border, |b| b.work.border.add_bounces(&b.work.solver, &b.work.contacts));
                 }
                 bench.stage(Phase::Border, send_impulses);
@@ -235,8 +235,8 @@ fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
 fn finalize(bench: &mut Bench<'_>) {
     bench.stage(Phase::Finalize, |b| {
         let (solver, contacts) = (&mut b.work.solver, &mut b.work.contacts);
-        if b.setup.params.exchange == Exchange::Step {
-            solver.apply_restitution(b.setup);
+        if b.setup.bouncy && b.setup.params.exchange == Exchange::Step {
+            solver.apply_restitution();
         }
         if b.measures {
             b.tile.violation = solver.violation(contacts, b.setup);

@@ -28,9 +28,9 @@ impl Groups {
         for batch in &mut batches.all {
             let first = self.colors.len();
             let range = batch.contacts.clone();
-            let (mut place, end) = if batch.at_once { ([0; COLUMNS], &mut at_once) } else { (kept, &mut kept) };
-            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch, &mut place);
-            end.iter_mut().zip(place).for_each(|(end, place)| *end = place.max(*end));
+            let (first_group, end) = if batch.at_once { ([0; COLUMNS], &mut at_once) } else { (kept, &mut kept) };
+            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch, first_group);
+            end.iter_mut().zip(&batch.groups).for_each(|(end, groups)| *end = groups.end.max(*end));
             batch.colors = first..self.colors.len();
             // All that overflows counts as one color.
             most_colors = most_colors.max(batch.colors.len().min(COLORS + 1));
@@ -40,17 +40,16 @@ impl Groups {
         most_colors
     }
 
-    /// `place` is where its groups begin, and then where they end.
     fn lay_out_batch(
         &mut self,
         contacts: &[Contact],
         own: &[u32],
         colors: &[u8],
         batch: &mut Batch,
-        place: &mut Each<usize>,
+        first: Each<usize>,
     ) {
         batch.members = self.members.each_ref().map(Vec::len);
-        let (first, first_member) = (*place, batch.members);
+        let first_member = batch.members;
         let column_of = |contact: u32| column_of(&contacts[contact as usize]);
         let mut counts = [[0; COLUMNS]; COLORS + 1];
         for (&contact, &color) in own.iter().zip(colors) {
@@ -80,8 +79,7 @@ impl Groups {
         }
         for (column, members) in self.members.iter_mut().enumerate() {
             members.resize(first_member[column] + end[column], [NO_CONTACT; WIDE]);
-            place[column] = first[column] + end[column];
-            batch.groups[column] = first[column]..place[column];
+            batch.groups[column] = first[column]..first[column] + end[column];
         }
         for (&contact, &color) in own.iter().zip(colors) {
             let column = column_of(contact);

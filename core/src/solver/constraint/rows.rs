@@ -62,6 +62,9 @@ impl<V: Wide> Visitor for WriteRows<'_, V> {
     fn group<const N: usize>(&mut self, group: &mut Group<N>, members: &Members) {
         self.inputs.collect(members, self.source, self.local);
         write::<V, N>(group, &self.inputs);
+        if self.source.setup.bouncy {
+            group.pressed = [[0.0; WIDE]; N];
+        }
     }
 }
 
@@ -239,7 +242,6 @@ fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
         normal_impulse.store(&mut rows.normal_impulse);
         tangent_impulse.store(&mut rows.tangent_impulse);
     }
-    group.pressed.iter_mut().for_each(|pressed| zero.store(pressed));
 }
 
 impl Groups {
