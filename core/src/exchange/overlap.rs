@@ -71,11 +71,6 @@ impl Outline {
         (low.cmpge(region.min - halo) & high.cmple(region.max + halo)).all()
     }
 
-    /// Whether the boxes of two bodies overlap.
-    pub(crate) fn meets(&self, other: &Self) -> bool {
-        (self.place - other.place).abs().cmple((self.half + other.half).as_dvec2()).all()
-    }
-
     /// The corners of its box.
     pub(crate) fn corners(&self) -> (DVec2, DVec2) {
         let half = self.half.as_dvec2();
