@@ -1,6 +1,5 @@
 //! Contacts that outlive a step: their manifolds and impulses, and the cache that keeps them.
 
-use crate::model::id::GlobalId;
 use crate::model::math::{Rot, cross, max, right_perp};
 use crate::model::shape::MOST_PARTS;
 use bytemuck::{Pod, Zeroable};
@@ -281,61 +280,5 @@ impl ContactCache {
         self.contacts = order.iter().map(|&(_, i)| self.contacts[i as usize]).collect();
         self.keys.clear();
         self.keys.extend(order.iter().map(|&(key, _)| key));
-    }
-}
-
-/// Where a contact found by name comes from; where a pair has several entries, the greatest decides.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(crate) enum Authority {
-    /// This tile's own cache, of a contact that it solved for others: good for nothing else.
-    Overlap,
-    /// Another tile, which did not own the lower GlobalId.
-    Foreign,
-    /// This tile's own cache.
-    Own,
-    /// Another tile, which owned the lower GlobalId.
-    ForeignOwner,
-}
-
-/// A contact known by the names of its bodies, because one of them is a ghost, has left or has arrived.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stray {
-    pub(crate) pair: (GlobalId, GlobalId),
-    pub(crate) authority: Authority,
-    pub(crate) contact: Contact,
-}
-
-/// Contacts by the names of their bodies and of their pieces, sorted, one for each two pieces.
-#[derive(Clone, Default, Debug)]
-pub(crate) struct Strays(Vec<Stray>);
-
-impl Strays {
-    pub(crate) fn clear(&mut self) {
-        self.0.clear();
-    }
-
-    pub(crate) fn push(&mut self, stray: Stray) {
-        self.0.push(stray);
-    }
-
-    /// Sorts, and keeps the entry of the highest authority of each pair.
-    pub(crate) fn settle(&mut self) {
-        let key = |stray: &Stray| (stray.pair, stray.contact.pieces());
-        self.0.sort_unstable_by(|a, b| key(a).cmp(&key(b)).then(b.authority.cmp(&a.authority)));
-        self.0.dedup_by_key(|stray| key(stray));
-    }
-
-    /// What is remembered of a pair: of which one is owned, or neither. Of circles and boxes there is one contact at most.
-    pub(crate) fn find(&self, pair: (GlobalId, GlobalId), is_own: bool) -> Option<&Contact> {
-        let found = &self.0[self.0.binary_search_by_key(&pair, |stray| stray.pair).ok()?];
-        (!is_own || found.authority != Authority::Overlap).then_some(&found.contact)
-    }
-
-    /// All that is remembered of a pair.
-    pub(crate) fn find_all(&self, pair: (GlobalId, GlobalId), is_own: bool) -> impl Iterator<Item = &Contact> {
-        let first = self.0.partition_point(|stray| stray.pair < pair);
-        let of_pair = self.0[first..].iter().take_while(move |stray| stray.pair == pair);
-        let is_known = move |stray: &&Stray| !is_own || stray.authority != Authority::Overlap;
-        of_pair.filter(is_known).map(|stray| &stray.contact)
     }
 }

@@ -13,3 +13,4 @@ pub(crate) mod path;
 pub(crate) mod piece;
 pub(crate) mod shape;
 pub(crate) mod softness;
+pub(crate) mod strays;

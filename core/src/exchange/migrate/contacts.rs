@@ -3,7 +3,8 @@
 use super::MigrateWork;
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::ContactRecord;
-use crate::model::contact::{Authority, Slot, SlotKind, Stray};
+use crate::model::contact::{Slot, SlotKind};
+use crate::model::strays::{Authority, Stray};
 use crate::parallel::ahead::fetch;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;

@@ -139,7 +139,8 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     for (place, rim) in (0..).zip(&tile.rim.bodies) {
         let (position, goes_far) = (rim.body.position, setup.goes_far(rim.body.velocity));
         tile.counts.far |= goes_far;
-        let (owner, outline) = (partition.locate(position), Outline::of_rim(rim));
+        let owner = if tile.region.contains(position) { tile.id } else { partition.locate(position) };
+        let outline = Outline::of_rim(rim);
         let first_send = work.sends.len() as u32;
         for target in partition.reached(position, rim.half, setup.halo_width).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);

@@ -4,8 +4,9 @@ use super::{MigrateWork, place};
 use crate::exchange::mail::Mail;
 use crate::exchange::record::GhostRecord;
 use crate::model::body::Body;
-use crate::model::contact::{Authority, Slot, SlotKind, Stray};
+use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
+use crate::model::strays::{Authority, Stray};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
