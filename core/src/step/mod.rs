@@ -75,34 +75,32 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                 finalize(bench);
             });
         }
+        // Between two sync points each tile goes through all that there is to do, while it is in the cache.
         Exchange::Substep => {
+            let last = world.setup.params.integrations() - 1;
             world.each_tile_apart(|bench| {
                 collide(bench);
                 bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
                 prepare(bench);
+                make_substep(bench, 0);
             });
-            for substep in 0..world.setup.params.integrations() {
-                // After the last substep only a bounce still looks at a ghost's velocity.
-                let refreshed = substep + 1 < world.setup.params.integrations() || world.setup.bouncy;
+            for substep in 1..=last {
+                world.exchange(halo)?;
                 world.each_tile_apart(|bench| {
-                    solve(bench, substep..substep + 1);
-                    bench.stage(Phase::Border, |b| b.work.border.add_impulses(&b.work.solver, &b.work.contacts));
-                    if refreshed {
-                        bench.stage(Phase::Border, send_refresh);
-                    }
+                    bench.stage(Phase::Border, refresh);
+                    make_substep(bench, substep);
                 });
-                if refreshed {
-                    world.exchange(halo)?;
-                    world.each_tile_apart(|bench| bench.stage(Phase::Border, refresh));
-                }
             }
-            world.each_tile_apart(|bench| {
-                if bench.setup.bouncy {
+            // After the last substep only a bounce still looks at a ghost's velocity.
+            if world.setup.bouncy {
+                world.exchange(halo)?;
+                world.each_tile_apart(|bench| {
+                    bench.stage(Phase::Border, refresh);
                     bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution());
                     bench.stage(Phase::Border, |b| b.work.border.add_bounces(&b.work.solver, &b.work.contacts));
-                }
-                bench.stage(Phase::Border, send_impulses);
-            });
+                    bench.stage(Phase::Border, send_impulses);
+                });
+            }
             world.exchange(halo)?;
             world.each_tile_apart(|bench| {
                 bench.stage(Phase::Border, average);
@@ -217,6 +215,16 @@ fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
         }
     }
     bench.stage(Phase::Substeps, |b| b.work.solver.solve(substeps, b.setup, b.team));
+}
+
+/// One substep, and what others must hear of it before they go on: the state of their ghosts, or at the end of the last one, where
+/// nothing bounces, what the contacts at the border did.
+fn make_substep(bench: &mut Bench<'_>, substep: u32) {
+    solve(bench, substep..substep + 1);
+    bench.stage(Phase::Border, |b| b.work.border.add_impulses(&b.work.solver, &b.work.contacts));
+    let is_last = substep + 1 == bench.setup.params.integrations();
+    let tell = if is_last && !bench.setup.bouncy { send_impulses } else { send_refresh };
+    bench.stage(Phase::Border, tell);
 }
 
 /// A batch that nobody waits for, while it is in the cache.
