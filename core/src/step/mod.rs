@@ -14,7 +14,7 @@ use crate::state::facts::TileFacts;
 use crate::tiling::tile::Fault;
 use crate::world::World;
 use phase::Phase;
-use stage::{Bench, Work};
+use stage::{Bench, Detection};
 use std::ops::Range;
 
 /// What one step of one rank was like. Counts are of this rank's tiles.
@@ -170,15 +170,15 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
 /// Broad phase, narrow phase.
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
-        let (tile, counts) = (&b.tile, [b.tile.owned, b.tile.ghosts()]);
-        b.work.proxies.load(&tile.bodies, counts, &tile.rectangle, b.setup, b.team);
-        b.work.proxies.pair_ghosts(tile, b.setup);
+        let (tile, proxies, counts) = (&b.tile, &mut b.detection.proxies, [b.tile.owned, b.tile.ghosts()]);
+        proxies.load(&tile.bodies, counts, &tile.rectangle, b.setup, b.team);
+        proxies.pair_ghosts(tile, b.setup);
         if let Some(quadtree) = &mut b.tile.quadtree {
-            quadtree.flush(&b.work.proxies, &b.tile.bodies.id);
+            quadtree.flush(proxies, &b.tile.bodies.id);
         }
     });
     bench.stage(Phase::BroadPhase, |b| {
-        let Work { grid, proxies, pairs, .. } = &mut *b.work;
+        let Detection { grid, proxies, pairs, .. } = &mut *b.detection;
         pairs.clear();
         match &b.tile.quadtree {
             None => grid.find_pairs(proxies, b.team, pairs),
@@ -186,8 +186,8 @@ fn collide(bench: &mut Bench<'_>) {
         }
     });
     bench.stage(Phase::NarrowPhase, |b| {
-        let Work { narrow_phase, proxies, pairs, contacts, .. } = &mut *b.work;
-        narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, contacts);
+        let Detection { narrow_phase, proxies, pairs, .. } = &mut *b.detection;
+        narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, &mut b.work.contacts);
     });
 }
 

@@ -15,15 +15,20 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use std::time::Duration;
 
-/// Everything that is derived of a tile's state in a step. With one sync point a step, a tile is stepped in one go and a
-/// thread's tiles share one of these, so that little more than the bodies streams through memory; with several, every
-/// tile that owns bodies keeps its own between them.
+/// What finding a tile's contacts takes. A thread's tiles share one of these.
 #[derive(Default, Debug)]
-pub(crate) struct Work {
+pub(crate) struct Detection {
     pub(crate) proxies: Proxies,
     pub(crate) grid: Grid,
     pub(crate) pairs: Vec<Pair>,
     pub(crate) narrow_phase: NarrowPhase,
+}
+
+/// A tile's contacts, and all that is derived of them in a step. With one sync point a step, a tile is stepped in one go and a
+/// thread's tiles share one of these, so that little more than the bodies streams through memory; with several, every
+/// tile that owns bodies keeps its own between them.
+#[derive(Default, Debug)]
+pub(crate) struct Work {
     pub(crate) contacts: Contacts,
     pub(crate) solver: Solver,
     pub(crate) border: Border,
@@ -42,6 +47,7 @@ pub(crate) struct Hand {
     pub(crate) outgoing: Mailbag,
     /// Of its tiles, in a step that takes them.
     pub(crate) figures: Figures,
+    detection: Detection,
     /// For tiles that are stepped in one go.
     work: Work,
 }
@@ -49,6 +55,7 @@ pub(crate) struct Hand {
 /// One tile with all it needs for a stage.
 pub(crate) struct Bench<'a> {
     pub(crate) tile: &'a mut Tile,
+    pub(crate) detection: &'a mut Detection,
     pub(crate) work: &'a mut Work,
     pub(crate) migrate: &'a mut MigrateWork,
     pub(crate) outgoing: &'a mut Mailbag,
@@ -78,19 +85,19 @@ pub(crate) struct Shop<'a> {
 
 impl<'a> Bench<'a> {
     pub(crate) fn new(shop: Shop<'a>, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
-        let Hand { migrate, timings, outgoing, figures, work, .. } = hand;
+        let Hand { migrate, timings, outgoing, figures, detection, work, .. } = hand;
         let Shop { setup, step, team, measures, takes_figures } = shop;
         let figures = takes_figures.then_some(figures);
         let watch = Stopwatch::start();
-        Self { tile, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
+        Self { tile, detection, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
     }
 
     /// The same with work of the tile's own.
     pub(crate) fn with_work<'b>(&'b mut self, work: &'b mut Work) -> Bench<'b> {
         let &mut Self { mail, setup, step, team, measures, watch, .. } = self;
-        let Self { tile, migrate, outgoing, figures, timings, .. } = self;
+        let Self { tile, detection, migrate, outgoing, figures, timings, .. } = self;
         let figures = figures.as_deref_mut();
-        Bench { tile, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
+        Bench { tile, detection, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }
     }
 
     /// Runs one stage and books the time since the one before.
