@@ -20,47 +20,57 @@ use std::ops::Range;
 /// Candidates, and pairs, in a piece of work, at least.
 const GRAIN: usize = 2048;
 
-/// The contacts of a tile, in canonical order: ascending by their bodies' slots, whatever order the pairs came in.
+/// What a step knows of each of a tile's contacts beside what outlives it, in their canonical order: ascending by their bodies' slots,
+/// whatever order the pairs came in.
 #[derive(Default, Debug)]
 pub(crate) struct Contacts {
-    pub(crate) cache: ContactCache,
-    /// For each contact the separation of its points now.
+    /// The separation of its points now.
     pub(crate) separation: Vec<[f32; 2]>,
-    /// For each contact the indices of body A, the one with the lower GlobalId, and body B.
+    /// The indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
     /// The same of those that were found before.
     before: Vec<Pair>,
 }
 
 impl Contacts {
-    fn clear(&mut self) {
-        self.cache.clear();
-        self.separation.clear();
-        std::mem::swap(&mut self.bodies, &mut self.before);
-        self.bodies.clear();
-    }
-
     /// Whether they are between the same bodies as those that were found before, as what rests has them.
     pub(crate) fn are_between_the_same(&self) -> bool {
         self.bodies == self.before
+    }
+
+    /// Contacts of a tile, and border contacts, of which body A is owned: so that each is counted by one tile.
+    pub(crate) fn count(&self, tile: &Tile) -> (u64, u64) {
+        let (mut all, mut border) = (0, 0);
+        for (&[a, _], &key) in self.bodies.iter().zip(&tile.contacts.keys[..tile.contacts.own()]) {
+            let is_border = key.is_border();
+            let counts = !is_border || (a as usize) < tile.owned;
+            all += u64::from(counts);
+            border += u64::from(counts && is_border);
+        }
+        (all, border)
+    }
+}
+
+/// All that is found of contacts, a column for each.
+#[derive(Default, Debug)]
+struct Found {
+    cache: ContactCache,
+    /// As in [`Contacts`].
+    separation: Vec<[f32; 2]>,
+    bodies: Vec<Pair>,
+}
+
+impl Found {
+    fn clear(&mut self) {
+        self.cache.clear();
+        self.separation.clear();
+        self.bodies.clear();
     }
 
     fn append(&mut self, other: &mut Self) {
         self.cache.append(&mut other.cache);
         self.separation.append(&mut other.separation);
         self.bodies.append(&mut other.bodies);
-    }
-
-    /// Contacts, and border contacts, of which body A is owned: so that each is counted by one tile.
-    pub(crate) fn count(&self, owned: usize) -> (u64, u64) {
-        let (mut all, mut border) = (0, 0);
-        for (&[a, _], &key) in self.bodies.iter().zip(&self.cache.keys[..self.cache.own()]) {
-            let is_border = key.is_border();
-            let counts = !is_border || (a as usize) < owned;
-            all += u64::from(counts);
-            border += u64::from(counts && is_border);
-        }
-        (all, border)
     }
 }
 
@@ -74,15 +84,16 @@ pub(crate) struct NarrowPhase {
     /// For each body whether its contacts are known by name alone.
     by_name: Vec<bool>,
     boxes: PieceBoxes,
+    found: Found,
     /// What each of several threads finds.
-    parts: Vec<Contacts>,
+    parts: Vec<Found>,
 }
 
 impl NarrowPhase {
-    /// Finds the contacts of a tile among candidate pairs.
+    /// Finds the contacts of a tile among candidate pairs: from here on it remembers these.
     pub(crate) fn find(
         &mut self,
-        tile: &Tile,
+        tile: &mut Tile,
         proxies: &Proxies,
         candidates: &[Pair],
         setup: &Setup,
@@ -92,20 +103,32 @@ impl NarrowPhase {
         self.cull(tile, proxies, candidates, setup, team);
         self.sort(proxies.pairing);
         self.mark_newcomers(tile);
-        contacts.clear();
         self.boxes.place(tile, setup);
-        let (sorted, by_name, boxes) = (&self.sorted[..], &self.by_name[..], &self.boxes);
+        // What outlives the step is found where it was for the tile before, in the cache.
+        std::mem::swap(&mut contacts.bodies, &mut contacts.before);
+        std::mem::swap(&mut contacts.bodies, &mut self.found.bodies);
+        std::mem::swap(&mut contacts.separation, &mut self.found.separation);
+        self.find_among(tile, setup, team);
+        std::mem::swap(&mut contacts.bodies, &mut self.found.bodies);
+        std::mem::swap(&mut contacts.separation, &mut self.found.separation);
+        tile.contacts.copy_from(&self.found.cache);
+    }
+
+    /// Finds the contacts among the sorted pairs.
+    fn find_among(&mut self, tile: &Tile, setup: &Setup, team: Team) {
+        let (sorted, by_name, boxes, found) = (&self.sorted[..], &self.by_name[..], &self.boxes, &mut self.found);
+        found.clear();
         let pieces = team.pieces(sorted.len(), GRAIN);
         if pieces == 1 {
-            return setup.lanes.run((FindAmong { sorted, by_name, boxes, tile, setup }, contacts));
+            return setup.lanes.run((FindAmong { sorted, by_name, boxes, tile, setup }, found));
         }
-        self.parts.resize_with(pieces, Contacts::default);
+        self.parts.resize_with(pieces, Found::default);
         let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
-        team.for_each(parts, |(range, part): (Range<usize>, &mut Contacts)| {
+        team.for_each(parts, |(range, part): (Range<usize>, &mut Found)| {
             let among = FindAmong { sorted: &sorted[range], by_name, boxes, tile, setup };
             setup.lanes.run((among, part));
         });
-        self.parts.iter_mut().for_each(|part| contacts.append(part));
+        self.parts.iter_mut().for_each(|part| found.append(part));
     }
 
     /// Keeps the candidates that are pairs, and counts them by their lower index.
@@ -241,12 +264,12 @@ enum Outcome {
     Several,
 }
 
-impl Kernel for (FindAmong<'_>, &mut Contacts) {
+impl Kernel for (FindAmong<'_>, &mut Found) {
     type Output = ();
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let (among, contacts) = self;
+        let (among, found) = self;
         let FindAmong { sorted, by_name, tile, setup, .. } = among;
         let mut names = Names::new(tile, by_name, sorted);
         let nobody = Named { key: PairKey::default(), bodies: [0, 0], known: None, old: 0 };
@@ -265,10 +288,10 @@ impl Kernel for (FindAmong<'_>, &mut Contacts) {
             block.keep_known(&mut lists, tile, setup);
             setup.lanes.run(Find::<BoxOutlook>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
             if lists.get(OF_PIECES).is_empty() {
-                block.keep(pairs.len(), contacts);
+                block.keep(pairs.len(), found);
             } else {
                 lists.get(OF_PIECES).iter().for_each(|&place| block.outcome[usize::from(place)] = Outcome::Several);
-                block.find_several(pairs.len(), &among, contacts);
+                block.find_several(pairs.len(), &among, found);
             }
         }
     }
@@ -301,8 +324,8 @@ impl<O: Outlook> Kernel for Find<'_, '_, O> {
 impl Block<'_> {
     /// Appends the contacts of so many pairs. Every one is written down, and counted if there is one: a branch would be a coin toss.
     #[inline(always)]
-    fn keep(&self, pairs: usize, contacts: &mut Contacts) {
-        let Contacts { cache: ContactCache { keys, contacts }, separation, bodies, .. } = contacts;
+    fn keep(&self, pairs: usize, found: &mut Found) {
+        let Found { cache: ContactCache { keys, contacts }, separation, bodies } = found;
         let mut kept = keys.len();
         let most = kept + pairs;
         keys.resize(most, PairKey::default());
@@ -327,9 +350,9 @@ impl Block<'_> {
 
     /// As [`keep`](Self::keep), and finds the contacts of pairs of which one body is made of pieces.
     #[inline(never)]
-    fn find_several(&self, pairs: usize, among: &FindAmong<'_>, contacts: &mut Contacts) {
+    fn find_several(&self, pairs: usize, among: &FindAmong<'_>, found: &mut Found) {
         let &FindAmong { by_name, boxes, tile, setup, .. } = among;
-        let Contacts { cache, separation, bodies, .. } = contacts;
+        let Found { cache, separation, bodies } = found;
         let mut several = Vec::new();
         for (named, i) in self.named[..pairs].iter().zip(0..) {
             let &Named { key, bodies: pair, known, old } = named;

@@ -254,7 +254,7 @@ impl SolverBodies {
                 continue;
             }
             let [first, _] = contacts.bodies[contact as usize];
-            let normal = contacts.cache.contacts[contact as usize].normal;
+            let normal = tile.contacts.contacts[contact as usize].normal;
             let outward = if first == body { normal } else { -normal };
             let i = body as usize;
             let runs = right_perp(outward) * setup.kind(bodies.kind[i]).material.surface_speed;

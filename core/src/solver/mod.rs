@@ -32,6 +32,7 @@ pub(crate) use write_back::write_back;
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::islands::{IslandSizes, Islands};
+use crate::model::contact::ContactCache;
 use crate::model::params::{Exchange, Parallel};
 use crate::parallel::crew::{Crew, Member, Needed};
 use crate::parallel::team::Team;
@@ -145,12 +146,13 @@ impl Solver {
     }
 
     /// Colors the contacts and gives each its place, as long as they do not have both. Returns how many colors there are.
-    pub(crate) fn color(&mut self, contacts: &Contacts, team: Team) -> u64 {
+    pub(crate) fn color(&mut self, tile: &Tile, contacts: &Contacts, team: Team) -> u64 {
         if self.colors == 0 {
             self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
         }
-        if self.colors == 0 || !self.groups.fit(&contacts.cache.contacts) {
-            self.colors = self.groups.lay_out(&contacts.cache.contacts, &mut self.batches, &self.coloring) as u64;
+        let known = &tile.contacts.contacts;
+        if self.colors == 0 || !self.groups.fit(known) {
+            self.colors = self.groups.lay_out(known, &mut self.batches, &self.coloring) as u64;
         }
         self.colors
     }
@@ -197,8 +199,8 @@ impl Solver {
     }
 
     /// Copies the impulses of the last substep of such a batch back to its contacts.
-    pub(crate) fn store_impulses_of(&self, batch: usize, contacts: &mut Contacts) {
-        self.groups.store_impulses(&self.batches.all[batch], &mut contacts.cache.contacts);
+    pub(crate) fn store_impulses_of(&self, batch: usize, contacts: &mut ContactCache) {
+        self.groups.store_impulses(&self.batches.all[batch], &mut contacts.contacts);
     }
 
     /// Makes some substeps of all batches that keep their rows. Those away from borders have no word to wait for, and make all of them
@@ -242,9 +244,9 @@ impl Solver {
     }
 
     /// Copies the impulses of the last substep back to the contacts, but of batches that were solved at once.
-    pub(crate) fn store_impulses(&self, contacts: &mut Contacts) {
+    pub(crate) fn store_impulses(&self, contacts: &mut ContactCache) {
         let batches = self.batches.all.iter().filter(|batch| !batch.at_once);
-        batches.for_each(|batch| self.groups.store_impulses(batch, &mut contacts.cache.contacts));
+        batches.for_each(|batch| self.groups.store_impulses(batch, &mut contacts.contacts));
     }
 
     /// Brings a contact's separations up to date after its bodies were placed anew.
@@ -258,9 +260,9 @@ impl Solver {
     }
 
     /// How fast, in m/s, the surfaces of each solved point still come nearer than they may.
-    pub(crate) fn violation(&self, contacts: &Contacts, setup: &Setup) -> Violation {
+    pub(crate) fn violation(&self, contacts: &ContactCache, setup: &Setup) -> Violation {
         let mut violation = Violation::default();
-        let own = &contacts.cache.contacts[..contacts.cache.own()];
+        let own = &contacts.contacts[..contacts.own()];
         for (i, contact) in (0..).zip(own).filter(|&(i, _)| self.groups.is_solved(i)) {
             for point in 0..contact.point_count() {
                 let speed = f64::from(self.groups.violation(i, point, &self.bodies, setup.h));

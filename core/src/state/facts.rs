@@ -61,7 +61,7 @@ impl TileFacts {
         }
         let violation = tile.violation;
         (facts.solved_points, facts.violation, facts.max_violation) = (violation.points, violation.sum, violation.max);
-        let found = Overlaps::among(contacts, 0..contacts.cache.own(), tile.owned, setup);
+        let found = Overlaps::among(tile, contacts, 0..tile.contacts.own(), setup);
         (facts.contacts, facts.border_contacts) = (found.contacts, found.border_contacts);
         (facts.overlaps, facts.penetration, facts.max_penetration) = (found.points, found.depth, found.most);
         facts

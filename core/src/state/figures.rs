@@ -103,8 +103,8 @@ impl Figures {
 
     /// Adds the contacts that a tile found.
     pub(crate) fn add_contacts(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, team: Team) {
-        let count = |range| Overlaps::among(contacts, range, tile.owned, setup);
-        in_pieces(contacts.cache.own(), team, count, |found: Overlaps| {
+        let count = |range| Overlaps::among(tile, contacts, range, setup);
+        in_pieces(tile.contacts.own(), team, count, |found: Overlaps| {
             self.contacts += found.contacts;
             self.border_contacts += found.border_contacts;
             self.overlaps += found.points;
@@ -137,16 +137,15 @@ pub(super) struct Overlaps {
 }
 
 impl Overlaps {
-    /// Among some contacts of a tile that owns so many bodies.
-    pub(super) fn among(contacts: &Contacts, range: Range<usize>, owned: usize, setup: &Setup) -> Self {
+    /// Among some contacts of a tile.
+    pub(super) fn among(tile: &Tile, contacts: &Contacts, range: Range<usize>, setup: &Setup) -> Self {
         let mut all = Self::default();
-        let cache = &contacts.cache;
-        let (keys, known) = (&cache.keys[range.clone()], &cache.contacts[range.clone()]);
+        let (keys, known) = (&tile.contacts.keys[range.clone()], &tile.contacts.contacts[range.clone()]);
         let (separations, bodies) = (&contacts.separation[range.clone()], &contacts.bodies[range]);
         for (((key, contact), separation), [a, _]) in keys.iter().zip(known).zip(separations).zip(bodies) {
             // Both owners of a border contact see it; the one with body A counts it.
             let border = key.is_border();
-            if border && *a as usize >= owned {
+            if border && *a as usize >= tile.owned {
                 continue;
             }
             let separation = &separation[..contact.point_count()];

@@ -97,7 +97,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                 world.each_tile_apart(|bench| {
                     bench.stage(Phase::Border, refresh);
                     bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution());
-                    bench.stage(Phase::Border, |b| b.work.border.add_bounces(&b.work.solver, &b.work.contacts));
+                    bench.stage(Phase::Border, |b| b.work.border.add_bounces(b.tile, &b.work.solver));
                     bench.stage(Phase::Border, send_impulses);
                 });
             }
@@ -198,11 +198,11 @@ fn prepare(bench: &mut Bench<'_>) {
         let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
         let islands = solver.arrange(b.tile, contacts, sent, b.measures, b.setup, b.team);
         solver.load(b.tile, contacts, b.setup);
-        let counts = &mut b.tile.counts;
+        let (found, counts) = (contacts.count(b.tile), &mut b.tile.counts);
         (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
-        (counts.contacts, counts.border_contacts) = contacts.count(b.tile.owned);
+        (counts.contacts, counts.border_contacts) = found;
     });
-    bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(&b.work.contacts, b.team));
+    bench.stage(Phase::Coloring, |b| b.tile.counts.colors = b.work.solver.color(b.tile, &b.work.contacts, b.team));
     bench.stage(Phase::Prepare, |b| b.work.solver.prepare(b.tile, &b.work.contacts, b.setup, b.team));
 }
 
@@ -221,7 +221,7 @@ fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
 /// nothing bounces, what the contacts at the border did.
 fn make_substep(bench: &mut Bench<'_>, substep: u32) {
     solve(bench, substep..substep + 1);
-    bench.stage(Phase::Border, |b| b.work.border.add_impulses(&b.work.solver, &b.work.contacts));
+    bench.stage(Phase::Border, |b| b.work.border.add_impulses(b.tile, &b.work.solver));
     let is_last = substep + 1 == bench.setup.params.integrations();
     let tell = if is_last && !bench.setup.bouncy { send_impulses } else { send_refresh };
     bench.stage(Phase::Border, tell);
@@ -235,37 +235,36 @@ fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
         if b.setup.bouncy {
             b.work.solver.bounce_at_once(batch);
         }
-        b.work.solver.store_impulses_of(batch, &mut b.work.contacts);
+        b.work.solver.store_impulses_of(batch, &mut b.tile.contacts);
     });
 }
 
 /// Restitution where it has not been, and everything written back.
 fn finalize(bench: &mut Bench<'_>) {
     bench.stage(Phase::Finalize, |b| {
-        let (solver, contacts) = (&mut b.work.solver, &mut b.work.contacts);
+        let solver = &mut b.work.solver;
         if b.setup.bouncy && b.setup.params.exchange == Exchange::Step {
             solver.apply_restitution();
         }
         if b.measures {
-            b.tile.violation = solver.violation(contacts, b.setup);
+            b.tile.violation = solver.violation(&b.tile.contacts, b.setup);
         }
-        solver.store_impulses(contacts);
-        b.tile.contacts.copy_from(&contacts.cache);
-        far::forget(b.tile);
+        solver.store_impulses(&mut b.tile.contacts);
         let ways = far::ways(b.tile, &solver.bodies, b.setup);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
         far::hold(b.tile, &ways, b.setup);
         b.tile.count_rest(b.setup);
         if let Some(figures) = &mut b.figures {
             figures.add_bodies(b.tile, b.setup, b.team);
-            figures.add_contacts(b.tile, contacts, b.setup, b.team);
+            figures.add_contacts(b.tile, &b.work.contacts, b.setup, b.team);
         }
+        far::forget(b.tile);
     });
 }
 
 fn send_refresh(bench: &mut Bench<'_>) {
     let work = &*bench.work;
-    work.border.send_refresh(bench.tile, &work.solver, &work.contacts, bench.outgoing);
+    work.border.send_refresh(bench.tile, &work.solver, bench.outgoing);
 }
 
 fn refresh(bench: &mut Bench<'_>) {
@@ -275,12 +274,12 @@ fn refresh(bench: &mut Bench<'_>) {
 
 fn send_impulses(bench: &mut Bench<'_>) {
     let work = &*bench.work;
-    work.border.send_impulses(bench.tile, &work.solver, &work.contacts, bench.outgoing);
+    work.border.send_impulses(bench.tile, &work.solver, bench.outgoing);
 }
 
 fn average(bench: &mut Bench<'_>) {
     let work = &mut *bench.work;
-    work.border.average(bench.tile, &mut work.solver, &work.contacts, bench.mail);
+    work.border.average(bench.tile, &mut work.solver, bench.mail);
 }
 
 /// Completes the report of a step, and the step.

@@ -10,7 +10,7 @@ use crate::collide::narrow_phase::Contacts;
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
-use crate::model::contact::{Contact, ContactPoint, PairKey, Slot, SlotKind};
+use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::solver::Solver;
 use crate::tiling::blueprint::Setup;
@@ -81,10 +81,10 @@ impl Border {
         self.feeds.clear();
         self.ghosts.clear();
         self.contacts.clear();
-        let own = contacts.cache.own();
-        self.scratch = own as u32..contacts.cache.len() as u32;
+        let own = tile.contacts.own();
+        self.scratch = own as u32..tile.contacts.len() as u32;
         self.mark_outer(tile, setup);
-        for (i, &key) in (0..).zip(&contacts.cache.keys[..own]) {
+        for (i, &key) in (0..).zip(&tile.contacts.keys[..own]) {
             let [a, b] = contacts.bodies[i as usize];
             if !(self.marked[a as usize] | self.marked[b as usize]) {
                 continue;
@@ -171,7 +171,7 @@ impl Border {
         }
         self.marked.fill(false);
         self.sent.iter().for_each(|&body| self.marked[body as usize] = true);
-        for (contact, &key) in (0..self.scratch.start).zip(&contacts.cache.keys) {
+        for (contact, &key) in (0..self.scratch.start).zip(&tile.contacts.keys) {
             let [a, b] = contacts.bodies[contact as usize];
             if !(self.marked[a as usize] | self.marked[b as usize]) {
                 continue;
@@ -196,10 +196,10 @@ impl Border {
     }
 
     /// Tells every peer the state of its ghosts.
-    pub(crate) fn send_refresh(&self, tile: &Tile, solver: &Solver, contacts: &Contacts, bag: &mut Mailbag) {
+    pub(crate) fn send_refresh(&self, tile: &Tile, solver: &Solver, bag: &mut Mailbag) {
         let mut unseen = vec![Unseen::default(); self.sends.len()];
         for feed in &self.feeds {
-            let (linear, on_a, on_b) = solver.current(contacts, feed.contact).impulse();
+            let (linear, on_a, on_b) = solver.current(&tile.contacts, feed.contact).impulse();
             let unseen = &mut unseen[feed.send as usize];
             if feed.upon_a {
                 unseen.add(-linear, on_a);
@@ -244,9 +244,9 @@ impl Border {
     }
 
     /// Adds what border contacts did in a substep to what they did in the step.
-    pub(crate) fn add_impulses(&mut self, solver: &Solver, contacts: &Contacts) {
+    pub(crate) fn add_impulses(&mut self, tile: &Tile, solver: &Solver) {
         for (border, totals) in self.contacts.iter().zip(&mut self.totals) {
-            let count = contacts.cache.contacts[border.contact as usize].point_count();
+            let count = tile.contacts.contacts[border.contact as usize].point_count();
             for (k, total) in totals[..count].iter_mut().enumerate() {
                 let now = solver.groups.impulses(border.contact, k);
                 *total = [total[0] + now[0], total[1] + now[1]];
@@ -255,10 +255,10 @@ impl Border {
     }
 
     /// Takes in what border contacts that bounced did then.
-    pub(crate) fn add_bounces(&mut self, solver: &Solver, contacts: &Contacts) {
+    pub(crate) fn add_bounces(&mut self, tile: &Tile, solver: &Solver) {
         let both = self.contacts.iter().zip(&mut self.totals);
         for (border, totals) in both.filter(|(border, _)| solver.groups.may_bounce(border.contact)) {
-            let count = contacts.cache.contacts[border.contact as usize].point_count();
+            let count = tile.contacts.contacts[border.contact as usize].point_count();
             for (k, total) in totals[..count].iter_mut().enumerate() {
                 total[0] = solver.groups.pressed(border.contact, k);
             }
@@ -266,11 +266,11 @@ impl Border {
     }
 
     /// Tells every peer what this tile's copies of their common contacts did in the whole step.
-    pub(crate) fn send_impulses(&self, tile: &Tile, solver: &Solver, contacts: &Contacts, bag: &mut Mailbag) {
+    pub(crate) fn send_impulses(&self, tile: &Tile, solver: &Solver, bag: &mut Mailbag) {
         for &i in &self.contact_order {
             let border = &self.contacts[i as usize];
             let (low, high) = border.pair;
-            let points = solver.border_points(contacts, border.contact, &self.totals[i as usize]);
+            let points = solver.border_points(&tile.contacts, border.contact, &self.totals[i as usize]);
             bag.address(tile.id, border.peer);
             bag.impulses.push(BorderImpulse { low, high, points });
         }
@@ -278,7 +278,7 @@ impl Border {
 
     /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far. Points that only one side
     /// has are left alone.
-    pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, contacts: &Contacts, mail: Mail<'_>) {
+    pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>) {
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
             // One for each two pieces of the pair that touch; features tell them apart.
@@ -289,7 +289,7 @@ impl Border {
             }
             for (border, totals) in of_pair.zip(&self.totals[first..]) {
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                    solver.move_together(contacts, border, totals, theirs);
+                    solver.move_together(&tile.contacts, border, totals, theirs);
                 }
             }
         }
@@ -312,8 +312,8 @@ fn owner_of(tile: &Tile, slot: Slot) -> Option<TileId> {
 
 impl Solver {
     /// A contact with the impulses it has at this moment.
-    fn current(&self, contacts: &Contacts, contact: u32) -> Contact {
-        let mut current = contacts.cache.contacts[contact as usize];
+    fn current(&self, contacts: &ContactCache, contact: u32) -> Contact {
+        let mut current = contacts.contacts[contact as usize];
         let count = current.point_count();
         for (k, point) in current.points[..count].iter_mut().enumerate() {
             [point.normal_impulse, point.tangent_impulse] = self.groups.impulses(contact, k);
@@ -321,9 +321,9 @@ impl Solver {
         current
     }
 
-    fn border_points(&self, contacts: &Contacts, contact: u32, totals: &[[f32; 2]; 2]) -> [BorderPoint; 2] {
-        let points = &contacts.cache.contacts[contact as usize].points;
-        let count = contacts.cache.contacts[contact as usize].point_count();
+    fn border_points(&self, contacts: &ContactCache, contact: u32, totals: &[[f32; 2]; 2]) -> [BorderPoint; 2] {
+        let known = &contacts.contacts[contact as usize];
+        let (points, count) = (&known.points, known.point_count());
         std::array::from_fn(|k| {
             let [normal, tangent] = if k < count { self.groups.impulses(contact, k) } else { [0.0; 2] };
             let ([total_normal, total_tangent], feature) = (totals[k], points[k].feature);
@@ -333,7 +333,7 @@ impl Solver {
 
     fn move_together(
         &mut self,
-        contacts: &Contacts,
+        contacts: &ContactCache,
         border: &BorderContact,
         totals: &[[f32; 2]; 2],
         theirs: &BorderPoint,
@@ -342,7 +342,7 @@ impl Solver {
         // Each owner may know others with whom its body bounces, or whom it meets first. The lesser impulse is the one that is sure:
         // it gives nobody more energy than there was.
         let lesser = far || self.groups.may_bounce(contact);
-        let points = contacts.cache.contacts[contact as usize].points();
+        let points = contacts.contacts[contact as usize].points();
         if let Some(k) = points.iter().position(|point| point.feature == theirs.feature) {
             let ([normal, tangent], now) = (totals[k], self.groups.impulses(contact, k));
             // Both owners must come to the same: of equal ones that of body A's.

@@ -15,7 +15,7 @@ impl Groups {
     pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
         self.bounces.clear();
         self.bounces_at_once.clear();
-        for (i, contact) in source.contacts.cache.contacts.iter().enumerate() {
+        for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let sides = source.contacts.bodies[i];
             let [a, b] =
                 sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);

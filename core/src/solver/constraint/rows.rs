@@ -164,7 +164,7 @@ impl Inputs {
         let carried = bodies.have_carriers();
         for (lane, &contact) in members.iter().enumerate().filter(|&(_, &contact)| contact != NO_CONTACT) {
             let contact = contact as usize;
-            let quads: &[Quad; QUADS] = bytemuck::cast_ref(&contacts.cache.contacts[contact]);
+            let quads: &[Quad; QUADS] = bytemuck::cast_ref(&tile.contacts.contacts[contact]);
             for (lanes, &quad) in self.contact.iter_mut().zip(quads) {
                 lanes[lane] = quad;
             }
