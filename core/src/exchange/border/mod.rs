@@ -8,15 +8,16 @@
 
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::mail::{Mail, Mailbag};
-use crate::exchange::overlap::Outline;
 use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
 use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
 use crate::solver::Solver;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::{Fault, Tile};
+use near::Near;
 use std::ops::Range;
 
+mod near;
 #[cfg(test)]
 mod tests;
 
@@ -43,8 +44,9 @@ pub(crate) struct Border {
     contact_order: Vec<u32>,
     /// For every owned body the range of its `sends`; all empty between steps.
     sends_of: Vec<(u32, u32)>,
-    /// Of all bodies those that a pass over the contacts asks for: most contacts have none, and go by quickly.
-    marked: Vec<bool>,
+    near: Near,
+    /// The contacts of ghosts, and of bodies that are near to other tiles.
+    outer: Vec<u32>,
 }
 
 /// An owned body that another tile has as a ghost in a contact that it solves.
@@ -83,13 +85,16 @@ impl Border {
         self.contacts.clear();
         let own = tile.contacts.own();
         self.scratch = own as u32..tile.contacts.len() as u32;
-        self.mark_outer(tile, setup);
-        for (i, &key) in (0..).zip(&tile.contacts.keys[..own]) {
-            let [a, b] = contacts.bodies[i as usize];
-            if !(self.marked[a as usize] | self.marked[b as usize]) {
-                continue;
+        self.near.find(tile, setup);
+        self.outer.clear();
+        for (i, &[a, b]) in (0..).zip(&contacts.bodies[..own]) {
+            if self.near.knows(a) | self.near.knows(b) {
+                self.outer.push(i);
             }
-            self.send_near(tile, key, setup);
+        }
+        for &i in &self.outer {
+            let key = tile.contacts.keys[i as usize];
+            send_near(tile, key, &self.near, &mut self.sends);
             if let SlotKind::Ghost(ghost) = key.high().kind() {
                 let (low, peer) = (tile.index(key.low()) as u32, tile.ghost_owners[ghost]);
                 let pair = tile.pair_of(key);
@@ -120,7 +125,7 @@ impl Border {
         contact_order.clear();
         contact_order.extend(0..by_pair.len() as u32);
         contact_order.sort_unstable_by_key(|&i| (by_pair[i as usize].peer, i));
-        self.find_feeds(tile, contacts, setup);
+        self.find_feeds(tile, contacts);
     }
 
     /// The owned bodies that other tiles hear of.
@@ -128,35 +133,7 @@ impl Border {
         &self.sent
     }
 
-    /// Marks ghosts, and the owned bodies that others may solve.
-    fn mark_outer(&mut self, tile: &Tile, setup: &Setup) {
-        self.marked.clear();
-        if setup.overlap.is_some() {
-            let is_near_any = |i| Outline::of(tile, i, setup).near(setup).any(|peer| peer != tile.id);
-            let owned = tile.bodies.position[..tile.owned].iter().enumerate();
-            self.marked.extend(owned.map(|(i, &position)| !tile.interior.contains(position) && is_near_any(i)));
-        }
-        self.marked.resize(tile.owned, false);
-        self.marked.resize(tile.owned + tile.ghosts(), true);
-        self.marked.resize(tile.bodies.position.len(), false);
-    }
-
-    /// Notes who must hear of the owned bodies of a contact as they solve it as well.
-    fn send_near(&mut self, tile: &Tile, key: PairKey, setup: &Setup) {
-        for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
-            let SlotKind::Owned(index) = body.kind() else { continue };
-            if setup.overlap.is_none() || !self.marked[index] {
-                continue;
-            }
-            for peer in Outline::of(tile, index, setup).near(setup).filter(|&peer| peer != tile.id) {
-                if solves(peer, tile, partner, setup) {
-                    self.sends.push(Outgoing { body: index as u32, peer });
-                }
-            }
-        }
-    }
-
-    fn find_feeds(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
+    fn find_feeds(&mut self, tile: &Tile, contacts: &Contacts) {
         if self.sends.is_empty() {
             return;
         }
@@ -169,13 +146,8 @@ impl Border {
             }
             range.1 = i + 1;
         }
-        self.marked.fill(false);
-        self.sent.iter().for_each(|&body| self.marked[body as usize] = true);
-        for (contact, &key) in (0..self.scratch.start).zip(&tile.contacts.keys) {
-            let [a, b] = contacts.bodies[contact as usize];
-            if !(self.marked[a as usize] | self.marked[b as usize]) {
-                continue;
-            }
+        for &contact in &self.outer {
+            let key = tile.contacts.keys[contact as usize];
             for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
                 let SlotKind::Owned(body) = body.kind() else { continue };
                 let (first, end) = self.sends_of[body];
@@ -183,11 +155,11 @@ impl Border {
                     continue;
                 }
                 let owner = owner_of(tile, partner);
-                let outline = Outline::of(tile, body, setup);
+                let near = self.near.of(body);
                 let upon_a = contacts.bodies[contact as usize][0] == body as u32;
                 for send in first..end {
                     let peer = self.sends[send as usize].peer;
-                    if owner != Some(peer) && !(outline.is_near(peer, setup) && solves(peer, tile, partner, setup)) {
+                    if owner != Some(peer) && !(near.contains(&peer) && self.near.solves(peer, tile, partner)) {
                         self.feeds.push(Feed { send, contact, upon_a });
                     }
                 }
@@ -296,9 +268,13 @@ impl Border {
     }
 }
 
-/// Whether a tile that a body is near solves its contact with this partner though it owns neither.
-fn solves(peer: TileId, tile: &Tile, partner: Slot, setup: &Setup) -> bool {
-    matches!(partner.kind(), SlotKind::Static(_)) || Outline::of(tile, tile.index(partner), setup).is_near(peer, setup)
+/// Notes who must hear of the owned bodies of a contact as they solve it as well.
+fn send_near(tile: &Tile, key: PairKey, near: &Near, sends: &mut Vec<Outgoing>) {
+    for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
+        let SlotKind::Owned(index) = body.kind() else { continue };
+        let peers = near.of(index).iter().filter(|&&peer| near.solves(peer, tile, partner));
+        sends.extend(peers.map(|&peer| Outgoing { body: index as u32, peer }));
+    }
 }
 
 /// The tile that owns a body; none owns a static.
