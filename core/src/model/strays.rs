@@ -71,14 +71,14 @@ impl Strays {
         let pieces = self.all[place].contact.pieces();
         let (mut before, mut at) = (None, self.table[slot]);
         while let Some(other) = place_of(at) {
-            let known = self.all[other];
-            if known.contact.pieces() == pieces {
-                if known.authority < self.all[place].authority {
+            let (known, its_pieces) = (self.all[other].authority, self.all[other].contact.pieces());
+            if its_pieces == pieces {
+                if known < self.all[place].authority {
                     self.all[other] = self.all[place];
                 }
                 return;
             }
-            if known.contact.pieces() > pieces {
+            if its_pieces > pieces {
                 break;
             }
             (before, at) = (Some(other), self.next[other]);

@@ -45,7 +45,8 @@ pub(crate) struct Tile {
     pub(crate) statics: Vec<u32>,
     /// Those from the next step on, where the tile's borders have moved since the last.
     pub(crate) next_statics: Option<Vec<u32>>,
-    /// What was solved last. From the first sync point on those of newcomers and ghosts mean nothing.
+    /// What was solved last, and from the narrow phase on what is to be solved. Between the first sync point and that those of newcomers
+    /// and ghosts mean nothing.
     pub(crate) contacts: ContactCache,
     /// The other remembered contacts, filled in the first sync point.
     pub(crate) strays: Strays,

@@ -1,5 +1,10 @@
 //! Narrow phase: from pairs to contacts, in canonical order, each with the impulses it had.
 
+mod contacts;
+mod names;
+
+pub(crate) use contacts::Contacts;
+
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::Cull;
 use crate::collide::piece_boxes::PieceBoxes;
@@ -7,72 +12,19 @@ use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch, touch_pieces};
 use crate::collide::wide_boxes::BoxOutlook;
 use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
-use crate::model::contact::{Contact, ContactCache, PairKey, Slot};
-use crate::parallel::ahead::fetch;
+use crate::model::contact::{Contact, ContactCache, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::Zeroable;
+use contacts::Found;
+use names::{Named, Names};
 use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Candidates, and pairs, in a piece of work, at least.
 const GRAIN: usize = 2048;
-
-/// What a step knows of each of a tile's contacts beside what outlives it, in their canonical order: ascending by their bodies' slots,
-/// whatever order the pairs came in.
-#[derive(Default, Debug)]
-pub(crate) struct Contacts {
-    /// The separation of its points now.
-    pub(crate) separation: Vec<[f32; 2]>,
-    /// The indices of body A, the one with the lower GlobalId, and body B.
-    pub(crate) bodies: Vec<Pair>,
-    /// The same of those that were found before.
-    before: Vec<Pair>,
-}
-
-impl Contacts {
-    /// Whether they are between the same bodies as those that were found before, as what rests has them.
-    pub(crate) fn are_between_the_same(&self) -> bool {
-        self.bodies == self.before
-    }
-
-    /// Contacts of a tile, and border contacts, of which body A is owned: so that each is counted by one tile.
-    pub(crate) fn count(&self, tile: &Tile) -> (u64, u64) {
-        let (mut all, mut border) = (0, 0);
-        for (&[a, _], &key) in self.bodies.iter().zip(&tile.contacts.keys[..tile.contacts.own()]) {
-            let is_border = key.is_border();
-            let counts = !is_border || (a as usize) < tile.owned;
-            all += u64::from(counts);
-            border += u64::from(counts && is_border);
-        }
-        (all, border)
-    }
-}
-
-/// All that is found of contacts, a column for each.
-#[derive(Default, Debug)]
-struct Found {
-    cache: ContactCache,
-    /// As in [`Contacts`].
-    separation: Vec<[f32; 2]>,
-    bodies: Vec<Pair>,
-}
-
-impl Found {
-    fn clear(&mut self) {
-        self.cache.clear();
-        self.separation.clear();
-        self.bodies.clear();
-    }
-
-    fn append(&mut self, other: &mut Self) {
-        self.cache.append(&mut other.cache);
-        self.separation.append(&mut other.separation);
-        self.bodies.append(&mut other.bodies);
-    }
-}
 
 /// Buffers of the narrow phase, shared by all tiles of a thread.
 #[derive(Default, Debug)]
@@ -186,17 +138,6 @@ struct FindAmong<'a> {
     boxes: &'a PieceBoxes,
     tile: &'a Tile,
     setup: &'a Setup,
-}
-
-/// A pair as its contact names it.
-#[derive(Clone, Copy)]
-struct Named<'a> {
-    key: PairKey,
-    /// Bodies A and B.
-    bodies: Pair,
-    known: Option<&'a Contact>,
-    /// The place of the first of its contacts of the last step, if it has any but by name.
-    old: u32,
 }
 
 /// So many pairs are sorted by kinds at a time.
@@ -423,60 +364,3 @@ impl Block<'_> {
         }
     }
 }
-
-/// Names pairs that ascend: one pass over the contacts of the last step serves them all.
-struct Names<'a> {
-    tile: &'a Tile,
-    by_name: &'a [bool],
-    ghosts: usize,
-    /// The first contact of the last step that is not before the pairs so far.
-    old: usize,
-}
-
-impl<'a> Names<'a> {
-    fn new(tile: &'a Tile, by_name: &'a [bool], sorted: &[Pair]) -> Self {
-        let mut names = Self { tile, by_name, ghosts: tile.ghosts(), old: 0 };
-        if let Some(&first) = sorted.first() {
-            let first = names.key(first);
-            names.old = tile.contacts.keys.partition_point(|&key| key < first);
-        }
-        names
-    }
-
-    #[inline(always)]
-    fn key(&self, [low, high]: Pair) -> PairKey {
-        let slot = |index: u32| Slot::from_index(index as usize, self.tile.owned, self.ghosts);
-        PairKey::new(slot(low), slot(high))
-    }
-
-    /// Names up to a block of pairs.
-    #[inline(always)]
-    fn name(&mut self, pairs: &[Pair], named: &mut [Named<'a>; BLOCK]) {
-        let (tile, mut known) = (self.tile, [NOT_KNOWN; BLOCK]);
-        for (named, &pair) in named.iter_mut().zip(pairs) {
-            named.key = self.key(pair);
-            // Nobody has asked for names since the last step.
-        }
-        // Two ascending lists are merged; which of them goes on is not for a branch to foresee.
-        let (keys, mut pair, mut old) = (&tile.contacts.keys[..], 0, self.old);
-        while pair < pairs.len().min(BLOCK) && old < keys.len() {
-            let (key, other) = (named[pair].key, keys[old]);
-            known[pair] = if key == other { old } else { NOT_KNOWN };
-            fetch(&tile.contacts.contacts, old);
-            pair += usize::from(key <= other);
-            old += usize::from(key >= other);
-        }
-        self.old = old;
-        for ((named, &[low, high]), &old) in named.iter_mut().zip(pairs).zip(&known) {
-            let ids = (tile.bodies.id[low as usize], tile.bodies.id[high as usize]);
-            let (bodies, pair) = if ids.0 < ids.1 { ([low, high], ids) } else { ([high, low], (ids.1, ids.0)) };
-            let by_name = self.by_name[low as usize] | self.by_name[high as usize];
-            let known =
-                if by_name { tile.strays.find(pair, named.key.is_own()) } else { tile.contacts.contacts.get(old) };
-            (named.bodies, named.known, named.old) = (bodies, known, old as u32);
-        }
-    }
-}
-
-/// The place of a contact that there was not.
-const NOT_KNOWN: usize = usize::MAX;
