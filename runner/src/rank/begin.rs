@@ -120,7 +120,7 @@ pub fn scene(plan: &Plan, rank: Rank) -> Result<World, RunError> {
         found.sort_unstable_by_key(|body| body.id);
         let doubled =
             found.windows(2).find(|pair| pair[0].id == pair[1].id).and_then(|pair| plan.scene.doubled(pair[0].id));
-        if let Some(error) = doubled {
+        if let Some(error) = doubled.or_else(|| plan.scene.crowd(&found)) {
             return Err(error.into());
         }
         for body in found {

@@ -257,6 +257,11 @@ impl Scene {
         self.file().map(|file| file.doubled(id))
     }
 
+    /// That far too many of some bodies are at one place, if files can be blamed for it.
+    pub(crate) fn crowd(&self, bodies: &[Body]) -> Option<SceneError> {
+        self.file().and_then(|file| file.crowd(&mut bodies.iter().map(file::place_of).collect::<Vec<_>>()))
+    }
+
     /// That only so many bodies were found, if files can be blamed for it.
     pub(crate) fn lost(&self, found: u64) -> Option<SceneError> {
         self.file().filter(|file| file.count() != found).map(|file| file.lost(found))

@@ -45,6 +45,14 @@ use std::iter;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
+/// More bodies than this at one and the same place are no scene that can be computed.
+const MOST_AT_A_PLACE: usize = 1000;
+
+/// Where a body is, as something to sort by.
+pub(super) fn place_of(body: &Body) -> [u64; 2] {
+    body.position.to_array().map(f64::to_bits)
+}
+
 /// The text of a scene may have so many bytes: more bodies belong into a file of their own.
 const LONGEST_TEXT: u64 = 64 << 20;
 
@@ -263,6 +271,19 @@ impl SceneFile {
         let first = rows.first().map_or("another body".to_owned(), |row| format!("the body of row {row}"));
         let reason = format!("{first} has this id as well; give each its own, or leave the column id out");
         SceneError::bad(self.bodies_path().unwrap_or(&self.path), place, reason)
+    }
+
+    /// That far too many of some bodies are at one place, if they are. The places are sorted.
+    pub(super) fn crowd(&self, places: &mut [[u64; 2]]) -> Option<SceneError> {
+        places.sort_unstable();
+        let crowds = places.chunk_by(|a, b| a == b).filter(|crowd| crowd.len() > MOST_AT_A_PLACE);
+        let crowd = crowds.max_by_key(|crowd| crowd.len())?;
+        let ([x, y], count) = (crowd[0].map(f64::from_bits), crowd.len());
+        let reason = format!(
+            "{count} bodies have their center at {x}, {y}, where every two of them would be a contact, and at most {MOST_AT_A_PLACE} \
+             may: give each a place of its own, with all digits that tell it from the others"
+        );
+        Some(SceneError::whole(self.bodies_path().unwrap_or(&self.path), reason))
     }
 
     /// That not all of its bodies came into the world.

@@ -329,6 +329,26 @@ fn rows_that_cannot_be_are_refused_in_one_line() {
 }
 
 #[test]
+fn a_crowd_at_one_place_is_told() {
+    let world = WORLD.replace("count = 3\n", "").replace("id = 7\n", "");
+    let faults = |crowd: usize| {
+        let folder =
+            folder(&world, ("x,y\n1.5,2.5\n1.5,2.25\n".to_owned() + &"1.5,2.5\n".repeat(crowd - 1)).as_bytes());
+        let mut faults = Vec::new();
+        let (scene, found) =
+            SceneFile::check(&folder.path().join("world.toml"), |fault| faults.push(fault.to_string())).unwrap();
+        assert_eq!((scene.count(), found.faults), (crowd as u64 + 1, faults.len() as u64));
+        faults
+    };
+    assert_eq!(faults(MOST_AT_A_PLACE), Vec::<String>::new());
+    let told = faults(MOST_AT_A_PLACE + 1);
+    assert!(
+        matches!(&told[..], [one] if one.contains("bodies.csv: 1001 bodies have their center at 1.5, 2.5,")),
+        "{told:?}"
+    );
+}
+
+#[test]
 fn a_doubled_id_is_told_with_its_rows() {
     let folder = folder(WORLD, BODIES.replace("0,0,0.1", "3,0,0.1").as_bytes());
     let told = open(&folder).unwrap().doubled(GlobalId(3)).to_string();
