@@ -142,6 +142,14 @@ impl Bodies {
         }
     }
 
+    /// Makes room for so many more, and for an eighth beside: few come at a time, and twice the room would be most of a tile's memory.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        let wanted = self.len() + more;
+        each_column!(self, column => if column.capacity() < wanted {
+            column.reserve_exact(wanted + wanted / 8 - column.len());
+        });
+    }
+
     /// Appends one.
     pub fn push(&mut self, body: Body) {
         self.id.push(body.id);
@@ -188,7 +196,10 @@ impl Bodies {
     pub(crate) fn permute(&mut self, order: &[u32]) {
         debug_assert_eq!(order.len(), self.len());
         each_column!(self, column => {
-            *column = order.iter().map(|&from| column[from as usize]).collect();
+            // With the room that there was.
+            let mut permuted = Vec::with_capacity(column.capacity());
+            permuted.extend(order.iter().map(|&from| column[from as usize]));
+            *column = permuted;
         });
     }
 

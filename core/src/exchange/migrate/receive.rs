@@ -65,6 +65,7 @@ fn settle(tile: &mut Tile, arrivals: &[Body]) {
         tile.bodies.set(gap as usize, body);
     }
     tile.newcomers.extend_from_slice(filled);
+    tile.bodies.reserve(arrivals.len() - filled.len());
     for &body in &arrivals[filled.len()..] {
         tile.newcomers.push(tile.bodies.len() as u32);
         tile.bodies.push(body);
@@ -111,6 +112,7 @@ fn take_ghosts(tile: &mut Tile, mail: Mail<'_>, Ghosts { records, order }: &mut 
         }));
     }
     order.sort_unstable();
+    tile.bodies.reserve(order.len() + tile.statics.len());
     for &number in &*order {
         let GhostRecord { body, unseen, .. } = records[number as u32 as usize];
         tile.bodies.push(body);

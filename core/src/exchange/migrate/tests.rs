@@ -355,6 +355,28 @@ fn disc(id: u64, x: f64, y: f64, vx: f32) -> Body {
     }
 }
 
+#[test]
+fn a_tile_has_little_more_room_than_bodies() {
+    let mut blueprint = two_tiles(Exchange::Step, vec![circle(0.01)]);
+    blueprint.params.sort_interval = 3;
+    let mut world = World::whole(&blueprint).unwrap();
+    // Discs in rows, every other one of which goes to the right, and none of which touches another.
+    for i in 0..8000_u32 {
+        let (column, row) = (i % 200, i / 200);
+        let speed = if row % 2 == 0 { 8.0 } else { -8.0 };
+        world.add(disc(i.into(), 0.09 * f64::from(column) - 9.0, 0.45 * f64::from(row) - 9.0, speed)).unwrap();
+    }
+    let mut migrations = 0;
+    for _ in 0..10 {
+        migrations += step(&mut world, &mut Loopback).unwrap().migrations;
+        for tile in world.tile_states() {
+            let (bodies, room) = (tile.bodies.len(), tile.bodies.velocity.capacity());
+            assert!(bodies > 3000 && room <= bodies * 5 / 4, "{bodies} bodies and room for {room}");
+        }
+    }
+    assert!(migrations > 100, "{migrations}");
+}
+
 /// The contact of a pair as each tile holds it.
 fn impulses(world: &World, pair: PairOfNames) -> Vec<Option<f32>> {
     let tiles = world.tile_states().iter();
