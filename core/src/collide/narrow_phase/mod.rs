@@ -307,8 +307,6 @@ impl Block<'_> {
                 Outcome::Nothing => {}
                 Outcome::Known => keep(known.expect("it is known"), self.separation[i]),
                 Outcome::Found => keep(&self.found[i], self.separation[i]),
-                // Where no body has several pieces, a pair has one contact.
-                Outcome::Several if !setup.compounds => touch_pieces(tile, pair, boxes, known.as_slice(), setup, keep),
                 Outcome::Several => {
                     several.clear();
                     if pair.iter().any(|&body| by_name[body as usize]) {
