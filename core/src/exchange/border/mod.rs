@@ -146,7 +146,10 @@ impl Border {
             }
             range.1 = i + 1;
         }
-        for &contact in &self.outer {
+        // Who touches a large ghost may be near to no other tile, so these are not the outer contacts alone.
+        let is_sent = |body: u32| self.sends_of.get(body as usize).is_some_and(|(first, end)| first < end);
+        let own = (0..self.scratch.start).zip(&contacts.bodies).filter(|(_, [a, b])| is_sent(*a) | is_sent(*b));
+        for (contact, _) in own {
             let key = tile.contacts.keys[contact as usize];
             for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
                 let SlotKind::Owned(body) = body.kind() else { continue };
