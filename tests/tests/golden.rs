@@ -11,9 +11,11 @@
 //! writes the file anew, and CHANGELOG.md says **results**.
 
 use atoll::Config;
-use atoll_core::{Exchange, Hashes, Instructions, Rot};
+use atoll_core::{Exchange, Hashes, Instructions, Material, Rot, Shape};
 use atoll_tests::program::{self, watched};
 use atoll_tests::scenes;
+use atoll_tests::world::Scene;
+use glam::{DVec2, Vec2};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -87,9 +89,21 @@ const CHOICES: &[(&str, Overrides)] = &[
     ("zoo", &[("bodies", "300"), ("steps", "150"), ("tiles", "1x1"), ("sleep", "true")]),
 ];
 
-/// Worlds of the library, by name.
-const BOUNCING: [(&str, Exchange); 2] =
-    [("bouncing exchange=step", Exchange::Step), ("bouncing exchange=substep", Exchange::Substep)];
+/// A world of the library on some tiles.
+struct World {
+    name: &'static str,
+    scene: fn() -> Scene,
+    grid: (u32, u32),
+    exchange: Exchange,
+    steps: u32,
+}
+
+/// What no configuration has.
+const WORLDS: [World; 3] = [
+    World { name: "bouncing exchange=step", scene: bouncing, grid: (3, 2), exchange: Exchange::Step, steps: 120 },
+    World { name: "bouncing exchange=substep", scene: bouncing, grid: (3, 2), exchange: Exchange::Substep, steps: 120 },
+    World { name: "scales exchange=substep", scene: scales, grid: (2, 1), exchange: Exchange::Substep, steps: 200 },
+];
 
 /// A case by name, as the golden file has it: the configuration, and what is set in it.
 fn name(config: &str, overrides: Overrides) -> String {
@@ -123,23 +137,48 @@ fn renew(results: &Results) {
     let mut text =
         "# Hashes of states and contacts, of runs with these settings. See tests/tests/golden.rs.\n".to_owned();
     let names = cases().map(|(config, overrides)| name(config, overrides));
-    for case in names.chain(BOUNCING.map(|(case, _)| case.to_owned())) {
+    for case in names.chain(WORLDS.map(|world| world.name.to_owned())) {
         let [state, contacts] = &results[&case];
         writeln!(text, "{case} | {state} | {contacts}").unwrap();
     }
     std::fs::write(file(), text).unwrap();
 }
 
-/// What no configuration has yet: bodies that bounce, and walls that stand aslant.
-fn bouncing(exchange: Exchange, instructions: Instructions) -> [String; 2] {
+/// Bodies that bounce, and walls that stand aslant.
+fn bouncing() -> Scene {
     let mut scene = scenes::room(12, 5);
-    scene.params.instructions = instructions;
     scene.kinds.iter_mut().for_each(|kind| kind.material.restitution = 0.7);
     scene.statics.iter_mut().for_each(|wall| wall.rotation = Rot::from_angle(0.03));
-    let mut sim = scene.start_on((3, 2), exchange);
-    sim.run(120);
-    let Hashes { state, contact } = sim.world.hashes();
-    [format!("{state:032x}"), format!("{contact:032x}")]
+    scene
+}
+
+/// A ball upon a border under a heap of balls a fiftieth of its size: who touches it may be far from the tile beside.
+fn scales() -> Scene {
+    let mut scene = Scene::new(DVec2::new(10.0, 8.0), -10.0);
+    scene.half = DVec2::new(10.0, 8.0);
+    let material = Material::default();
+    scene.wall(DVec2::new(10.0, -1.0), (24.0, 2.0), 0.0, material);
+    for x in [-1.0, 21.0] {
+        scene.wall(DVec2::new(x, 8.0), (2.0, 20.0), 0.0, material);
+    }
+    let kinds = [5.0, 0.1].map(|radius| scene.kind(Shape::circle(radius), material));
+    scene.body(kinds[0], DVec2::new(10.2, 5.0), Vec2::ZERO);
+    for k in 0..1500 {
+        let place = DVec2::new(0.2 + 0.22 * f64::from(k % 90), 10.5 + 0.25 * f64::from(k / 90));
+        scene.body(kinds[1], place, Vec2::new(0.0, -10.0));
+    }
+    scene
+}
+
+impl World {
+    fn hashes(&self, instructions: Instructions) -> [String; 2] {
+        let mut scene = (self.scene)();
+        scene.params.instructions = instructions;
+        let mut sim = scene.start_on(self.grid, self.exchange);
+        sim.run(self.steps);
+        let Hashes { state, contact } = sim.world.hashes();
+        [format!("{state:032x}"), format!("{contact:032x}")]
+    }
 }
 
 /// The hashes of every case, by runs in this process on some set of instructions, as a configuration and as the library
@@ -155,7 +194,7 @@ fn results((word, instructions): (&'static str, Instructions)) -> Results {
             watched(&case, move || atoll::run(&config_read)).unwrap_or_else(|error| panic!("{case}: {error}"));
         (case, [summary.state_hash, summary.contact_hash])
     };
-    let worlds = BOUNCING.iter().map(|&(case, exchange)| (case.to_owned(), bouncing(exchange, instructions)));
+    let worlds = WORLDS.iter().map(|world| (world.name.to_owned(), world.hashes(instructions)));
     cases().map(run).chain(worlds).collect()
 }
 
@@ -201,7 +240,7 @@ fn results_are_golden_on_portable_lanes() {
 fn every_case_differs() {
     let golden = golden();
     let states: std::collections::BTreeSet<&String> = golden.values().map(|[state, _]| state).collect();
-    assert_eq!(states.len(), cases().count() + BOUNCING.len(), "two cases of golden.txt have one state");
+    assert_eq!(states.len(), cases().count() + WORLDS.len(), "two cases of golden.txt have one state");
 }
 
 #[test]
