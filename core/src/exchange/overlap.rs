@@ -37,6 +37,8 @@ pub(crate) fn depth(params: &Params) -> Option<f64> {
 pub(crate) struct Outline {
     place: DVec2,
     half: Vec2,
+    /// How near a tile's region it may matter to it, in meters.
+    halo: f64,
 }
 
 impl Outline {
@@ -45,12 +47,12 @@ impl Outline {
     pub(crate) fn of(tile: &Tile, body: usize, setup: &Setup) -> Self {
         let bodies = &tile.bodies;
         let half = setup.grown_half_extents(bodies.kind[body], bodies.rotation[body], bodies.velocity[body]);
-        Self { place: bodies.position[body], half }
+        Self { place: bodies.position[body], half, halo: setup.halo_of(bodies.kind[body]) }
     }
 
     /// Of an owned body near the border.
-    pub(crate) fn of_rim(body: &RimBody) -> Self {
-        Self { place: body.body.position, half: body.half }
+    pub(crate) fn of_rim(body: &RimBody, setup: &Setup) -> Self {
+        Self { place: body.body.position, half: body.half, halo: setup.halo_of(body.body.kind) }
     }
 
     /// Whether it is so near a tile that its contacts with others that are, and with statics, are solved there.
@@ -61,10 +63,15 @@ impl Outline {
 
     /// Whether a tile that does not own it has it as a ghost.
     pub(crate) fn is_ghost_of(&self, tile: TileId, setup: &Setup) -> bool {
-        setup.partition.reaches(tile, self.place, self.half, setup.halo_width)
+        setup.partition.reaches(tile, self.place, self.half, self.halo)
     }
 
-    /// Whether all that its box meets is a ghost of that tile, or lives there.
+    /// The tiles that have it as a ghost, or own it.
+    pub(crate) fn reached(&self, setup: &Setup) -> impl Iterator<Item = TileId> {
+        setup.partition.reached(self.place, self.half, self.halo)
+    }
+
+    /// Whether all that its box meets is a ghost of that tile, whoever knows it, or lives there.
     pub(crate) fn is_within_halo_of(&self, tile: TileId, setup: &Setup) -> bool {
         let (region, (low, high)) = (setup.partition.region(tile), self.corners());
         let halo = DVec2::splat(setup.halo_width);

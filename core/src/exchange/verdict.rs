@@ -9,7 +9,7 @@ pub struct Verdict {
     pub stop: bool,
     /// Somebody asks all ranks to meet after this step.
     pub meet: bool,
-    /// A body goes further in this step than halos are wide: another sync point follows the first one.
+    /// A body reaches further in this step than halos are wide: another sync point follows the first one.
     pub far: bool,
     /// A check failed: the step and the lowest body concerned.
     pub failure: Option<(u64, GlobalId)>,
@@ -27,7 +27,7 @@ impl Verdict {
 
     /// As a word for the outside to carry: the least word of all ranks stands for all their verdicts joined. A failure
     /// hides a stop, and a stop a wish to meet, which makes no difference: they end the run. All of these hide whether a body
-    /// goes far: then `is_far` takes it for granted.
+    /// reaches far: then `is_far` takes it for granted.
     pub fn to_word(self) -> u128 {
         match self {
             // A run never counts as many steps as would make this one of the words below.
@@ -50,7 +50,7 @@ impl Verdict {
         }
     }
 
-    /// Whether another sync point is to follow the first one of a step. That changes nothing where no body goes far.
+    /// Whether another sync point is to follow the first one of a step. That changes nothing where no body reaches far.
     pub(crate) fn is_far(self) -> bool {
         self.far | self.stop | self.meet
     }

@@ -133,6 +133,9 @@ pub struct Params {
     /// Greatest margin of a body's AABB, in m (0.5). A step in which a body moves further costs an exchange more. Part of the width
     /// of the halo.
     pub margin_cap: f32,
+    /// Bodies of a greater bounding radius are few, and do not widen the halo, in m (none: infinity). A step in which one of them lies
+    /// over the rim of its tile's halo costs an exchange more.
+    pub large_radius: f32,
     /// The bodies of a tile are sorted by place every so many steps (32). For memory locality alone, yet part of the
     /// result: constraint order follows body order.
     pub sort_interval: u32,
@@ -184,6 +187,7 @@ impl Default for Params {
             restitution_threshold: 1.0,
             margin_floor: 0.05,
             margin_cap: 0.5,
+            large_radius: f32::INFINITY,
             sort_interval: 32,
             exchange: Exchange::default(),
             broad_phase: BroadPhase::default(),
@@ -228,6 +232,7 @@ impl Params {
             self.margin_cap >= self.margin_floor && self.margin_cap.is_finite(),
             "finite and at least margin_floor",
         )?;
+        require("large_radius", self.large_radius, self.large_radius > 0.0, "positive")?;
         require("sort_interval", self.sort_interval as f32, self.sort_interval > 0, "at least 1")?;
         require("iterations", self.iterations as f32, (1..=1000).contains(&self.iterations), "within 1 to 1000")?;
         require("baumgarte", self.baumgarte, (0.0..=1.0).contains(&self.baumgarte), "within 0 to 1")?;

@@ -107,6 +107,13 @@ impl Strays {
         if self.table.is_empty() { None } else { place_of(self.table[self.slot(names)]) }
     }
 
+    /// All of which one is owned, once they are in order.
+    pub(crate) fn own(&self) -> impl Iterator<Item = (Names, &Contact)> {
+        let is_known =
+            |stray: &&Stray| self.find_all(stray.pair, true).any(|contact| std::ptr::eq(contact, &stray.contact));
+        self.all.iter().filter(is_known).map(|stray| (stray.pair, &stray.contact))
+    }
+
     /// What is remembered of a pair: of which one is owned, or neither. Of circles and boxes there is one contact at most.
     #[inline]
     pub(crate) fn find(&self, names: Names, is_own: bool) -> Option<&Contact> {

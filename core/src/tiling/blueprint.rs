@@ -20,7 +20,8 @@ pub struct Blueprint {
     pub params: Params,
     /// How the domain is cut.
     pub partition: Partition,
-    /// Shapes and materials of dynamic bodies; a body names its row. The largest sets the width of the halo.
+    /// Shapes and materials of dynamic bodies; a body names its row. The largest that is not beyond
+    /// [`Params::large_radius`] sets the width of the halo.
     pub kinds: Vec<Kind>,
     /// Bodies that never move, or move whatever they meet.
     pub statics: Vec<StaticBody>,
@@ -36,15 +37,16 @@ impl Blueprint {
     }
 }
 
-/// The largest bounding radius of a dynamic body, in meters.
-pub(crate) fn largest_radius(kinds: &[Kind]) -> f32 {
-    kinds.iter().map(|kind| kind.shape.bounding_radius()).fold(0.0, |most, radius| math::max(radius, most))
+/// The largest bounding radius of a dynamic body that is not [large](Params::large_radius), in meters.
+pub(crate) fn usual_radius(kinds: &[Kind], params: &Params) -> f32 {
+    let radii = kinds.iter().map(|kind| kind.shape.bounding_radius());
+    radii.filter(|&radius| radius <= params.large_radius).fold(0.0, |most, radius| math::max(radius, most))
 }
 
 /// The width of the halo in meters, a little more than what the ghost rule asks for: bodies this near a tile's region may
-/// matter to it. The largest bounding radius of a dynamic body and the greatest margin.
+/// matter to it. The largest bounding radius of a dynamic body that is not [large](Params::large_radius) and the greatest margin.
 pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
-    width_for(largest_radius(kinds), params)
+    width_for(usual_radius(kinds, params), params)
 }
 
 /// The same for the largest bounding radius.
@@ -81,8 +83,8 @@ pub(crate) struct Setup {
     static_names: Vec<GlobalId>,
     /// Bodies this near a tile's region may matter to it, in meters.
     pub(crate) halo_width: f64,
-    /// A body further inside its tile than this neither leaves nor is anybody's ghost.
-    pub(crate) inset: f64,
+    /// Large bodies this near may; as wide where there are none.
+    pub(crate) wide_halo: f64,
     /// A contact of bodies that both come this near a tile's region is solved there as well (see `exchange/overlap.rs`), in
     /// meters. None where each contact is solved by the owners of its bodies alone.
     pub(crate) overlap: Option<f64>,
@@ -145,6 +147,8 @@ impl Setup {
             return Err(SetupError::BadStatic { id: pair[0] });
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
+        let all = Params { large_radius: f32::INFINITY, ..params.clone() };
+        let wide_halo = self::halo_width(&blueprint.kinds, &all);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
         let compounds = kinds.iter().any(KindRow::is_compound);
@@ -152,7 +156,7 @@ impl Setup {
         Ok(Self {
             partition: blueprint.partition.clone(),
             halo_width,
-            inset: 2.0 * halo_width,
+            wide_halo,
             overlap: overlap::depth(&params).map(|part| part * halo_width),
             h: params.substep(),
             lanes: LaneSet::of(params.instructions)
@@ -182,7 +186,12 @@ impl Setup {
     pub(crate) fn with_kind(&self, kind: &Kind) -> Result<Self, SetupError> {
         let row = KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32))?;
         let mut setup = self.clone();
-        setup.set_halo_width(self.halo_width.max(width_for(row.bounding_radius, &self.params)));
+        let width = width_for(row.bounding_radius, &self.params);
+        setup.wide_halo = self.wide_halo.max(width);
+        if row.bounding_radius <= self.params.large_radius {
+            setup.halo_width = self.halo_width.max(width);
+            setup.overlap = overlap::depth(&self.params).map(|part| part * setup.halo_width);
+        }
         setup.kinds.insert(self.dynamic_kinds, row);
         setup.dynamic_kinds += 1;
         setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
@@ -196,12 +205,6 @@ impl Setup {
     /// Whether there can be dynamic bodies of it.
     pub(crate) fn check_kind(&self, kind: &Kind) -> Result<(), SetupError> {
         KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32)).map(drop)
-    }
-
-    fn set_halo_width(&mut self, width: f64) {
-        self.halo_width = width;
-        self.inset = 2.0 * width;
-        self.overlap = overlap::depth(&self.params).map(|part| part * width);
     }
 
     /// Whether a dynamic body may be one of this world.
@@ -236,6 +239,28 @@ impl Setup {
         Vec2::new(math::max(own_way.x, any_way), math::max(own_way.y, any_way))
     }
 
+    /// Whether there may be large bodies.
+    pub(crate) fn has_large(&self) -> bool {
+        self.wide_halo > self.halo_width
+    }
+
+    /// Whether a body is so large that the halo does not reckon with it.
+    #[inline(always)]
+    pub(crate) fn is_large(&self, kind: KindId) -> bool {
+        self.kind(kind).bounding_radius > self.params.large_radius
+    }
+
+    /// How near a tile's region a body may matter to it, in meters.
+    #[inline(always)]
+    pub(crate) fn halo_of(&self, kind: KindId) -> f64 {
+        if self.is_large(kind) { self.wide_halo } else { self.halo_width }
+    }
+
+    /// A body of a tile further inside than this neither leaves nor is anybody's ghost, in meters. `large` says whether any of them is.
+    pub(crate) fn inset(&self, large: bool) -> f64 {
+        2.0 * if large { self.wide_halo } else { self.halo_width }
+    }
+
     /// Whether a body goes further in a step than the halo has room for.
     #[inline(always)]
     pub(crate) fn goes_far(&self, velocity: Vec2) -> bool {
@@ -249,10 +274,10 @@ impl Setup {
         self.kind(kind).half_extents(rotation) + self.margin(velocity)
     }
 
-    /// The statics that a tile must know: those that reach its region grown by the halo; where it solves contacts of ghosts, by
-    /// three times as much: a ghost is in the halo with one end, and touches statics with the other.
+    /// The statics that a tile must know: those that reach its region grown by the halo of the largest; where it solves contacts of
+    /// ghosts, by three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
-        let reach = if self.overlap.is_some() { 3.0 * self.halo_width } else { self.halo_width };
+        let reach = if self.overlap.is_some() { 3.0 * self.wide_halo } else { self.wide_halo };
         let reaches = |row: u32, body: &Body| match self.path(row) {
             None => {
                 let half = self.kind(body.kind).half_extents(body.rotation);

@@ -226,7 +226,7 @@ impl Tile {
             // Where they are the next step tells.
             self.push_statics(setup, 0);
         }
-        self.interior = self.region.shrunk(setup.inset);
+        self.find_interior(setup);
         self.rim.is_known = false;
     }
 

@@ -72,7 +72,7 @@ pub(crate) struct TileCounts {
     pub(crate) ghosts: u64,
     /// Bodies that left for a tile that is no neighbour.
     pub(crate) leaps: u64,
-    /// Whether an owned body goes further in the step than the halo is wide.
+    /// Whether an owned body reaches further in the step than the halo.
     pub(crate) far: bool,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
@@ -105,7 +105,7 @@ impl Tile {
         Self {
             id,
             region,
-            interior: region.shrunk(setup.inset),
+            interior: region.shrunk(setup.inset(false)),
             rectangle,
             bodies: Bodies::default(),
             owned: 0,
@@ -176,6 +176,12 @@ impl Tile {
             let statics = setup.statics_of(self.id);
             self.next_statics = (statics != self.statics).then_some(statics);
         }
+    }
+
+    /// Finds where in the tile its bodies concern no other, however large they are.
+    pub(crate) fn find_interior(&mut self, setup: &Setup) {
+        let large = setup.has_large() && self.bodies.kind[..self.owned].iter().any(|&kind| setup.is_large(kind));
+        self.interior = self.region.shrunk(setup.inset(large));
     }
 
     /// Takes in the statics of a region that has changed: contacts go on with those that the tile still knows. Before the statics

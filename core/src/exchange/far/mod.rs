@@ -1,9 +1,13 @@
-//! Bodies that go further within a step than the halo is wide.
+//! Bodies that reach further within a step than the halo is wide: they go so far, or are so large.
 //!
 //! The box around the way of such a body reaches over tiles, and each of these has it as a ghost like any other. But its own tile
 //! knows neither the bodies nor the statics there. So in a step in which there is such a body (every rank hears of it with the
 //! first sync point, see [`Verdict::far`](crate::Verdict)), a second one follows: whoever has it as a ghost sends its tile what
-//! lies on its way. Halos stay as narrow as the slow bodies need them.
+//! lies on its way. Halos stay as narrow as the slow and small bodies need them.
+//!
+//! Large bodies ([`Params::large_radius`](crate::Params)) stay for long where they are, and bodies rest between them and others: so
+//! of these their tile is told by their owners alone, with what they have of it that is unseen there. Of each other, and of statics,
+//! large bodies know by a halo and a reach of their own, as wide as the largest needs them.
 //!
 //! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands
 //! there; so whoever has gone far is held back, after the step, where it met a static.
@@ -12,6 +16,7 @@
 
 mod bounds;
 mod hold;
+mod unseen;
 
 pub(crate) use hold::{hold, ways};
 
@@ -28,6 +33,7 @@ use crate::tiling::tile::Tile;
 use bounds::Bounds;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
+use unseen::add_unseen;
 
 /// Whether some bodies' velocities take one of them far. Without a branch, as hardly ever does one.
 fn any(velocities: &[Vec2], setup: &Setup) -> bool {
@@ -40,41 +46,76 @@ fn far_rows(tile: &Tile, rows: Range<usize>, setup: &Setup) -> impl Iterator<Ite
     rows.filter(|&row| setup.goes_far(tile.bodies.velocity[row]))
 }
 
-/// Sends the tiles of ghosts that go far the bodies on their way, as far as they do not have them anyway.
-pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
-    let far = far_rows(tile, tile.owned..tile.owned + tile.ghosts(), setup).filter_map(|ghost| {
+/// A body for a tile that another belongs to, which reaches for it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Parcel {
+    to: TileId,
+    /// Among the sender's bodies.
+    row: usize,
+    /// Whether that other one is not large, but goes far, or the body does so itself.
+    passes: bool,
+}
+
+/// A ghost that reaches far, its tile, and how far it reaches.
+struct Far {
+    ghost: usize,
+    owner: TileId,
+    way: Outline,
+    passes: bool,
+}
+
+/// The ghosts of a tile that reach further than their own tile's halo.
+fn far_ghosts(tile: &Tile, setup: &Setup) -> Vec<Far> {
+    let ghosts = tile.owned..tile.owned + tile.ghosts();
+    let passing = far_rows(tile, ghosts.clone(), setup).map(|ghost| (ghost, true));
+    let lasting = if setup.has_large() { ghosts } else { 0..0 };
+    let is_large = |ghost: &usize| setup.is_large(tile.bodies.kind[*ghost]);
+    let lasting = lasting.filter(is_large).map(|ghost| (ghost, false));
+    let far = passing.chain(lasting).filter_map(|(ghost, passes)| {
         let (owner, way) = (tile.ghost_owners[ghost - tile.owned], Outline::of(tile, ghost, setup));
-        (!way.is_within_halo_of(owner, setup)).then_some((ghost, owner, way))
+        (!way.is_within_halo_of(owner, setup)).then_some(Far { ghost, owner, way, passes })
     });
-    let far: Vec<(usize, TileId, Outline)> = far.collect();
+    far.collect()
+}
+
+/// Sends the tiles of ghosts that reach far the bodies that these may come to, as far as they do not have them anyway.
+pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
+    let far = far_ghosts(tile, setup);
     if far.is_empty() {
         return;
     }
-    let untouched = far.iter().fold(tile.rectangle, |region, (.., way)| apart_from(region, way.corners()));
+    let untouched = far.iter().fold(tile.rectangle, |region, far| apart_from(region, far.way.corners()));
     let touched = (0..tile.owned + tile.ghosts()).filter_map(|row| {
         let (low, high) = Outline::of(tile, row, setup).corners();
         let is_touched = !(low.cmpgt(untouched.min) & high.cmplt(untouched.max)).all();
         is_touched.then_some((row, low, high))
     });
     let touched = Bounds::new(touched.collect());
-    let mut sends: Vec<(TileId, usize)> = Vec::new();
-    for &(ghost, owner, way) in &far {
+    let mut parcels: Vec<Parcel> = Vec::new();
+    for &Far { ghost, owner, way, passes } in &far {
         let (low, high) = way.corners();
         for row in touched.meeting(low, high) {
+            let may_pass = passes || setup.goes_far(tile.bodies.velocity[row]);
+            if row >= tile.owned && !may_pass {
+                continue;
+            }
             let is_there = || {
                 let body = Outline::of(tile, row, setup);
                 setup.partition.locate(tile.bodies.position[row]) == owner || body.is_ghost_of(owner, setup)
             };
             if row != ghost && !is_there() {
-                sends.push((owner, row));
+                parcels.push(Parcel { to: owner, row, passes: may_pass });
             }
         }
     }
-    sends.sort_unstable();
-    sends.dedup();
-    for (owner, row) in sends {
-        bag.address(tile.id, owner);
-        bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen: Unseen::default(), padding: 0 });
+    parcels.sort_unstable();
+    // What is told of those that stay counts.
+    parcels.dedup_by_key(|parcel| (parcel.to, parcel.row));
+    let mut unseen = vec![Unseen::default(); parcels.len()];
+    add_unseen(tile, &parcels, &mut unseen);
+    for (Parcel { to, row, .. }, unseen) in parcels.into_iter().zip(unseen) {
+        bag.address(tile.id, to);
+        bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, padding: 0 });
     }
 }
 
@@ -94,23 +135,24 @@ fn apart_from(region: Region, (low, high): (DVec2, DVec2)) -> Region {
 
 /// Takes in what lies on the way of the tile's own bodies, and the statics that its bodies and ghosts may come to.
 pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64) {
-    let mut ghosts: Vec<(TileId, Body, Unseen)> = Vec::new();
+    let mut ghosts: Vec<(TileId, Body, Unseen, bool)> = Vec::new();
     for message in mail.messages() {
-        ghosts.extend(
-            message.ghosts.iter().map(|ghost| (setup.partition.locate(ghost.body.position), ghost.body, ghost.unseen)),
-        );
+        ghosts.extend(message.ghosts.iter().map(|ghost| {
+            let owner = setup.partition.locate(ghost.body.position);
+            (owner, ghost.body, ghost.unseen, owner != message.from)
+        }));
     }
     let owned = tile.owned;
     if !ghosts.is_empty() {
         let known = tile.ghost_owners.iter().zip(&tile.unseen).zip(owned..);
-        ghosts.extend(known.map(|((&owner, &unseen), row)| (owner, tile.bodies.get(row), unseen)));
-        ghosts.sort_unstable_by_key(|(owner, body, _)| (*owner, body.id));
-        // Several tiles may have sent the same.
-        ghosts.dedup_by_key(|(_, body, _)| body.id);
+        ghosts.extend(known.map(|((&owner, &unseen), row)| (owner, tile.bodies.get(row), unseen, false)));
+        ghosts.sort_unstable_by_key(|(owner, body, _, is_hearsay)| (*owner, body.id, *is_hearsay));
+        // Several tiles may have sent the same. Its owner knows best.
+        ghosts.dedup_by_key(|(_, body, ..)| body.id);
         tile.bodies.truncate(owned);
         tile.ghost_owners.clear();
         tile.unseen.clear();
-        for (owner, body, unseen) in ghosts {
+        for (owner, body, unseen, _) in ghosts {
             tile.bodies.push(body);
             tile.ghost_owners.push(owner);
             tile.unseen.push(unseen);

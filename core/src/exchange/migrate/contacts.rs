@@ -40,8 +40,9 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
         };
         let is_near = |slot: Slot, target| match slot.kind() {
             // Whoever is no ghost of any tile is near to none.
-            SlotKind::Owned(index) => border_of(mark[index])
-                .is_some_and(|border| Outline::of_rim(&tile.rim.bodies[border.rim as usize]).is_near(target, setup)),
+            SlotKind::Owned(index) => border_of(mark[index]).is_some_and(|border| {
+                Outline::of_rim(&tile.rim.bodies[border.rim as usize], setup).is_near(target, setup)
+            }),
             // Judged by where it was: what comes of it is put right with the first refresh.
             SlotKind::Ghost(_) => Outline::of(tile, tile.index(slot), setup).is_near(target, setup),
             SlotKind::Static(_) => true,

@@ -137,12 +137,13 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.rim.is_known = false;
     let partition = &setup.partition;
     for (place, rim) in (0..).zip(&tile.rim.bodies) {
-        let (position, goes_far) = (rim.body.position, setup.goes_far(rim.body.velocity));
-        tile.counts.far |= goes_far;
+        let position = rim.body.position;
         let owner = if tile.region.contains(position) { tile.id } else { partition.locate(position) };
-        let outline = Outline::of_rim(rim);
+        let outline = Outline::of_rim(rim, setup);
+        tile.counts.far |= setup.goes_far(rim.body.velocity)
+            || setup.is_large(rim.body.kind) && !outline.is_within_halo_of(owner, setup);
         let first_send = work.sends.len() as u32;
-        for target in partition.reached(position, rim.half, setup.halo_width).filter(|&target| target != owner) {
+        for target in outline.reached(setup).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);
             work.sends.push(Send { rim: place, target, near, unseen: Unseen::default() });
         }

@@ -44,6 +44,9 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     if step.is_multiple_of(u64::from(setup.params.sort_interval)) {
         place::sort(tile, setup);
     }
+    if setup.has_large() {
+        tile.find_interior(setup);
+    }
     take_ghosts(tile, mail, &mut work.ghosts, setup);
     tile.push_statics(setup, step);
 }

@@ -72,14 +72,16 @@ fn any_scene(bodies: usize, gravity: f32) -> impl Strategy<Value = Scene> {
     let kinds = prop::collection::vec(any_kind(0.1, 4.0), 1..5);
     let grid = (1_u32..=7, 1_u32..=5, 0.4_f64..4.0);
     let exchange = prop_oneof![Just(Exchange::Step), Just(Exchange::Substep)];
-    (kinds, grid, exchange, 1_u32..=5)
+    let large = prop_oneof![Just(f32::INFINITY), 0.1_f32..2.0];
+    (kinds, grid, (exchange, large), 1_u32..=5)
         .prop_flat_map(move |(kinds, (columns, rows, side), exchange, sort_interval)| {
             let domain = DVec2::new(side * f64::from(columns), side * f64::from(rows));
             let bodies = prop::collection::vec(any_body(kinds.len(), domain), 0..=bodies);
             (bodies, Just((kinds, columns, rows, domain, exchange, sort_interval)))
         })
-        .prop_map(move |(mut bodies, (kinds, columns, rows, domain, exchange, sort_interval))| {
-            let params = Params { exchange, sort_interval, gravity: Vec2::new(0.0, gravity), ..Params::default() };
+        .prop_map(move |(mut bodies, (kinds, columns, rows, domain, (exchange, large_radius), sort_interval))| {
+            let gravity = Vec2::new(0.0, gravity);
+            let params = Params { exchange, sort_interval, gravity, large_radius, ..Params::default() };
             let floor = StaticBody {
                 id: GlobalId(0),
                 position: DVec2::new(0.5 * domain.x, -1.0),
@@ -133,13 +135,21 @@ fn reaches(world: &World, tile: TileId, body: &Body, far: f64) -> bool {
 
 /// Whether a tile is to have a ghost of a body, whatever else there is.
 fn needs(world: &World, tile: TileId, body: &Body) -> bool {
-    reaches(world, tile, body, world.setup.halo_width)
+    reaches(world, tile, body, world.setup.halo_of(body.kind))
 }
 
 /// Whether a body lies on the way of another that goes far.
 fn is_on_the_way(world: &World, body: &Body, far: &Body) -> bool {
-    let boxes_meet = (body.position - far.position).abs().cmple(grown(world, body) + grown(world, far)).all();
-    world.setup.goes_far(far.velocity) && boxes_meet
+    world.setup.goes_far(far.velocity) && boxes_meet(world, body, far)
+}
+
+/// Whether a large body may come to another.
+fn is_come_to(world: &World, body: &Body, large: &Body) -> bool {
+    world.setup.is_large(large.kind) && boxes_meet(world, body, large)
+}
+
+fn boxes_meet(world: &World, a: &Body, b: &Body) -> bool {
+    (a.position - b.position).abs().cmple(grown(world, a) + grown(world, b)).all()
 }
 
 /// Who owns what, and who has a ghost of whom, after a step, given the bodies before it.
@@ -154,7 +164,8 @@ fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
         }
         // A tile that owns nothing solves nothing, and nobody's copy is kept.
         let owned: Vec<_> = tile.bodies.id[..tile.owned].iter().map(|id| before[id]).collect();
-        let on_a_way = |body: &Body| owned.iter().any(|far| is_on_the_way(world, body, far));
+        let on_a_way =
+            |body: &Body| owned.iter().any(|far| is_on_the_way(world, body, far) || is_come_to(world, body, far));
         let others: Vec<_> = before
             .values()
             .map(|body| (grid.locate(body.position), body))
@@ -277,8 +288,26 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
         let is_near = |body: &Body| world.setup.overlap.is_some_and(|depth| reaches(world, tile.id, body, depth));
         for (unseen, id) in tile.unseen.iter().zip(&tile.bodies.id[tile.owned..]) {
             let (mut wanted, mut size) = ([0.0; 3], 1e-6);
+            let body = &bodies[id];
+            let owner_now = |id: &GlobalId| bodies.get(id).map(|body| world.setup.partition.locate(body.position));
+            let of_body = |push: &&Push| push.pair.0 == *id || push.pair.1 == *id;
             // What was only on the way of somebody is told of by another than its owner, as it is.
-            let owners = if needs(world, tile.id, &bodies[id]) { before } else { &[] };
+            let mut owners = before;
+            if !needs(world, tile.id, body) {
+                let mut owned = tile.bodies.id[..tile.owned].iter();
+                let lasts =
+                    !world.setup.goes_far(body.velocity) && owned.any(|large| is_come_to(world, body, &bodies[large]));
+                if !lasts {
+                    owners = &[];
+                }
+                // Who came or has new neighbours may know otherwise of what was.
+                let moved = |push: &Push| {
+                    [push.pair.0, push.pair.1].iter().zip(push.owners).any(|(id, owner)| owner_now(id) != owner)
+                };
+                if owners.iter().filter(of_body).any(moved) {
+                    continue;
+                }
+            }
             for push in owners {
                 for (me, other) in [(0, 1), (1, 0)] {
                     let name = [push.pair.0, push.pair.1][me];
