@@ -47,12 +47,12 @@ impl Outline {
     pub(crate) fn of(tile: &Tile, body: usize, setup: &Setup) -> Self {
         let bodies = &tile.bodies;
         let half = setup.grown_half_extents(bodies.kind[body], bodies.rotation[body], bodies.velocity[body]);
-        Self { place: bodies.position[body], half, halo: setup.halo_of(bodies.kind[body]) }
+        Self { place: bodies.position[body], half, halo: setup.halo_of(bodies.kind[body], bodies.velocity[body]) }
     }
 
     /// Of an owned body near the border.
     pub(crate) fn of_rim(body: &RimBody, setup: &Setup) -> Self {
-        Self { place: body.body.position, half: body.half, halo: setup.halo_of(body.body.kind) }
+        Self { place: body.body.position, half: body.half, halo: setup.halo_of(body.body.kind, body.body.velocity) }
     }
 
     /// Whether it is so near a tile that its contacts with others that are, and with statics, are solved there.

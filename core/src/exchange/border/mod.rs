@@ -7,6 +7,7 @@
 //! itself until the next step.
 
 use crate::collide::narrow_phase::Contacts;
+use crate::exchange::far;
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
 use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot, SlotKind};
@@ -97,6 +98,9 @@ impl Border {
             send_near(tile, key, &self.near, &mut self.sends);
             if let SlotKind::Ghost(ghost) = key.high().kind() {
                 let (low, peer) = (tile.index(key.low()) as u32, tile.ghost_owners[ghost]);
+                if far::may_be_unknown(tile, low as usize, ghost, setup) {
+                    continue;
+                }
                 let pair = tile.pair_of(key);
                 self.sends.push(Outgoing { body: low, peer });
                 self.ghosts.push(ghost as u32);

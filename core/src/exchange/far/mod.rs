@@ -12,7 +12,8 @@
 //! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands
 //! there; so whoever has gone far is held back, after the step, where it met a static.
 //!
-//! Not seen: two such bodies from tiles apart that meet over a tile where nobody is.
+//! Not seen: two that go far, from tiles apart, that meet over a tile where nobody is; and it may be that one of their tiles knows
+//! of it alone.
 
 mod bounds;
 mod hold;
@@ -52,15 +53,19 @@ struct Parcel {
     to: TileId,
     /// Among the sender's bodies.
     row: usize,
-    /// Whether that other one is not large, but goes far, or the body does so itself.
+    /// Whether that other one is not large, but goes far.
     passes: bool,
 }
+
+/// Rounding of a distance between two bodies' boxes as a tile computes it, at most, as part of how far off they are.
+const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A ghost that reaches far, its tile, and how far it reaches.
 struct Far {
     ghost: usize,
     owner: TileId,
-    way: Outline,
+    /// Low and high corner.
+    way: (DVec2, DVec2),
     passes: bool,
 }
 
@@ -73,9 +78,27 @@ fn far_ghosts(tile: &Tile, setup: &Setup) -> Vec<Far> {
     let lasting = lasting.filter(is_large).map(|ghost| (ghost, false));
     let far = passing.chain(lasting).filter_map(|(ghost, passes)| {
         let (owner, way) = (tile.ghost_owners[ghost - tile.owned], Outline::of(tile, ghost, setup));
-        (!way.is_within_halo_of(owner, setup)).then_some(Far { ghost, owner, way, passes })
+        let room = room(way.corners(), owner, setup);
+        (!way.is_within_halo_of(owner, setup)).then_some(Far { ghost, owner, way: room, passes })
     });
     far.collect()
+}
+
+/// A box with room for the rounding of what a tile compares it with, in coordinates of its own.
+fn room((low, high): (DVec2, DVec2), tile: TileId, setup: &Setup) -> (DVec2, DVec2) {
+    let corner = setup.partition.rectangle(tile).min;
+    let furthest = (low - corner).abs().max((high - corner).abs()).max_element();
+    let room = DVec2::splat(ROUNDING * furthest);
+    (low - room, high + room)
+}
+
+/// Whether a ghost's owner may not know that it meets an owned body: both go far, and neither is known to the other's tile but by
+/// what others told. Each tile then solves what it knows.
+pub(crate) fn may_be_unknown(tile: &Tile, body: usize, ghost: usize, setup: &Setup) -> bool {
+    let (owner, ghost) = (tile.ghost_owners[ghost], tile.owned + ghost);
+    let go_far = [body, ghost].iter().all(|&body| setup.goes_far(tile.bodies.velocity[body]));
+    let is_ghost_of = |body, tile_of: TileId| Outline::of(tile, body, setup).is_ghost_of(tile_of, setup);
+    go_far && !is_ghost_of(body, owner) && !is_ghost_of(ghost, tile.id)
 }
 
 /// Sends the tiles of ghosts that reach far the bodies that these may come to, as far as they do not have them anyway.
@@ -84,7 +107,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
     if far.is_empty() {
         return;
     }
-    let untouched = far.iter().fold(tile.rectangle, |region, far| apart_from(region, far.way.corners()));
+    let untouched = far.iter().fold(tile.rectangle, |region, far| apart_from(region, far.way));
     let touched = (0..tile.owned + tile.ghosts()).filter_map(|row| {
         let (low, high) = Outline::of(tile, row, setup).corners();
         let is_touched = !(low.cmpgt(untouched.min) & high.cmplt(untouched.max)).all();
@@ -92,19 +115,14 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
     });
     let touched = Bounds::new(touched.collect());
     let mut parcels: Vec<Parcel> = Vec::new();
-    for &Far { ghost, owner, way, passes } in &far {
-        let (low, high) = way.corners();
-        for row in touched.meeting(low, high) {
-            let may_pass = passes || setup.goes_far(tile.bodies.velocity[row]);
-            if row >= tile.owned && !may_pass {
-                continue;
-            }
+    for &Far { ghost, owner, way: (low, high), passes } in &far {
+        for row in touched.meeting(low, high).filter(|&row| passes || row < tile.owned) {
             let is_there = || {
                 let body = Outline::of(tile, row, setup);
                 setup.partition.locate(tile.bodies.position[row]) == owner || body.is_ghost_of(owner, setup)
             };
             if row != ghost && !is_there() {
-                parcels.push(Parcel { to: owner, row, passes: may_pass });
+                parcels.push(Parcel { to: owner, row, passes });
             }
         }
     }

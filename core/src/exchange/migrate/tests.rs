@@ -135,21 +135,16 @@ fn reaches(world: &World, tile: TileId, body: &Body, far: f64) -> bool {
 
 /// Whether a tile is to have a ghost of a body, whatever else there is.
 fn needs(world: &World, tile: TileId, body: &Body) -> bool {
-    reaches(world, tile, body, world.setup.halo_of(body.kind))
+    reaches(world, tile, body, world.setup.halo_of(body.kind, body.velocity))
 }
 
-/// Whether a body lies on the way of another that goes far.
-fn is_on_the_way(world: &World, body: &Body, far: &Body) -> bool {
-    world.setup.goes_far(far.velocity) && boxes_meet(world, body, far)
+/// Whether a body lies where another may come to that goes far or is large, with so much room in meters.
+fn is_reached(world: &World, body: &Body, far: &Body, room: f64) -> bool {
+    (world.setup.goes_far(far.velocity) || world.setup.is_large(far.kind)) && boxes_meet(world, body, far, room)
 }
 
-/// Whether a large body may come to another.
-fn is_come_to(world: &World, body: &Body, large: &Body) -> bool {
-    world.setup.is_large(large.kind) && boxes_meet(world, body, large)
-}
-
-fn boxes_meet(world: &World, a: &Body, b: &Body) -> bool {
-    (a.position - b.position).abs().cmple(grown(world, a) + grown(world, b)).all()
+fn boxes_meet(world: &World, a: &Body, b: &Body, room: f64) -> bool {
+    (a.position - b.position).abs().cmple(grown(world, a) + grown(world, b) + DVec2::splat(room)).all()
 }
 
 /// Who owns what, and who has a ghost of whom, after a step, given the bodies before it.
@@ -164,8 +159,7 @@ fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
         }
         // A tile that owns nothing solves nothing, and nobody's copy is kept.
         let owned: Vec<_> = tile.bodies.id[..tile.owned].iter().map(|id| before[id]).collect();
-        let on_a_way =
-            |body: &Body| owned.iter().any(|far| is_on_the_way(world, body, far) || is_come_to(world, body, far));
+        let is_reached = |body: &Body, room: f64| owned.iter().any(|far| is_reached(world, body, far, room));
         let others: Vec<_> = before
             .values()
             .map(|body| (grid.locate(body.position), body))
@@ -178,7 +172,9 @@ fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
         // Two that go far and meet where nobody is may have nobody to tell of it.
         let may_lack = |body: &Body| world.setup.goes_far(body.velocity);
         let is_wanted = |&(owner, body): &(TileId, &Body)| {
-            needs(world, tile.id, body) || on_a_way(body) && (!may_lack(body) || is_held(owner, body))
+            needs(world, tile.id, body)
+                || is_reached(body, -ROUNDING) && !may_lack(body)
+                || is_reached(body, ROUNDING) && is_held(owner, body)
         };
         let mut wanted: Vec<_> = others.into_iter().filter(is_wanted).collect();
         wanted.sort_by_key(|&(owner, body)| (owner, body.id));
@@ -190,6 +186,9 @@ fn check_owners_and_ghosts(world: &World, before: &BTreeMap<GlobalId, Body>) {
         }
     }
 }
+
+/// More than the rounding of a place in a tile's own coordinates, in meters.
+const ROUNDING: f64 = 1e-4;
 
 type PairOfNames = (GlobalId, GlobalId);
 
@@ -212,14 +211,22 @@ fn without_impulses(contact: &Contact) -> Contact {
     contact
 }
 
-/// Both owners hold every border contact, with one geometry, and in `substep` with the same impulses.
-fn check_border_contacts(world: &World) -> usize {
+/// Both owners hold every border contact, with one geometry, and in `substep` with the same impulses, given the bodies before the step.
+/// Of two that go far and are known to each other's tiles by hearsay alone, one owner may.
+fn check_border_contacts(world: &World, before: &BTreeMap<GlobalId, Body>) -> usize {
     let tiles: Vec<_> = world.tile_states().iter().map(|tile| (tile.id, contacts_of(tile))).collect();
     let mut border = 0;
     for (id, contacts) in &tiles {
         for (pair, (peer, contact)) in contacts {
             let Some(peer) = peer.filter(|peer| peer != id) else { continue };
             let theirs = &tiles[peer.0 as usize].1;
+            let far = [pair.0, pair.1].map(|id| &before[&id]);
+            // A tile reaches what it owns.
+            let are_known =
+                far.iter().all(|body| needs(world, peer, body)) || far.iter().all(|body| needs(world, *id, body));
+            if far.iter().all(|body| world.setup.goes_far(body.velocity)) && !are_known {
+                continue;
+            }
             let (back, other) =
                 theirs.get(pair).unwrap_or_else(|| panic!("tile {peer} does not see {pair:?} of tile {id}"));
             assert_eq!(*back, Some(*id));
@@ -294,17 +301,18 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             // What was only on the way of somebody is told of by another than its owner, as it is.
             let mut owners = before;
             if !needs(world, tile.id, body) {
+                let is_come_to =
+                    |large: &Body| world.setup.is_large(large.kind) && boxes_meet(world, body, large, ROUNDING);
                 let mut owned = tile.bodies.id[..tile.owned].iter();
-                let lasts =
-                    !world.setup.goes_far(body.velocity) && owned.any(|large| is_come_to(world, body, &bodies[large]));
-                if !lasts {
+                if !owned.any(|large| is_come_to(&bodies[large])) {
                     owners = &[];
                 }
-                // Who came or has new neighbours may know otherwise of what was.
+                // Who came or has new neighbours may know otherwise of what was, and of who goes far it may be another that tells.
                 let moved = |push: &Push| {
                     [push.pair.0, push.pair.1].iter().zip(push.owners).any(|(id, owner)| owner_now(id) != owner)
                 };
-                if owners.iter().filter(of_body).any(moved) {
+                let is_far = world.setup.goes_far(body.velocity);
+                if !owners.is_empty() && is_far || owners.iter().filter(of_body).any(moved) {
                     continue;
                 }
             }
@@ -345,7 +353,7 @@ proptest! {
             step(&mut world, &mut Loopback).unwrap();
             check_owners_and_ghosts(&world, &before);
             check_unseen(&world, &before, &stored);
-            check_border_contacts(&world);
+            check_border_contacts(&world, &before);
         }
     }
 
@@ -357,14 +365,18 @@ proptest! {
         let report = step(&mut cut, &mut Loopback).unwrap();
         // A static that only lies on the way of what goes far is forgotten where it is far from the tile.
         let goes_far = |id| scene.bodies.iter().any(|body| body.id == id && whole.setup.goes_far(body.velocity));
+        // And two that go far may meet where nobody is.
+        let is_lasting =
+            |(low, high): &PairOfNames| !(goes_far(*high) && (whole.setup.is_static(*low) || goes_far(*low)));
         let lasting = |world: &World| {
             let mut contacts = all_contacts(world);
-            contacts.retain(|(low, high), _| !(whole.setup.is_static(*low) && goes_far(*high)));
+            contacts.retain(|pair, _| is_lasting(pair));
             contacts
         };
         prop_assert_eq!(lasting(&cut), lasting(&whole));
-        prop_assert_eq!(report.contacts, counted.contacts, "each contact is counted once");
-        prop_assert_eq!(report.border_contacts * 2, check_border_contacts(&cut) as u64);
+        prop_assert!(report.contacts <= counted.contacts, "each contact is counted once");
+        let before = scene.bodies.iter().map(|body| (body.id, *body)).collect();
+        prop_assert!(report.border_contacts * 2 >= check_border_contacts(&cut, &before) as u64);
     }
 }
 
