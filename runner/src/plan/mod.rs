@@ -71,10 +71,14 @@ impl Output {
     }
 }
 
-fn scene_and_tiles(config: &Config) -> Result<(Scene, [u32; 2]), SceneError> {
-    let scene = Scene::open(&config.scene)?;
-    let tiles = tiles::tile_counts(config, &scene);
-    Ok((scene, tiles))
+/// The scene of a configuration, what that takes from the scene, and its tiles.
+fn open(config: &Config) -> Result<(Config, Scene, [u32; 2]), SceneError> {
+    let (scene, mut config) = (Scene::open(&config.scene)?, config.clone());
+    if let Some(file) = scene.file() {
+        config.params.large_radius = file.large_radius(config.params.margin_cap);
+    }
+    let tiles = tiles::tile_counts(&config, &scene);
+    Ok((config, scene, tiles))
 }
 
 impl Plan {
@@ -95,7 +99,7 @@ impl Plan {
     }
 
     fn begin(config: &Config, folder: Option<RunFolder>) -> Result<Self, RunError> {
-        let (scene, tiles) = scene_and_tiles(config)?;
+        let (config, scene, tiles) = open(config)?;
         Self::from_found(config, scene, tiles, Found::default(), folder.map(|folder| (folder, true)))
     }
 
@@ -105,8 +109,8 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new), and if what the folder holds is another run, or cannot be gone on with.
     pub fn going_on(config: &Config, folder: RunFolder) -> Result<Self, RunError> {
-        let (scene, tiles) = scene_and_tiles(config)?;
-        folder.check_same_run(config, tiles)?;
+        let (config, scene, tiles) = open(config)?;
+        folder.check_same_run(&config, tiles)?;
         // One that cannot be read counts as missing, unless nothing else tells how far the run came.
         let (steps, ended) = (config.run.steps, Ended::read(folder.path()));
         let (ended, unreadable) = ended.map_or_else(|error| (None, Some(error)), |ended| (ended, None));
@@ -160,14 +164,14 @@ impl Plan {
 
     /// `folder` is written to, and says whether the run begins there.
     fn from_found(
-        config: &Config,
+        config: Config,
         scene: Scene,
         tiles: [u32; 2],
         found: Found,
         folder: Option<(RunFolder, bool)>,
     ) -> Result<Self, RunError> {
         let transport = config.transport();
-        let first = tiles::first_partition(config, &scene, tiles)?;
+        let first = tiles::first_partition(&config, &scene, tiles)?;
         let partition = match found.snapshots.first() {
             Some(snapshot) => snapshot.partition(&first)?,
             None => first,
@@ -175,8 +179,8 @@ impl Plan {
         let params = config.params.clone();
         let blueprint = Blueprint { params, partition, kinds: scene.kinds(), statics: scene.statics().to_vec() };
         blueprint.check()?;
-        let threads = threads::of_each_rank(config);
-        memory::check(&blueprint, scene.bodies(), config, threads, folder.is_some().then_some(&config.output))?;
+        let threads = threads::of_each_rank(&config);
+        memory::check(&blueprint, scene.bodies(), &config, threads, folder.is_some().then_some(&config.output))?;
 
         let ranks = config.run.ranks;
         let weights = match found.snapshots.first() {
@@ -199,7 +203,6 @@ impl Plan {
             every: config.output,
             begins,
         });
-        let config = config.clone();
         Ok(Self {
             config,
             scene,

@@ -195,8 +195,8 @@ pub(crate) fn in_words([columns, rows]: [u32; 2], how: Option<Retile>) -> String
 /// The width of the halo in meters that the default is made with, which no change may bend: without what
 /// [`atoll_core::halo_width`] adds for rounding.
 fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
-    let radii = kinds.iter().map(|kind| f64::from(kind.shape.bounding_radius()));
-    radii.fold(0.0, f64::max) + f64::from(params.margin_cap)
+    let radii = kinds.iter().map(|kind| kind.shape.bounding_radius()).filter(|&radius| radius <= params.large_radius);
+    radii.map(f64::from).fold(0.0, f64::max) + f64::from(params.margin_cap)
 }
 
 /// About so many tiles.

@@ -11,6 +11,7 @@ mod entries;
 mod footer;
 mod inline;
 mod kinds;
+mod large;
 mod lines;
 mod parquet_file;
 mod parquet_rows;
@@ -67,6 +68,8 @@ pub struct SceneFile {
     static_ids: Vec<GlobalId>,
     rows: Rows,
     count: u64,
+    /// How many there are of each kind, if they were counted.
+    by_kind: Vec<u64>,
 }
 
 /// Where bodies come from.
@@ -127,7 +130,19 @@ impl SceneFile {
             }
         };
         let statics = description.statics.clone();
-        Ok((Self { path: path.to_owned(), digest, description, statics, static_ids, rows, count: 0 }, told))
+        Ok((
+            Self {
+                path: path.to_owned(),
+                digest,
+                description,
+                statics,
+                static_ids,
+                rows,
+                count: 0,
+                by_kind: Vec::new(),
+            },
+            told,
+        ))
     }
 
     /// Compares the rows there are with what the text says.
@@ -138,23 +153,36 @@ impl SceneFile {
         Err(SceneError::bad(&self.path, place, reason))
     }
 
-    /// Counts the bodies. Gives the greatest of their ids, if there are any and statics are to be called by it.
+    /// Counts the bodies, and where kinds differ much in size how many there are of each. Gives the greatest of their ids, if there are
+    /// any and statics are to be called by it.
     fn look_through(&mut self) -> Result<Option<u64>, SceneError> {
         let wants_last = !self.statics.is_empty() && !self.description.are_named;
+        let wants_kinds = large::may_be(self.kinds());
         let (count, last) = match &self.rows {
-            Rows::Parquet(parquet) if !wants_last => (parquet.rows, None),
-            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) => (parquet.rows, parquet.rows.checked_sub(1)),
+            Rows::Parquet(parquet) if !wants_last && !wants_kinds => (parquet.rows, None),
+            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) && !wants_kinds => {
+                (parquet.rows, parquet.rows.checked_sub(1))
+            }
             _ => {
-                let (mut count, mut last) = (0, None);
+                let (mut count, mut last, mut by_kind) = (0, None, vec![0; self.kinds().len()]);
                 for body in self.iter() {
+                    let body = body?;
                     count += 1;
-                    last = last.max(Some(body?.id.0));
+                    by_kind[body.kind.0 as usize] += 1;
+                    last = last.max(Some(body.id.0));
                 }
+                self.by_kind = by_kind;
                 (count, last)
             }
         };
         self.count = count;
         Ok(last)
+    }
+
+    /// The bounding radius in meters beyond which its bodies are few, and better not reckoned with in halos, with such a greatest
+    /// margin. Infinity if none are.
+    pub(crate) fn large_radius(&self, margin_cap: f32) -> f32 {
+        large::radius(self.kinds(), &self.by_kind, margin_cap)
     }
 
     /// Statics without ids of their own get those above all bodies.
