@@ -188,6 +188,47 @@ fn a_stack_over_a_border_sinks_no_deeper_than_one_beside_it() {
     }
 }
 
+/// Discs that fly from all sides at a ball fifty times their size, which reaches over many tiles and widens no halo.
+#[test]
+fn a_large_ball_is_met_as_anywhere() {
+    let mut scene = Scene::new(MIDDLE, 0.0);
+    scene.params.large_radius = 1.0;
+    let smooth = Material { friction: 0.0, ..Material::default() };
+    let [ball, disc] = [5.0, 0.1].map(|radius| scene.kind(Shape::circle(radius), smooth));
+    scene.body(ball, MIDDLE + DVec2::new(0.3, -0.7), Vec2::new(0.4, 0.3));
+    let middle = scene.last().position;
+    for k in 0..60 {
+        // Fast ones among them, of which each goes further in a step than it is wide.
+        let (angle, speed) = (f64::from(k) * std::f64::consts::TAU / 60.0, if k % 7 == 0 { 60.0 } else { 6.0 });
+        let outward = DVec2::from_angle(angle);
+        scene.body(disc, middle + outward * (5.1 + speed * 0.4), outward.as_vec2() * -speed as f32);
+    }
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let mut whole = scene.start_on((1, 1), exchange);
+        whole.run(60);
+        for grid in [(2, 2), (3, 5), (16, 16)] {
+            let mut sim = scene.start_on(grid, exchange);
+            let (momentum, size) = (sim.momentum(), sim.sum_of_momenta());
+            let mut on_borders = 0;
+            for _ in 0..60 {
+                sim.run(1);
+                on_borders += sim.report.border_contacts;
+            }
+            assert!(on_borders > 30, "{grid:?}, {exchange:?}: {on_borders} contacts on borders");
+            let drift = (sim.momentum() - momentum).length() / size;
+            let most = if exchange == Exchange::Substep { 1e-5 } else { 1e-3 };
+            assert!(drift < most, "{grid:?}, {exchange:?}: momentum drifted by {drift} of the sum of |p|");
+            let (bodies, alone) = (sim.bodies(), whole.bodies());
+            let error = (bodies[0].velocity - alone[0].velocity).length();
+            assert!(error < 3e-3, "{grid:?}, {exchange:?}: the ball is {error} m/s off");
+            let nearest = bodies[1..].iter().map(|body| (body.position - bodies[0].position).length());
+            let nearest = nearest.fold(f64::INFINITY, f64::min);
+            println!("{grid:?}, {exchange:?}: momentum drifts by {drift:.1e}, the ball is {error:.1e} m/s off");
+            assert!(nearest > 5.05, "{grid:?}, {exchange:?}: a disc is {nearest} m from the middle of the ball");
+        }
+    }
+}
+
 /// A stack over four borders with a top so heavy that what it presses with must come down to the floor within the step.
 #[test]
 fn a_stack_under_a_heavy_top_rests_over_its_borders() {

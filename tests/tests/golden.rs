@@ -99,10 +99,12 @@ struct World {
 }
 
 /// What no configuration has.
-const WORLDS: [World; 3] = [
+const WORLDS: [World; 5] = [
     World { name: "bouncing exchange=step", scene: bouncing, grid: (3, 2), exchange: Exchange::Step, steps: 120 },
     World { name: "bouncing exchange=substep", scene: bouncing, grid: (3, 2), exchange: Exchange::Substep, steps: 120 },
     World { name: "scales exchange=substep", scene: scales, grid: (2, 1), exchange: Exchange::Substep, steps: 200 },
+    World { name: "large exchange=step", scene: large, grid: (5, 4), exchange: Exchange::Step, steps: 200 },
+    World { name: "large exchange=substep", scene: large, grid: (5, 4), exchange: Exchange::Substep, steps: 200 },
 ];
 
 /// A case by name, as the golden file has it: the configuration, and what is set in it.
@@ -167,6 +169,13 @@ fn scales() -> Scene {
         let place = DVec2::new(0.2 + 0.22 * f64::from(k % 90), 10.5 + 0.25 * f64::from(k / 90));
         scene.body(kinds[1], place, Vec2::new(0.0, -10.0));
     }
+    scene
+}
+
+/// The same where that ball widens no halo.
+fn large() -> Scene {
+    let mut scene = scales();
+    scene.params.large_radius = 1.0;
     scene
 }
 

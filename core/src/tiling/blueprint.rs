@@ -83,7 +83,7 @@ pub(crate) struct Setup {
     static_names: Vec<GlobalId>,
     /// Bodies this near a tile's region may matter to it, in meters.
     pub(crate) halo_width: f64,
-    /// Bodies this near may that are large or go far; as wide where none is large.
+    /// Large bodies this near may; as wide where there are none.
     pub(crate) wide_halo: f64,
     /// A contact of bodies that both come this near a tile's region is solved there as well (see `exchange/overlap.rs`), in
     /// meters. None where each contact is solved by the owners of its bodies alone.
@@ -250,10 +250,13 @@ impl Setup {
         self.kind(kind).bounding_radius > self.params.large_radius
     }
 
-    /// How near a tile's region a body may matter to it, in meters. Who goes far may come to large ones.
+    /// How near a tile's region a body may matter to it, in meters. Who goes so far that it may come to large ones that are nobody's
+    /// ghost where it is reckons with those as well.
     #[inline(always)]
     pub(crate) fn halo_of(&self, kind: KindId, velocity: Vec2) -> f64 {
-        if self.is_large(kind) | self.goes_far(velocity) { self.wide_halo } else { self.halo_width }
+        let way = f64::from(velocity.abs().max_element() * self.params.dt);
+        let is_wide = self.is_large(kind) | (way > self.wide_halo - self.halo_width);
+        if is_wide { self.wide_halo } else { self.halo_width }
     }
 
     /// A body of a tile further inside than this neither leaves nor is anybody's ghost, in meters. `large` says whether any of them is.

@@ -16,6 +16,9 @@ const BODIES_PER_TILE: f64 = 8000.0;
 /// A tile of the default grid is at least this many halo widths wide; below, most of a tile's work would be ghosts.
 const HALOS_PER_TILE: f64 = 4.0;
 
+/// A world of fewer tiles is not cut through its large bodies: that costs more than it is worth.
+const TILES_THROUGH_LARGE: f64 = 4.0;
+
 /// Tiles that follow the bodies are cut from squares of which each is so many tiles wide where bodies are spread evenly: then four
 /// and sixteen of them can be joined where few are.
 const CUT_IN: u32 = 4;
@@ -27,8 +30,9 @@ pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
             return [1, 1]; // islands sleep within one tile only
         }
         let (low, high) = scene.domain();
-        let halo_width = halo_width(&scene.kinds(), &config.params);
         let tiles = scene.bodies() as f64 / BODIES_PER_TILE;
+        let large_radius = if tiles < TILES_THROUGH_LARGE { f32::INFINITY } else { config.params.large_radius };
+        let halo_width = halo_width(&scene.kinds(), &Params { large_radius, ..config.params.clone() });
         match config.run.retiling.map(|retiling| retiling.how) {
             None => default_counts(tiles, high - low, halo_width),
             // Cut from these as often as is usual, evenly spread bodies with some contacts fill tiles by half.
