@@ -222,7 +222,7 @@ mod tests {
             .filter(|at| is_figure(&before[*at]) && !changed.contains(at))
             .map(|at| before[at].as_str())
             .collect();
-        // Where the number of ranks comes from is part of that key.
-        assert_eq!(forgotten, ["ranks_asked_for: false,"]);
+        // Where the number of ranks comes from is part of that key, and which bodies are large is taken from the scene.
+        assert_eq!(forgotten, ["ranks_asked_for: false,", "large_radius: inf,"]);
     }
 }

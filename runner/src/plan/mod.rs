@@ -74,9 +74,7 @@ impl Output {
 /// The scene of a configuration, what that takes from the scene, and its tiles.
 fn open(config: &Config) -> Result<(Config, Scene, [u32; 2]), SceneError> {
     let (scene, mut config) = (Scene::open(&config.scene)?, config.clone());
-    if let Some(file) = scene.file() {
-        config.params.large_radius = file.large_radius(config.params.margin_cap);
-    }
+    config.params.large_radius = scene.large_radius(config.params.margin_cap);
     let tiles = tiles::tile_counts(&config, &scene);
     Ok((config, scene, tiles))
 }

@@ -11,6 +11,7 @@ pub(crate) mod file;
 pub(crate) mod import;
 mod junkyard;
 mod kind;
+mod large;
 mod lattice;
 mod pile;
 mod pyramids;
@@ -135,6 +136,12 @@ impl Scene {
             Source::Made { layout, .. } => layout.kinds(),
             Source::Read(file) => file.kinds().to_vec(),
         }
+    }
+
+    /// The bounding radius in meters beyond which bodies of this scene are few, and better not reckoned with in halos, with such a
+    /// greatest margin.
+    pub(crate) fn large_radius(&self, margin_cap: f32) -> f32 {
+        large::radius(&self.kinds(), self.file().and_then(SceneFile::by_kind), margin_cap)
     }
 
     /// What never moves. Of scenes that are made, these have the lowest ids.

@@ -11,7 +11,6 @@ mod entries;
 mod footer;
 mod inline;
 mod kinds;
-mod large;
 mod lines;
 mod parquet_file;
 mod parquet_rows;
@@ -69,7 +68,7 @@ pub struct SceneFile {
     rows: Rows,
     count: u64,
     /// How many there are of each kind, if they were counted.
-    by_kind: Vec<u64>,
+    by_kind: Option<Vec<u64>>,
 }
 
 /// Where bodies come from.
@@ -131,16 +130,7 @@ impl SceneFile {
         };
         let statics = description.statics.clone();
         Ok((
-            Self {
-                path: path.to_owned(),
-                digest,
-                description,
-                statics,
-                static_ids,
-                rows,
-                count: 0,
-                by_kind: Vec::new(),
-            },
+            Self { path: path.to_owned(), digest, description, statics, static_ids, rows, count: 0, by_kind: None },
             told,
         ))
     }
@@ -157,7 +147,7 @@ impl SceneFile {
     /// any and statics are to be called by it.
     fn look_through(&mut self) -> Result<Option<u64>, SceneError> {
         let wants_last = !self.statics.is_empty() && !self.description.are_named;
-        let wants_kinds = large::may_be(self.kinds());
+        let wants_kinds = super::large::may_be(self.kinds());
         let (count, last) = match &self.rows {
             Rows::Parquet(parquet) if !wants_last && !wants_kinds => (parquet.rows, None),
             Rows::Parquet(parquet) if !parquet.header.has(Column::Id) && !wants_kinds => {
@@ -171,7 +161,7 @@ impl SceneFile {
                     by_kind[body.kind.0 as usize] += 1;
                     last = last.max(Some(body.id.0));
                 }
-                self.by_kind = by_kind;
+                self.by_kind = Some(by_kind);
                 (count, last)
             }
         };
@@ -179,10 +169,9 @@ impl SceneFile {
         Ok(last)
     }
 
-    /// The bounding radius in meters beyond which its bodies are few, and better not reckoned with in halos, with such a greatest
-    /// margin. Infinity if none are.
-    pub(crate) fn large_radius(&self, margin_cap: f32) -> f32 {
-        large::radius(self.kinds(), &self.by_kind, margin_cap)
+    /// How many of its bodies there are of each kind, if that was counted.
+    pub(super) fn by_kind(&self) -> Option<&[u64]> {
+        self.by_kind.as_deref()
     }
 
     /// Statics without ids of their own get those above all bodies.
