@@ -71,7 +71,7 @@ impl Output {
     }
 }
 
-/// The scene of a configuration, what that takes from the scene, and its tiles.
+/// A configuration with what it takes from its scene, the scene, and its tiles.
 fn open(config: &Config) -> Result<(Config, Scene, [u32; 2]), SceneError> {
     let (scene, mut config) = (Scene::open(&config.scene)?, config.clone());
     config.params.large_radius = scene.large_radius(config.params.margin_cap);

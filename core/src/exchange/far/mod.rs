@@ -5,9 +5,9 @@
 //! first sync point, see [`Verdict::far`](crate::Verdict)), a second one follows: whoever has it as a ghost sends its tile what
 //! lies on its way. Halos stay as narrow as the slow and small bodies need them.
 //!
-//! Large bodies ([`Params::large_radius`](crate::Params)) stay for long where they are, and bodies rest between them and others: so
-//! of these their tile is told by their owners alone, with what they have of it that is unseen there. Of each other, and of statics,
-//! large bodies know by a halo and a reach of their own, as wide as the largest needs them.
+//! Large bodies ([`Params::large_radius`](crate::Params)) lie where they are for many steps, with small ones that rest on them and on
+//! others. So a small one is sent by its owner alone, with its unseen impulse. Of each other, of statics and of what goes far, large
+//! bodies and their tiles know by a halo that is as wide as the largest needs it.
 //!
 //! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands
 //! there; so whoever has gone far is held back, after the step, where it met a static.
@@ -47,26 +47,27 @@ fn far_rows(tile: &Tile, rows: Range<usize>, setup: &Setup) -> impl Iterator<Ite
     rows.filter(|&row| setup.goes_far(tile.bodies.velocity[row]))
 }
 
-/// A body for a tile that another belongs to, which reaches for it.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-struct Parcel {
-    to: TileId,
-    /// Among the sender's bodies.
-    row: usize,
-    /// Whether that other one is not large, but goes far.
-    passes: bool,
-}
-
 /// Rounding of a distance between two bodies' boxes as a tile computes it, at most, as part of how far off they are.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
-/// A ghost that reaches far, its tile, and how far it reaches.
+/// A ghost that reaches far, and its tile.
 struct Far {
     ghost: usize,
     owner: TileId,
-    /// Low and high corner.
+    /// Low and high corner of all that it may come to.
     way: (DVec2, DVec2),
+    /// Whether it is no large one, but goes far.
     passes: bool,
+}
+
+/// A body that is sent to the tile of one that reaches far.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Reached {
+    to: TileId,
+    /// Among the sender's bodies.
+    row: usize,
+    /// Whether what comes to it is no large one, but goes far.
+    in_passing: bool,
 }
 
 /// The ghosts of a tile that reach further than their own tile's halo.
@@ -114,7 +115,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
         is_touched.then_some((row, low, high))
     });
     let touched = Bounds::new(touched.collect());
-    let mut parcels: Vec<Parcel> = Vec::new();
+    let mut reached: Vec<Reached> = Vec::new();
     for &Far { ghost, owner, way: (low, high), passes } in &far {
         for row in touched.meeting(low, high).filter(|&row| passes || row < tile.owned) {
             let is_there = || {
@@ -122,16 +123,16 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
                 setup.partition.locate(tile.bodies.position[row]) == owner || body.is_ghost_of(owner, setup)
             };
             if row != ghost && !is_there() {
-                parcels.push(Parcel { to: owner, row, passes });
+                reached.push(Reached { to: owner, row, in_passing: passes });
             }
         }
     }
-    parcels.sort_unstable();
-    // What is told of those that stay counts.
-    parcels.dedup_by_key(|parcel| (parcel.to, parcel.row));
-    let mut unseen = vec![Unseen::default(); parcels.len()];
-    add_unseen(tile, &parcels, &mut unseen);
-    for (Parcel { to, row, .. }, unseen) in parcels.into_iter().zip(unseen) {
+    reached.sort_unstable();
+    // Who is reached by both kinds counts as reached by a large one.
+    reached.dedup_by_key(|body| (body.to, body.row));
+    let mut unseen = vec![Unseen::default(); reached.len()];
+    add_unseen(tile, &reached, &mut unseen);
+    for (Reached { to, row, .. }, unseen) in reached.into_iter().zip(unseen) {
         bag.address(tile.id, to);
         bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, padding: 0 });
     }

@@ -1,6 +1,6 @@
 //! What the tiles of large bodies do not see of those that they come to.
 
-use super::Parcel;
+use super::Reached;
 use crate::exchange::record::Unseen;
 use crate::model::contact::{Contact, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
@@ -8,17 +8,17 @@ use crate::tiling::tile::Tile;
 
 /// The owned bodies that large ones come to, and what of each is unseen by whom it is sent to.
 struct Sums<'a> {
-    parcels: &'a [Parcel],
+    reached: &'a [Reached],
     unseen: &'a mut [Unseen],
-    /// Of each owned body that is sent: its name, and its place among the parcels, ascending by names.
+    /// Of each that is sent its name, and its place among these, ascending by names.
     by_name: Vec<(GlobalId, usize)>,
 }
 
 /// Adds up the impulses of the last step for bodies that are sent to the tiles of large ones, and to no others: those of all their
 /// contacts but with bodies of that tile. Between the sync points contacts are known by slots where both bodies stayed, and by name.
-pub(super) fn add_unseen(tile: &Tile, parcels: &[Parcel], unseen: &mut [Unseen]) {
-    let lasting = parcels.iter().enumerate().filter(|(_, parcel)| !parcel.passes);
-    let mut by_name: Vec<_> = lasting.map(|(place, parcel)| (tile.bodies.id[parcel.row], place)).collect();
+pub(super) fn add_unseen(tile: &Tile, reached: &[Reached], unseen: &mut [Unseen]) {
+    let lasting = reached.iter().enumerate().filter(|(_, body)| !body.in_passing);
+    let mut by_name: Vec<_> = lasting.map(|(place, body)| (tile.bodies.id[body.row], place)).collect();
     if by_name.is_empty() {
         return;
     }
@@ -28,10 +28,10 @@ pub(super) fn add_unseen(tile: &Tile, parcels: &[Parcel], unseen: &mut [Unseen])
     owners.sort_unstable();
     let owner_of = |name: GlobalId| owners.binary_search_by_key(&name, |(id, _)| *id).ok().map(|place| owners[place].1);
     let mut is_lasting = vec![false; tile.owned];
-    by_name.iter().for_each(|&(_, place)| is_lasting[parcels[place].row] = true);
+    by_name.iter().for_each(|&(_, place)| is_lasting[reached[place].row] = true);
     let mut is_newcomer = vec![false; tile.owned];
     tile.newcomers.iter().for_each(|&index| is_newcomer[index as usize] = true);
-    let mut sums = Sums { parcels, unseen, by_name };
+    let mut sums = Sums { reached, unseen, by_name };
     let stays = |slot: Slot| match slot.kind() {
         SlotKind::Owned(index) => is_newcomer.get(index) == Some(&false),
         SlotKind::Ghost(_) => false,
@@ -55,7 +55,7 @@ impl Sums<'_> {
         for (name, partner, linear, angular) in [(a, owner_of_b, -linear, on_a), (b, owner_of_a, linear, on_b)] {
             let first = self.by_name.partition_point(|&(id, _)| id < name);
             for &(_, place) in self.by_name[first..].iter().take_while(|&&(id, _)| id == name) {
-                if partner != Some(self.parcels[place].to) {
+                if partner != Some(self.reached[place].to) {
                     self.unseen[place].add(linear, angular);
                 }
             }

@@ -31,13 +31,13 @@ pub(crate) use kinds::of_command as kind_of_command;
 pub(super) use row::{FARTHEST, is_turn};
 pub(super) use statics::chain_of;
 
-use super::{Place, SceneError};
+use super::{Place, SceneError, large};
 use atoll_core::{Body, GlobalId, Kind, StaticBody};
 use csv_rows::CsvRows;
 use description::{Bodies, Description};
 use glam::DVec2;
 use parquet_file::ParquetFile;
-use parquet_rows::ParquetRows;
+use parquet_rows::{ParquetRows, Wanted};
 use row::{Column, Scenery};
 use std::fs::{self, File};
 use std::io::Read;
@@ -147,12 +147,9 @@ impl SceneFile {
     /// any and statics are to be called by it.
     fn look_through(&mut self) -> Result<Option<u64>, SceneError> {
         let wants_last = !self.statics.is_empty() && !self.description.are_named;
-        let wants_kinds = super::large::may_be(self.kinds());
         let (count, last) = match &self.rows {
-            Rows::Parquet(parquet) if !wants_last && !wants_kinds => (parquet.rows, None),
-            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) && !wants_kinds => {
-                (parquet.rows, parquet.rows.checked_sub(1))
-            }
+            Rows::Parquet(parquet) if !wants_last => (parquet.rows, None),
+            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) => (parquet.rows, parquet.rows.checked_sub(1)),
             _ => {
                 let (mut count, mut last, mut by_kind) = (0, None, vec![0; self.kinds().len()]);
                 for body in self.iter() {
@@ -166,6 +163,14 @@ impl SceneFile {
             }
         };
         self.count = count;
+        if let (None, Rows::Parquet(parquet), true) = (&self.by_kind, &self.rows, large::may_be(self.kinds())) {
+            let mut by_kind = vec![0; self.kinds().len()];
+            for body in ParquetRows::open(parquet, Wanted::Columns(&[Column::Kind]), |_, _| true)? {
+                // What is of no kind is told of when its row is read.
+                by_kind.get_mut(body?.kind.0 as usize).into_iter().for_each(|count| *count += 1);
+            }
+            self.by_kind = Some(by_kind);
+        }
         Ok(last)
     }
 
@@ -262,7 +267,9 @@ impl SceneFile {
         let all: BodyIter<'a> = match &self.rows {
             Rows::Inline(bodies) => Box::new(bodies.iter().copied().map(Ok)),
             Rows::Csv(path) => or_error(CsvRows::open(self.scenery(path))),
-            Rows::Parquet(parquet) => or_error(ParquetRows::open(parquet, Some(self.scenery(&parquet.path)), &meets)),
+            Rows::Parquet(parquet) => {
+                or_error(ParquetRows::open(parquet, Wanted::Bodies(self.scenery(&parquet.path)), &meets))
+            }
         };
         let is_near = move |body: &Result<Body, SceneError>| {
             body.as_ref().map_or(true, |body| meets(body.position, body.position))
@@ -273,7 +280,9 @@ impl SceneFile {
     /// Where all bodies are.
     pub(super) fn places(&self) -> Box<dyn Iterator<Item = Result<DVec2, SceneError>> + '_> {
         let all = match &self.rows {
-            Rows::Parquet(parquet) => or_error(ParquetRows::open(parquet, None, |_, _| true)),
+            Rows::Parquet(parquet) => {
+                or_error(ParquetRows::open(parquet, Wanted::Columns(&[Column::X, Column::Y]), |_, _| true))
+            }
             _ => self.iter(),
         };
         Box::new(all.map(|body| body.map(|body| body.position)))

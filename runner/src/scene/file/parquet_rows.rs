@@ -21,14 +21,21 @@ const CHUNK: usize = 4096;
 /// The rows of some groups. They can be read on after a row that cannot be.
 pub(super) struct ParquetRows<'a> {
     parquet: &'a ParquetFile,
-    /// What bodies are checked against; none where only their places are wanted.
-    scenery: Option<Scenery<'a>>,
+    wanted: Wanted<'a>,
     file: Arc<File>,
     /// Groups that are wanted and not begun, and the first row of each.
     groups: vec::IntoIter<(usize, u64)>,
     open: Option<OpenGroup>,
     ready: vec::IntoIter<Result<Body, SceneError>>,
     failed: bool,
+}
+
+/// What of its rows.
+pub(super) enum Wanted<'a> {
+    /// All, and what bodies are checked against.
+    Bodies(Scenery<'a>),
+    /// These columns, of bodies at rest.
+    Columns(&'static [Column]),
 }
 
 /// A group of which some rows are read.
@@ -46,16 +53,16 @@ impl<'a> ParquetRows<'a> {
     /// If the file cannot be opened any more.
     pub(super) fn open(
         parquet: &'a ParquetFile,
-        scenery: Option<Scenery<'a>>,
+        wanted: Wanted<'a>,
         meets: impl Fn(DVec2, DVec2) -> bool,
     ) -> Result<Self, SceneError> {
         // Its own, as those who share an open file share a place in it.
         let file = File::open(&parquet.path).map_err(|error| SceneError::read(&parquet.path, "these bodies", error))?;
-        let wanted =
+        let groups =
             parquet.groups().filter(|(.., group)| parquet.extent(group).is_none_or(|(low, high)| meets(low, high)));
-        let groups: Vec<(usize, u64)> = wanted.map(|(place, first, _)| (place, first)).collect();
+        let groups: Vec<(usize, u64)> = groups.map(|(place, first, _)| (place, first)).collect();
         let (groups, ready) = (groups.into_iter(), Vec::new().into_iter());
-        Ok(Self { parquet, scenery, file: Arc::new(file), groups, open: None, ready, failed: false })
+        Ok(Self { parquet, wanted, file: Arc::new(file), groups, open: None, ready, failed: false })
     }
 
     /// Makes the next rows ready; says whether there are any.
@@ -104,9 +111,12 @@ impl<'a> ParquetRows<'a> {
                 vy: number(Column::Vy) as f32,
                 omega: number(Column::Omega) as f32,
             };
-            bodies.push(match &self.scenery {
-                Some(scenery) => scenery.body(row, None, turned, &values),
-                None => Ok(Body::at_rest(GlobalId(row), KindId(0), DVec2::new(values.x, values.y))),
+            bodies.push(match &self.wanted {
+                Wanted::Bodies(scenery) => scenery.body(row, None, turned, &values),
+                Wanted::Columns(_) => {
+                    let kind = KindId(u32::try_from(values.kind).unwrap_or(u32::MAX));
+                    Ok(Body::at_rest(GlobalId(row), kind, DVec2::new(values.x, values.y)))
+                }
             });
         }
         open.next += count as u64;
@@ -118,8 +128,10 @@ impl<'a> ParquetRows<'a> {
     fn begin(&self, group: usize, first: u64) -> Result<OpenGroup, SceneError> {
         let metadata = self.parquet.metadata.row_group(group);
         let rows = metadata.num_rows().cast_unsigned();
-        let only_places = self.scenery.is_none();
-        let wanted = |column: &Column| !only_places || matches!(column, Column::X | Column::Y);
+        let wanted = |column: &Column| match self.wanted {
+            Wanted::Bodies(_) => true,
+            Wanted::Columns(columns) => columns.contains(column),
+        };
         let mut columns = Vec::new();
         for column in Column::ALL.into_iter().filter(wanted) {
             let Some(place) = self.parquet.header.places[column as usize] else { continue };

@@ -71,6 +71,18 @@ fn what_is_written_is_read_bit_for_bit() {
 }
 
 #[test]
+fn bodies_of_each_kind_are_counted_where_kinds_differ_in_size() {
+    let mut bodies = many();
+    bodies.iter_mut().for_each(|body| body.kind = KindId(u32::from(body.id.0.is_multiple_of(3000))));
+    let larger = bodies.iter().filter(|body| body.kind == KindId(1)).count() as u64;
+    let folder = folder(&written(&bodies));
+    let path = folder.path().join("world.toml");
+    assert_eq!(SceneFile::open(&path).unwrap().by_kind(), None);
+    fs::write(&path, HEAD.replace("radius = 0.3", "radius = 3")).unwrap();
+    assert_eq!(SceneFile::open(&path).unwrap().by_kind(), Some(&[100_000 - larger, larger][..]));
+}
+
+#[test]
 fn groups_of_rows_that_are_elsewhere_are_passed_over() {
     let mut bodies = many();
     write::sort_in_space(&mut bodies, (DVec2::ZERO, DVec2::splat(1000.0)));
