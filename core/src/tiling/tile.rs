@@ -209,6 +209,17 @@ impl Tile {
         self.unseen.len()
     }
 
+    /// Tells, once owned bodies have come and gone, of which slots contacts still mean whom they meant: others are known by name.
+    pub(crate) fn who_stays(&self) -> impl Fn(Slot) -> bool + use<> {
+        let mut is_newcomer = vec![false; self.owned];
+        self.newcomers.iter().for_each(|&index| is_newcomer[index as usize] = true);
+        move |slot| match slot.kind() {
+            SlotKind::Owned(index) => is_newcomer.get(index) == Some(&false),
+            SlotKind::Ghost(_) => false,
+            SlotKind::Static(_) => true,
+        }
+    }
+
     /// Index into [`Tile::bodies`] of a slot.
     #[inline(always)]
     pub(crate) fn index(&self, slot: Slot) -> usize {

@@ -29,14 +29,7 @@ pub(super) fn add_unseen(tile: &Tile, reached: &[Reached], unseen: &mut [Unseen]
     let owner_of = |name: GlobalId| owners.binary_search_by_key(&name, |(id, _)| *id).ok().map(|place| owners[place].1);
     let mut is_lasting = vec![false; tile.owned];
     by_name.iter().for_each(|&(_, place)| is_lasting[reached[place].row] = true);
-    let mut is_newcomer = vec![false; tile.owned];
-    tile.newcomers.iter().for_each(|&index| is_newcomer[index as usize] = true);
-    let mut sums = Sums { reached, unseen, by_name };
-    let stays = |slot: Slot| match slot.kind() {
-        SlotKind::Owned(index) => is_newcomer.get(index) == Some(&false),
-        SlotKind::Ghost(_) => false,
-        SlotKind::Static(_) => true,
-    };
+    let (mut sums, stays) = (Sums { reached, unseen, by_name }, tile.who_stays());
     let lasts = |slot: Slot| matches!(slot.kind(), SlotKind::Owned(index) if is_lasting[index]);
     for (key, contact) in tile.contacts.iter().filter(|(key, _)| stays(key.low()) && stays(key.high())) {
         if lasts(key.low()) || lasts(key.high()) {

@@ -35,13 +35,7 @@ pub(super) fn sort(tile: &mut Tile, setup: &Setup) {
 
 /// Renames the bodies of the contacts that serve on, and forgets the others.
 fn rename_contacts(tile: &mut Tile, new_place: &[u32]) {
-    let mut is_newcomer = vec![false; new_place.len()];
-    tile.newcomers.iter().for_each(|&index| is_newcomer[index as usize] = true);
-    let stays = |slot: Slot| match slot.kind() {
-        SlotKind::Owned(index) => is_newcomer.get(index) == Some(&false),
-        SlotKind::Ghost(_) => false,
-        SlotKind::Static(_) => true,
-    };
+    let stays = tile.who_stays();
     tile.contacts.retain(|key: PairKey| stays(key.low()) && stays(key.high()));
     tile.contacts.rename(|slot| match slot.kind() {
         SlotKind::Owned(index) => Slot::from_index(new_place[index] as usize, usize::MAX, 0),
