@@ -339,7 +339,7 @@ fn all_contacts(world: &World) -> BTreeMap<PairOfNames, Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(cases(96))]
+    #![proptest_config(cases(256))]
 
     #[test]
     fn owners_ghosts_and_border_contacts_are_as_defined(scene in any_scene(40, -10.0)) {

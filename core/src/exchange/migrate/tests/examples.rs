@@ -170,3 +170,31 @@ fn a_lost_message_is_noticed() {
     // A substep's refresh of the ghosts.
     assert_eq!(outcome((1, 2)), Err(StepError::Protocol { step: 1, tile: TileId(0) }));
 }
+
+#[test]
+fn a_pair_that_one_tile_knows_of_by_hearsay_ends_no_run() {
+    // Disc 4 goes over the tile of disc 3, which therefore tells its own tile of that one; there disc 2 meets it. The tile of disc 3
+    // hears nothing of disc 2.
+    let side = 3.86;
+    let partition = Partition::uniform(DVec2::ZERO, DVec2::new(4.0 * side, 5.0 * side), 4, 5).unwrap();
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let params = Params { exchange, ..Params::default() };
+        let kinds = vec![circle(1.0)];
+        let mut world =
+            World::whole(&Blueprint { params, partition: partition.clone(), kinds, statics: vec![] }).unwrap();
+        for (id, place, velocity) in [
+            (4, DVec2::new(7.80, 8.67), Vec2::new(-220.9, 300.5)),
+            (3, DVec2::new(2.71, 2.05), Vec2::new(172.6, 189.0)),
+            (2, DVec2::new(7.92, 9.80), Vec2::new(-106.5, -171.5)),
+        ] {
+            world.add(Body { velocity, ..disc(id, place.x, place.y, 0.0) }).unwrap();
+        }
+        let pair = (GlobalId(2), GlobalId(3));
+        step(&mut world, &mut Loopback).unwrap();
+        let known = world.tile_states().iter().filter(|tile| contacts_of(tile).contains_key(&pair)).count();
+        assert_eq!(known, 1, "{exchange:?}: the pair is not that of which this is to tell");
+        for _ in 0..10 {
+            step(&mut world, &mut Loopback).unwrap();
+        }
+    }
+}
