@@ -37,16 +37,16 @@ impl Blueprint {
     }
 }
 
-/// The largest bounding radius of a dynamic body that is not [large](Params::large_radius), in meters.
-pub(crate) fn usual_radius(kinds: &[Kind], params: &Params) -> f32 {
+/// The largest bounding radius of a dynamic body that is no greater than this, in meters.
+pub(crate) fn largest_radius(kinds: &[Kind], up_to: f32) -> f32 {
     let radii = kinds.iter().map(|kind| kind.shape.bounding_radius());
-    radii.filter(|&radius| radius <= params.large_radius).fold(0.0, |most, radius| math::max(radius, most))
+    radii.filter(|&radius| radius <= up_to).fold(0.0, |most, radius| math::max(radius, most))
 }
 
 /// The width of the halo in meters, a little more than what the ghost rule asks for: bodies this near a tile's region may
 /// matter to it. The largest bounding radius of a dynamic body that is not [large](Params::large_radius) and the greatest margin.
 pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
-    width_for(usual_radius(kinds, params), params)
+    width_for(largest_radius(kinds, params.large_radius), params)
 }
 
 /// The same for the largest bounding radius.
@@ -147,8 +147,7 @@ impl Setup {
             return Err(SetupError::BadStatic { id: pair[0] });
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
-        let all = Params { large_radius: f32::INFINITY, ..params.clone() };
-        let wide_halo = self::halo_width(&blueprint.kinds, &all);
+        let wide_halo = width_for(largest_radius(&blueprint.kinds, f32::INFINITY), &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
         let compounds = kinds.iter().any(KindRow::is_compound);
@@ -255,7 +254,7 @@ impl Setup {
     #[inline(always)]
     pub(crate) fn halo_of(&self, kind: KindId, velocity: Vec2) -> f64 {
         let way = f64::from(velocity.abs().max_element() * self.params.dt);
-        let is_wide = self.is_large(kind) | (way > self.wide_halo - self.halo_width);
+        let is_wide = self.is_large(kind) | (self.goes_far(velocity) & (way > self.wide_halo - self.halo_width));
         if is_wide { self.wide_halo } else { self.halo_width }
     }
 

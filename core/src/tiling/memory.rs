@@ -1,6 +1,6 @@
 //! How much memory a world takes, before it is built.
 
-use super::blueprint::{Blueprint, halo_width, usual_radius};
+use super::blueprint::{Blueprint, halo_width, largest_radius};
 use super::tile::Tile;
 use crate::model::id::TileId;
 
@@ -14,7 +14,7 @@ impl Blueprint {
     /// the scene `rooms`, with 5000 bodies in a tile and with 450 tiles for a body.
     pub fn memory(&self, bodies: u64) -> u64 {
         let reach = halo_width(&self.kinds, &self.params)
-            + f64::from(usual_radius(&self.kinds, &self.params))
+            + f64::from(largest_radius(&self.kinds, self.params.large_radius))
             + 0.5 * f64::from(self.params.margin_floor + self.params.margin_cap);
         let partition = &self.partition;
         // How many tiles of that size a body's grown AABB and the halo around it meet, along an axis.

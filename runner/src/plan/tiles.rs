@@ -4,7 +4,7 @@
 use crate::config::{Config, MOST_TILES, Retile, Retiling};
 use crate::error::RunError;
 use crate::scene::Scene;
-use atoll_core::{Adaptive, Census, Kind, Params, Partition, SetupError, TileId, World};
+use atoll_core::{Adaptive, Census, Kind, Partition, SetupError, TileId, World};
 use bytemuck::AnyBitPattern;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -32,7 +32,7 @@ pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
         let (low, high) = scene.domain();
         let tiles = scene.bodies() as f64 / BODIES_PER_TILE;
         let large_radius = if tiles < TILES_THROUGH_LARGE { f32::INFINITY } else { config.params.large_radius };
-        let halo_width = halo_width(&scene.kinds(), &Params { large_radius, ..config.params.clone() });
+        let halo_width = halo_width(&scene.kinds(), large_radius, config.params.margin_cap);
         match config.run.retiling.map(|retiling| retiling.how) {
             None => default_counts(tiles, high - low, halo_width),
             // Cut from these as often as is usual, evenly spread bodies with some contacts fill tiles by half.
@@ -198,9 +198,9 @@ pub(crate) fn in_words([columns, rows]: [u32; 2], how: Option<Retile>) -> String
 
 /// The width of the halo in meters that the default is made with, which no change may bend: without what
 /// [`atoll_core::halo_width`] adds for rounding.
-fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
-    let radii = kinds.iter().map(|kind| kind.shape.bounding_radius()).filter(|&radius| radius <= params.large_radius);
-    radii.map(f64::from).fold(0.0, f64::max) + f64::from(params.margin_cap)
+fn halo_width(kinds: &[Kind], large_radius: f32, margin_cap: f32) -> f64 {
+    let radii = kinds.iter().map(|kind| kind.shape.bounding_radius()).filter(|&radius| radius <= large_radius);
+    radii.map(f64::from).fold(0.0, f64::max) + f64::from(margin_cap)
 }
 
 /// About so many tiles.

@@ -34,7 +34,7 @@ use crate::tiling::tile::Tile;
 use bounds::Bounds;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
-use unseen::add_unseen;
+use unseen::unseen_of;
 
 /// Whether some bodies' velocities take one of them far. Without a branch, as hardly ever does one.
 fn any(velocities: &[Vec2], setup: &Setup) -> bool {
@@ -130,8 +130,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
     reached.sort_unstable();
     // Who is reached by both kinds counts as reached by a large one.
     reached.dedup_by_key(|body| (body.to, body.row));
-    let mut unseen = vec![Unseen::default(); reached.len()];
-    add_unseen(tile, &reached, &mut unseen);
+    let unseen = unseen_of(tile, &reached);
     for (Reached { to, row, .. }, unseen) in reached.into_iter().zip(unseen) {
         bag.address(tile.id, to);
         bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, padding: 0 });

@@ -9,18 +9,19 @@ use crate::tiling::tile::Tile;
 /// The owned bodies that large ones come to, and what of each is unseen by whom it is sent to.
 struct Sums<'a> {
     reached: &'a [Reached],
-    unseen: &'a mut [Unseen],
+    unseen: Vec<Unseen>,
     /// Of each that is sent its name, and its place among these, ascending by names.
     by_name: Vec<(GlobalId, usize)>,
 }
 
 /// Adds up the impulses of the last step for bodies that are sent to the tiles of large ones, and to no others: those of all their
 /// contacts but with bodies of that tile. Between the sync points contacts are known by slots where both bodies stayed, and by name.
-pub(super) fn add_unseen(tile: &Tile, reached: &[Reached], unseen: &mut [Unseen]) {
+pub(super) fn unseen_of(tile: &Tile, reached: &[Reached]) -> Vec<Unseen> {
+    let unseen = vec![Unseen::default(); reached.len()];
     let lasting = reached.iter().enumerate().filter(|(_, body)| !body.in_passing);
     let mut by_name: Vec<_> = lasting.map(|(place, body)| (tile.bodies.id[body.row], place)).collect();
     if by_name.is_empty() {
-        return;
+        return unseen;
     }
     by_name.sort_unstable();
     let ghosts = tile.owned..tile.owned + tile.ghosts();
@@ -39,6 +40,7 @@ pub(super) fn add_unseen(tile: &Tile, reached: &[Reached], unseen: &mut [Unseen]
     for (pair, contact) in tile.strays.own() {
         sums.add(pair, contact, [owner_of(pair.0), owner_of(pair.1)]);
     }
+    sums.unseen
 }
 
 impl Sums<'_> {

@@ -370,8 +370,13 @@ proptest! {
             contacts
         };
         prop_assert_eq!(lasting(&cut), lasting(&whole));
-        prop_assert!(report.contacts <= counted.contacts, "each contact is counted once");
         let before = scene.bodies.iter().map(|body| (body.id, *body)).collect();
-        prop_assert!(report.border_contacts * 2 >= check_border_contacts(&cut, &before) as u64);
+        let held = check_border_contacts(&cut, &before) as u64;
+        if all_contacts(&whole).keys().all(|(low, high)| !(goes_far(*low) && goes_far(*high))) {
+            prop_assert_eq!(report.contacts, counted.contacts, "each contact is counted once");
+            prop_assert_eq!(report.border_contacts * 2, held);
+        } else {
+            prop_assert!(report.contacts <= counted.contacts && report.border_contacts * 2 >= held);
+        }
     }
 }

@@ -163,7 +163,10 @@ impl SceneFile {
             }
         };
         self.count = count;
-        if let (None, Rows::Parquet(parquet), true) = (&self.by_kind, &self.rows, large::may_be(self.kinds())) {
+        if self.by_kind.is_none()
+            && large::may_be(self.kinds())
+            && let Rows::Parquet(parquet) = &self.rows
+        {
             let mut by_kind = vec![0; self.kinds().len()];
             for body in ParquetRows::open(parquet, Wanted::Columns(&[Column::Kind]), |_, _| true)? {
                 // What is of no kind is told of when its row is read.
