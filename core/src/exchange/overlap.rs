@@ -13,6 +13,7 @@ use crate::exchange::rim::RimBody;
 use crate::model::id::TileId;
 use crate::model::params::{Exchange, Ghosts, Params};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::partition::Surroundings;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 
@@ -67,8 +68,14 @@ impl Outline {
     }
 
     /// The tiles that have it as a ghost, or own it.
-    pub(crate) fn reached(&self, setup: &Setup) -> impl Iterator<Item = TileId> {
-        setup.partition.reached(self.place, self.half, self.halo)
+    #[inline]
+    pub(crate) fn reached<'a>(
+        &self,
+        setup: &'a Setup,
+        around: &'a Surroundings,
+    ) -> impl Iterator<Item = TileId> + use<'a> {
+        let half = self.half.as_dvec2() + DVec2::splat(self.halo);
+        around.met(&setup.partition, self.place - half, self.place + half)
     }
 
     /// Whether all that its box meets is a ghost of that tile, whoever knows it, or lives there.

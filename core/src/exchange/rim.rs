@@ -40,9 +40,16 @@ impl Rim {
     /// That of a tile, if it is not known yet.
     pub(crate) fn find(tile: &mut Tile, setup: &Setup) {
         let Tile { rim, bodies, region, owned, .. } = tile;
-        if !rim.is_known {
-            rim.bodies.clear();
-            rim.bodies.extend((0..*owned).filter_map(|i| RimBody::of(bodies.get(i), i as u32, region, setup)));
+        if rim.is_known {
+            return;
         }
+        // Most are so far inside that their place alone tells.
+        let interior = region.shrunk(setup.inset(false));
+        let may_be = |&i: &usize| {
+            !interior.contains(bodies.position[i]) || setup.goes_far(bodies.velocity[i]) || setup.is_large(bodies.kind[i])
+        };
+        let of = |i| RimBody::of(bodies.get(i), i as u32, region, setup);
+        rim.bodies.clear();
+        rim.bodies.extend((0..*owned).filter(may_be).filter_map(of));
     }
 }

@@ -19,6 +19,7 @@ use crate::exchange::rim::Rim;
 use crate::model::body::Body;
 use crate::model::id::TileId;
 use crate::tiling::blueprint::Setup;
+use crate::tiling::partition::Surroundings;
 use crate::tiling::tile::Tile;
 
 /// Buffers of [`send`] and [`receive`], shared by all tiles of a thread.
@@ -34,6 +35,8 @@ pub(crate) struct MigrateWork {
     contacts: Vec<(TileId, ContactRecord)>,
     /// What is sent, by destination.
     parcels: Vec<Parcel>,
+    /// The tiles around.
+    around: Surroundings,
     arrivals: Vec<Body>,
     ghosts: receive::Ghosts,
 }
@@ -136,6 +139,7 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     Rim::find(tile, setup);
     tile.rim.is_known = false;
     let partition = &setup.partition;
+    work.around.look_around(partition, tile.id, 2.0 * setup.inset(false));
     for (place, rim) in (0..).zip(&tile.rim.bodies) {
         let position = rim.body.position;
         let owner = if tile.region.contains(position) { tile.id } else { partition.locate(position) };
@@ -143,7 +147,7 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
         tile.counts.far |= setup.goes_far(rim.body.velocity)
             || setup.is_large(rim.body.kind) && !outline.is_within_halo_of(owner, setup);
         let first_send = work.sends.len() as u32;
-        for target in outline.reached(setup).filter(|&target| target != owner) {
+        for target in outline.reached(setup, &work.around).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);
             work.sends.push(Send { rim: place, target, near, unseen: Unseen::default() });
         }

@@ -5,6 +5,7 @@ mod bisection;
 mod census;
 mod forest;
 mod grid;
+mod surroundings;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -20,6 +21,7 @@ use crate::model::id::TileId;
 use forest::Forest;
 use glam::{DVec2, Vec2};
 use grid::{Grid, Span};
+pub(crate) use surroundings::Surroundings;
 
 /// How the domain is cut into tiles.
 ///
