@@ -46,7 +46,9 @@ impl Rim {
         // Most are so far inside that their place alone tells.
         let interior = region.shrunk(setup.inset(false));
         let may_be = |&i: &usize| {
-            !interior.contains(bodies.position[i]) || setup.goes_far(bodies.velocity[i]) || setup.is_large(bodies.kind[i])
+            !interior.contains(bodies.position[i])
+                || setup.goes_far(bodies.velocity[i])
+                || setup.is_large(bodies.kind[i])
         };
         let of = |i| RimBody::of(bodies.get(i), i as u32, region, setup);
         rim.bodies.clear();

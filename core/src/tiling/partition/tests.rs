@@ -1,6 +1,6 @@
 //! Owners and regions against each other and against trying every tile.
 
-use super::{Adaptive, Bisector, Load, Partition, Region, Tally};
+use super::{Adaptive, Bisector, Load, Partition, Region, Surroundings, Tally};
 use crate::model::error::SetupError;
 use crate::model::id::TileId;
 use crate::testing::cases;
@@ -122,6 +122,12 @@ proptest! {
         let reached: Vec<_> = partition.reached(point, half, reach).collect();
         prop_assert_eq!(&reached, &tiles(&partition).filter(meets).collect::<Vec<_>>());
         prop_assert!(reached.contains(&partition.locate(point)));
+        // And so has whoever has looked around from any tile.
+        let mut around = Surroundings::default();
+        for tile in tiles(&partition) {
+            around.look_around(&partition, tile, 2.0 * size.min_element());
+            prop_assert_eq!(&reached, &around.met(&partition, low, high).collect::<Vec<_>>());
+        }
         prop_assert!(tiles(&partition).all(|tile| reached.contains(&tile) == partition.reaches(tile, point, half, reach)));
     }
 
