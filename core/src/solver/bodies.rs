@@ -17,6 +17,13 @@ use glam::Vec2;
 /// written down; this leaves 1e-12 of what an impulse would do, and that is taken back in every substep.
 const FROZEN: f32 = 1_048_576.0;
 
+/// The contacts with statics whose surface moves: which, the static, and who touches it.
+fn carrying<'a>(tile: &'a Tile, contacts: &'a [Pair], setup: &'a Setup) -> impl Iterator<Item = (u32, u32, u32)> + 'a {
+    let dynamic = (tile.owned + tile.ghosts()) as u32;
+    let sides = (0..).zip(contacts).flat_map(|(contact, &[a, b])| [(contact, a, b), (contact, b, a)]);
+    sides.filter(move |&(_, body, _)| body >= dynamic && setup.drives(tile.bodies.kind[body as usize]))
+}
+
 /// Bodies with contacts, batch by batch, in the order of the tile's bodies within each.
 #[derive(Default, Debug)]
 pub(crate) struct SolverBodies {
@@ -164,16 +171,18 @@ impl SolverBodies {
 
     /// Carriers are nodes behind all others, known by places behind all bodies of the tile.
     fn number_carriers(&mut self, tile: &Tile, contacts: &[Pair], setup: &Setup) {
-        for (contact, &[a, b]) in (0..).zip(contacts) {
-            for (body, other) in [(a, b), (b, a)] {
-                let is_static = self.node[body as usize] == GraphNode::STATIC;
-                if is_static && setup.drives(tile.bodies.kind[body as usize]) {
-                    let partner = self.node[other as usize].number().expect("one of a contact's bodies moves");
-                    self.node.push(GraphNode::new((self.touched.len() + self.carriers.len()) as u32));
-                    self.carriers.push(Carrier { contact, body, partner });
-                }
-            }
+        for (contact, body, other) in carrying(tile, contacts, setup) {
+            let partner = self.node[other as usize].number().expect("one of a contact's bodies moves");
+            self.node.push(GraphNode::new((self.touched.len() + self.carriers.len()) as u32));
+            self.carriers.push(Carrier { contact, body, partner });
         }
+    }
+
+    /// Whether the carriers of these contacts are those that were numbered: another tile may have as many bodies, and contacts of the
+    /// same, and yet other statics.
+    pub(crate) fn has_carriers_of(&self, tile: &Tile, contacts: &[Pair], setup: &Setup) -> bool {
+        let known = self.carriers.iter().map(|carrier| (carrier.contact, carrier.body));
+        !setup.any_drives() || carrying(tile, contacts, setup).map(|(contact, body, _)| (contact, body)).eq(known)
     }
 
     /// Who touches a static whose surface moves: as nodes, one for each carrier, which belongs to their islands.

@@ -95,7 +95,9 @@ impl Solver {
         };
         // Who sleeps may change though contacts do not.
         match self.arranged.as_ref().filter(|_| !setup.params.sleep && contacts.are_between_the_same()) {
-            Some(arranged) if is_same(arranged) => arranged.islands,
+            Some(arranged) if is_same(arranged) && self.bodies.has_carriers_of(tile, &contacts.bodies, setup) => {
+                arranged.islands
+            }
             _ => {
                 let islands = self.arrange_anew(tile, &contacts.bodies, sent, keeps_rows, setup, team);
                 self.colors = 0;
@@ -297,6 +299,31 @@ mod tests {
         }
         world.add(Body::at_rest(GlobalId(50), KindId(0), DVec2::new(4.2, 8.0))).unwrap();
         world
+    }
+
+    #[test]
+    fn who_carries_is_asked_in_every_tile() {
+        let params = Params { gravity: Vec2::new(0.0, -10.0), ..Params::default() };
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::new(40.0, 10.0), 4, 1).unwrap();
+        let floor = |tile: u32| {
+            let mut kind = rectangle(8.0, 1.0);
+            kind.material.surface_speed = [0.0, 1.0, 0.0, -2.0][tile as usize];
+            StaticBody::new(GlobalId(u64::from(tile)), kind, DVec2::new(f64::from(10 * tile + 5), 1.0))
+        };
+        let statics = (0..4).map(floor).collect();
+        let blueprint = Blueprint { params, partition, kinds: vec![rectangle(1.0, 1.0)], statics };
+        let mut world = World::whole(&blueprint).unwrap();
+        for tile in 0..4_u32 {
+            let place = DVec2::new(f64::from(10 * tile + 5), 2.0);
+            world.add(Body::at_rest(GlobalId(u64::from(tile) + 4), KindId(0), place)).unwrap();
+        }
+        // All four have a box on a floor: the same contacts of as many bodies, but two of the floors are belts.
+        (0..60).for_each(|_| assert_eq!(step(&mut world, &mut Loopback).unwrap().contacts, 4));
+        let mut speeds: Vec<(GlobalId, f32)> = world.bodies().map(|body| (body.id, body.velocity.x)).collect();
+        speeds.sort_by_key(|(id, _)| *id);
+        for ((id, speed), expected) in speeds.into_iter().zip([0.0, 1.0, 0.0, -2.0]) {
+            assert!((speed - expected).abs() < 0.01, "{id:?}: {speed} and not {expected}");
+        }
     }
 
     #[test]
