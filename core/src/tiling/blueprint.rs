@@ -11,7 +11,9 @@ use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
 use crate::tiling::partition::Partition;
+use crate::tiling::terrain::{Rows, Terrain};
 use glam::{DVec2, Vec2};
+use std::sync::Arc;
 
 /// Everything about a world but its dynamic bodies. Every rank must be given the same.
 #[derive(Clone, PartialEq, Debug)]
@@ -79,6 +81,8 @@ pub(crate) struct Setup {
     paths: Vec<Option<Path>>,
     /// For each of them whether its surface moves; empty where none does.
     driving: Vec<bool>,
+    /// Where they stand.
+    pub(crate) terrain: Arc<Terrain>,
     /// Their names, sorted.
     static_names: Vec<GlobalId>,
     /// Bodies this near a tile's region may matter to it, in meters.
@@ -147,6 +151,11 @@ impl Setup {
             return Err(SetupError::BadStatic { id: pair[0] });
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
+        let boxes = blueprint.statics.iter().zip(&statics).map(|(fixed, body)| {
+            let half = kinds[body.kind.0 as usize].half_extents(body.rotation).as_dvec2();
+            fixed.path.is_none().then(|| [body.position - half, body.position + half])
+        });
+        let terrain = Arc::new(Terrain::new(boxes, halo_width));
         let wide_halo = width_for(largest_radius(&blueprint.kinds, f32::INFINITY), &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
@@ -171,6 +180,7 @@ impl Setup {
             statics,
             paths,
             driving,
+            terrain,
             static_names,
             params,
         })
@@ -279,8 +289,18 @@ impl Setup {
     /// The statics that a tile must know: those that reach its region grown by the halo of the largest; where it solves contacts of
     /// ghosts, by three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
-        let reach = if self.overlap.is_some() { 3.0 * self.wide_halo } else { self.wide_halo };
-        let reaches = |row: u32, body: &Body| match self.path(row) {
+        let (region, mut rows) = (self.partition.region(tile), Rows::default());
+        // Rounding decides nothing here.
+        let reach = DVec2::splat(1.001 * self.reach_of_statics());
+        self.terrain.meeting(region.min - reach, region.max + reach, |row| rows.insert(row));
+        self.terrain.at_large().iter().for_each(|&row| rows.insert(row));
+        rows.drain().filter(|&row| self.static_reaches(row, tile)).collect()
+    }
+
+    /// Whether a static is one of [these](Self::statics_of).
+    pub(crate) fn static_reaches(&self, row: u32, tile: TileId) -> bool {
+        let (body, reach) = (&self.statics[row as usize], self.reach_of_statics());
+        match self.path(row) {
             None => {
                 let half = self.kind(body.kind).half_extents(body.rotation);
                 self.partition.reaches(tile, body.position, half, reach)
@@ -291,8 +311,12 @@ impl Setup {
                 let [least, most] = path.extent().map(|moved| body.position + moved);
                 self.partition.region(tile).meets(least - bound, most + bound)
             }
-        };
-        (0..).zip(&self.statics).filter(|&(row, body)| reaches(row, body)).map(|(row, _)| row).collect()
+        }
+    }
+
+    /// How near a tile's region it must know statics, in meters.
+    fn reach_of_statics(&self) -> f64 {
+        if self.overlap.is_some() { 3.0 * self.wide_halo } else { self.wide_halo }
     }
 
     /// How a static moves, if it does.
@@ -307,6 +331,13 @@ impl Setup {
         let Course { position, rotation, velocity, angular_velocity } =
             path.course(body.position, body.rotation, step, self.params.dt);
         Body { position, rotation, velocity, angular_velocity, ..body }
+    }
+
+    /// The low and the high corner of a static's box as a step begins.
+    pub(crate) fn static_box(&self, row: u32, step: u64) -> [DVec2; 2] {
+        let fixed = self.static_at(row, step);
+        let half = self.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
+        [fixed.position - half, fixed.position + half]
     }
 
     /// All statics as a step begins, by their rows.

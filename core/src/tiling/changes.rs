@@ -2,6 +2,7 @@
 //! before the tile is stepped, all together, so that one of many costs next to nothing.
 
 use super::blueprint::Setup;
+use super::statics::Near;
 use super::tile::Tile;
 use crate::model::body::Body;
 use crate::model::contact::{PairKey, Slot, SlotKind};
@@ -149,7 +150,7 @@ impl Tile {
             sleep: self.sleep.clone(),
             violation: self.violation,
             changes: self.changes.clone(),
-            ..Self::with_statics(self.id, self.statics.clone(), setup)
+            ..self.emptied(setup)
         };
         copy.settle();
         Settled::Copy(Box::new(copy))
@@ -211,8 +212,9 @@ impl Tile {
 
     /// Goes on with a setup that has more kinds: statics are of other rows, and where the halo became wider more of them matter.
     pub(crate) fn follow_kinds(&mut self, setup: &Setup) {
-        let statics = setup.statics_of(self.id);
-        let before = std::mem::replace(&mut self.statics, statics);
+        self.reached = setup.statics_of(self.id);
+        self.near = Near::default();
+        let before = std::mem::replace(&mut self.statics, self.reached.clone());
         // None of those before is missing.
         self.contacts.renumber(|slot| match slot.kind() {
             SlotKind::Static(number) => {

@@ -5,4 +5,6 @@ pub(crate) mod changes;
 mod memory;
 pub(crate) mod partition;
 pub(crate) mod regroup;
+pub(crate) mod statics;
+pub(crate) mod terrain;
 pub(crate) mod tile;

@@ -15,6 +15,7 @@ use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::changes::Changes;
 use crate::tiling::partition::Region;
+use crate::tiling::statics::Near;
 use std::time::Duration;
 
 /// The unit of physics: one step of a tile is a function of its state and of the messages it received.
@@ -41,10 +42,12 @@ pub(crate) struct Tile {
     pub(crate) unseen: Vec<Unseen>,
     /// One per ghost, ascending.
     pub(crate) ghost_owners: Vec<TileId>,
-    /// Rows of the setup's statics.
+    /// Rows of the setup's statics, ascending: those that its bodies may come to in this step.
     pub(crate) statics: Vec<u32>,
-    /// Those from the next step on, where the tile's borders have moved since the last.
-    pub(crate) next_statics: Option<Vec<u32>>,
+    /// Of all that reach its region.
+    pub(crate) reached: Vec<u32>,
+    /// Where its bodies are, if statics are many.
+    pub(crate) near: Near,
     /// What was solved last, and from the narrow phase on what is to be solved. Between the first sync point and that those of newcomers
     /// and ghosts mean nothing.
     pub(crate) contacts: ContactCache,
@@ -95,11 +98,11 @@ pub(crate) enum Fault {
 
 impl Tile {
     pub(crate) fn new(id: TileId, setup: &Setup) -> Self {
-        Self::with_statics(id, setup.statics_of(id), setup)
+        Self::within(id, setup.statics_of(id), setup)
     }
 
-    /// An empty tile whose statics are known already.
-    pub(crate) fn with_statics(id: TileId, statics: Vec<u32>, setup: &Setup) -> Self {
+    /// An empty tile of which it is known already which statics reach it.
+    pub(crate) fn within(id: TileId, reached: Vec<u32>, setup: &Setup) -> Self {
         let (region, rectangle) = (setup.partition.region(id), setup.partition.rectangle(id));
         let quadtree = || Box::new(Quadtree::new(rectangle.size().as_vec2().to_array()));
         Self {
@@ -115,8 +118,9 @@ impl Tile {
             rim: Rim::default(),
             unseen: Vec::new(),
             ghost_owners: Vec::new(),
-            statics,
-            next_statics: None,
+            statics: reached.clone(),
+            reached,
+            near: Near::default(),
             contacts: ContactCache::default(),
             strays: Strays::default(),
             sleep: Sleep::default(),
@@ -131,8 +135,12 @@ impl Tile {
     pub(crate) fn copy_bodies(&self, setup: &Setup) -> Self {
         let mut bodies = self.bodies.clone();
         bodies.truncate(self.owned);
-        let empty = Self::with_statics(self.id, self.statics.clone(), setup);
-        Self { bodies, owned: self.owned, violation: self.violation, ..empty }
+        Self { bodies, owned: self.owned, violation: self.violation, ..self.emptied(setup) }
+    }
+
+    /// An empty tile that knows the same statics.
+    pub(crate) fn emptied(&self, setup: &Setup) -> Self {
+        Self { statics: self.statics.clone(), ..Self::within(self.id, self.reached.clone(), setup) }
     }
 
     /// Whether it owns nothing: then a step has nothing to do here.
@@ -166,15 +174,15 @@ impl Tile {
 
     /// Gives the tile another region. Whom it owns and what it remembers is settled with the next step, as if all bodies had moved.
     pub(crate) fn move_borders(&mut self, setup: &Setup) {
-        let Self { region, interior, rectangle, quadtree, .. } = Self::with_statics(self.id, Vec::new(), setup);
+        let Self { region, interior, rectangle, quadtree, .. } = Self::within(self.id, Vec::new(), setup);
         let is_same = region == self.region;
         (self.region, self.interior, self.rectangle) = (region, interior, rectangle);
         // A neighbour's border may have moved where this one's have not.
         self.rim.is_known = false;
         if !is_same {
             self.quadtree = quadtree;
-            let statics = setup.statics_of(self.id);
-            self.next_statics = (statics != self.statics).then_some(statics);
+            self.reached = setup.statics_of(self.id);
+            self.near = Near::default();
         }
     }
 
@@ -182,27 +190,6 @@ impl Tile {
     pub(crate) fn find_interior(&mut self, setup: &Setup) {
         let large = setup.has_large() && self.bodies.kind[..self.owned].iter().any(|&kind| setup.is_large(kind));
         self.interior = self.region.shrunk(setup.inset(large));
-    }
-
-    /// Takes in the statics of a region that has changed: contacts go on with those that the tile still knows. Before the statics
-    /// are put behind the bodies.
-    pub(crate) fn change_statics(&mut self) {
-        let Some(statics) = self.next_statics.take() else { return };
-        let known = std::mem::replace(&mut self.statics, statics);
-        let number = |slot: Slot| match slot.kind() {
-            SlotKind::Static(old) => self.statics.binary_search(&known[old]).map(|new| Slot::from_index(new, 0, 0)),
-            _ => Ok(slot),
-        };
-        // Both lists ascend, so the contacts stay in order.
-        self.contacts.retain(|key| number(key.high()).is_ok());
-        self.contacts.renumber(|slot| number(slot).unwrap_or(slot));
-    }
-
-    /// Puts the statics behind owned bodies and ghosts, as they are at the beginning of a step.
-    pub(crate) fn push_statics(&mut self, setup: &Setup, step: u64) {
-        for &row in &self.statics {
-            self.bodies.push(setup.static_at(row, step));
-        }
     }
 
     pub(crate) fn ghosts(&self) -> usize {

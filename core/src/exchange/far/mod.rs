@@ -30,6 +30,7 @@ use crate::model::id::TileId;
 use crate::model::math::max;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
+use crate::tiling::terrain::Rows;
 use crate::tiling::tile::Tile;
 use bounds::Bounds;
 use glam::{DVec2, Vec2};
@@ -160,8 +161,8 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
             (owner, ghost.body, ghost.unseen, owner != message.from)
         }));
     }
-    let owned = tile.owned;
-    if !ghosts.is_empty() {
+    let (owned, has_more) = (tile.owned, !ghosts.is_empty());
+    if has_more {
         let known = tile.ghost_owners.iter().zip(&tile.unseen).zip(owned..);
         ghosts.extend(known.map(|((&owner, &unseen), row)| (owner, tile.bodies.get(row), unseen, false)));
         ghosts.sort_unstable_by_key(|(owner, body, _, is_hearsay)| (*owner, body.id, *is_hearsay));
@@ -175,24 +176,41 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
             tile.ghost_owners.push(owner);
             tile.unseen.push(unseen);
         }
-        tile.push_statics(setup, step);
     }
     let dynamic = owned + tile.ghosts();
-    let Some(speed) =
-        far_rows(tile, 0..dynamic, setup).map(|row| tile.bodies.velocity[row].abs().max_element()).reduce(max)
-    else {
+    let fastest =
+        far_rows(tile, 0..dynamic, setup).map(|row| tile.bodies.velocity[row].abs().max_element()).reduce(max);
+    if fastest.is_none() && !has_more {
         return;
-    };
+    }
+    tile.bodies.truncate(dynamic);
+    let mut met = Rows::default();
+    if let Some(speed) = fastest {
+        find_on_the_way(tile, speed, setup, step, &mut met);
+    }
+    let on_the_way: Vec<u32> = met.drain().collect();
+    on_the_way.iter().for_each(|&row| met.insert(row));
+    tile.meet_statics(met, setup);
+    tile.push_statics(setup, step);
+    for row in on_the_way {
+        if tile.statics.binary_search(&row).is_err() {
+            tile.bodies.push(setup.static_at(row, step));
+        }
+    }
+}
+
+/// Adds the statics that a tile's bodies and ghosts may come to, the fastest of which has this speed along an axis.
+fn find_on_the_way(tile: &Tile, speed: f32, setup: &Setup, step: u64, met: &mut Rows) {
     // Whoever is hit may go twice as far as who hits, whichever way.
     let reach = DVec2::splat(2.0 * f64::from(speed * setup.params.dt) + setup.halo_width);
     let corners = |(low, high): (DVec2, DVec2), place: &DVec2| (low.min(*place), high.max(*place));
-    let (low, high) = tile.bodies.position[..dynamic].iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), corners);
+    let (low, high) = tile.bodies.position.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), corners);
     let (low, high) = (low - reach, high + reach);
-    for (row, fixed) in (0..).zip(setup.statics_at(step)) {
-        let half = setup.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
-        let is_met = (fixed.position - half).cmple(high).all() && (fixed.position + half).cmpge(low).all();
-        if is_met && tile.statics.binary_search(&row).is_err() {
-            tile.bodies.push(fixed);
+    setup.terrain.meeting(low, high, |row| met.insert(row));
+    for &row in setup.terrain.at_large() {
+        let [own_low, own_high] = setup.static_box(row, step);
+        if own_low.cmple(high).all() && own_high.cmpge(low).all() {
+            met.insert(row);
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::terrain::Rows;
 use crate::tiling::tile::Tile;
 
 /// Ghosts as they come in, and in order.
@@ -30,7 +31,6 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     }
     tile.counts.migrations = arrivals.len() as u64;
     settle(tile, arrivals);
-    tile.change_statics();
     for message in mail.messages() {
         for record in message.contacts {
             let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
@@ -48,6 +48,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
         tile.find_interior(setup);
     }
     take_ghosts(tile, mail, &mut work.ghosts, setup);
+    tile.meet_statics(Rows::default(), setup);
     tile.push_statics(setup, step);
 }
 

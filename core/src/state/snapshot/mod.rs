@@ -176,7 +176,7 @@ impl World {
     /// unchanged. Never panics, and allocates in proportion to the bytes given.
     pub fn restore(&mut self, tile: TileId, block: &[u8]) -> Result<(), RestoreError> {
         let place = self.place_of(tile).ok_or(RestoreError::NotHere { tile })?;
-        let (restored, saved) = read(tile, self.tile_states()[place].statics.clone(), block, &self.setup)?;
+        let (restored, saved) = read(tile, self.tile_states()[place].reached.clone(), block, &self.setup)?;
         let hashes = restored.hashes();
         if hashes != saved {
             return Err(RestoreError::Hashes { tile, saved, restored: hashes });
@@ -192,8 +192,8 @@ impl World {
     }
 }
 
-/// The columns of a block, in their order.
-fn columns(tile: &Tile) -> [&[u8]; 10] {
+/// The columns of a block, in their order, with these keys of the contacts.
+fn columns<'a>(tile: &'a Tile, keys: &'a [PairKey]) -> [&'a [u8]; 10] {
     let Tile { bodies, owned, ghost_owners, contacts, sleep, .. } = tile;
     let dynamic = *owned + tile.ghosts();
     [
@@ -205,20 +205,20 @@ fn columns(tile: &Tile) -> [&[u8]; 10] {
         cast_slice(&bodies.kind[..dynamic]),
         cast_slice(sleep.still()),
         cast_slice(ghost_owners),
-        cast_slice(&contacts.keys),
+        cast_slice(keys),
         cast_slice(&contacts.contacts),
     ]
 }
 
 /// Bytes of a tile's block.
 fn length(tile: &Tile) -> usize {
-    HEADER + columns(tile).iter().map(|column| column.len()).sum::<usize>()
+    HEADER + columns(tile, &tile.contacts.keys).iter().map(|column| column.len()).sum::<usize>()
 }
 
 fn save(tile: &Tile, hashes: Hashes, block: &mut [u8]) -> SavedTile {
     let mut header = Header::of(tile, hashes);
     let mut at = HEADER;
-    for column in columns(tile) {
+    for column in columns(tile, &tile.keys_of_reached()) {
         block[at..at + column.len()].copy_from_slice(column);
         at += column.len();
     }
@@ -276,7 +276,7 @@ pub(crate) fn read(
     let contacts = ContactCache { keys: reader.column(contacts), contacts: reader.column(contacts) };
     statics.iter().for_each(|&row| bodies.push(setup.statics[row as usize]));
     let unseen = vec![Unseen::default(); dynamic - owned];
-    let empty = Tile::with_statics(tile, statics, setup);
+    let empty = Tile::within(tile, statics, setup);
     let restored = Tile { bodies, owned, unseen, ghost_owners, contacts, sleep, ..empty };
     check(&restored, setup)?;
     Ok((restored, header.hashes()))
