@@ -252,7 +252,7 @@ fn finalize(bench: &mut Bench<'_>) {
         solver.store_impulses(&mut b.tile.contacts);
         let ways = far::ways(b.tile, &solver.bodies, b.setup);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
-        far::hold(b.tile, &ways, b.setup);
+        far::hold(b.tile, &ways, b.setup, b.step);
         b.tile.count_rest(b.setup);
         if let Some(figures) = &mut b.figures {
             figures.add_bodies(b.tile, b.setup, b.team);

@@ -44,6 +44,15 @@ enum Found {
     Nothing,
 }
 
+/// The low and the high corner of all that one of some bodies may come to in this step, in a tile with this low corner.
+pub(crate) fn surroundings(bodies: &Bodies, row: usize, corner: DVec2, setup: &Setup) -> (DVec2, DVec2) {
+    let place = bodies.position[row];
+    let bound = f64::from(setup.kind(bodies.kind[row]).bounding_radius + setup.params.speculative_distance);
+    let rounding = ROUNDING * (place - corner).abs().max_element();
+    let reach = setup.margin(bodies.velocity[row]).as_dvec2() + DVec2::splat(bound + rounding);
+    (place - reach, place + reach)
+}
+
 impl Near {
     /// Adds the statics that some bodies may come to, of so many that reach their tile, whose low corner this is.
     fn find(&mut self, bodies: &Bodies, reached: usize, corner: DVec2, setup: &Setup, rows: &mut Rows) -> Found {
@@ -56,12 +65,9 @@ impl Near {
             self.squares.clear();
         }
         let mut looks = LOOKS * reached;
-        let all = bodies.position.iter().zip(&bodies.velocity).zip(&bodies.kind);
-        for ((&place, &velocity), &kind) in all {
-            let bound = f64::from(setup.kind(kind).bounding_radius + setup.params.speculative_distance);
-            let rounding = ROUNDING * (place - corner).abs().max_element();
-            let reach = setup.margin(velocity).as_dvec2() + DVec2::splat(bound + rounding);
-            let Some(squares) = setup.terrain.squares(place - reach, place + reach, looks) else {
+        for row in 0..bodies.len() {
+            let (low, high) = surroundings(bodies, row, corner, setup);
+            let Some(squares) = setup.terrain.squares(low, high, looks) else {
                 return self.give_up();
             };
             for square in squares {

@@ -1,7 +1,6 @@
 //! Upright rectangles around bodies, in an order in which those that meet another are found.
 
 use crate::tiling::blueprint::Setup;
-use crate::tiling::tile::Tile;
 use glam::DVec2;
 
 /// Some of a tile's bodies, with the low and high corners of upright rectangles around them: from left to right by the low ones.
@@ -23,20 +22,34 @@ impl Bounds {
         Self { all, right }
     }
 
-    pub(super) fn of_statics(tile: &Tile, setup: &Setup) -> Self {
-        let bound = |row: usize| {
-            let fixed = tile.bodies.get(row);
-            let half = setup.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
-            (row, fixed.position - half, fixed.position + half)
-        };
-        Self::new((tile.owned + tile.ghosts()..tile.bodies.len()).map(bound).collect())
-    }
-
     /// Those that meet a rectangle.
     pub(super) fn meeting(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + '_ {
         let first = self.right.partition_point(|&right| right < low.x);
         let near = self.all[first..].iter().take_while(move |(_, own, _)| own.x <= high.x);
         near.filter(move |(_, own_low, own_high)| own_low.cmple(high).all() && own_high.cmpge(low).all())
             .map(|(row, ..)| *row)
+    }
+}
+
+/// All statics as a step begins, in an order in which those that meet a rectangle are found.
+pub(super) struct StaticsByPlace<'a> {
+    setup: &'a Setup,
+    /// Those that the terrain does not find.
+    others: Bounds,
+}
+
+impl<'a> StaticsByPlace<'a> {
+    pub(super) fn new(setup: &'a Setup, step: u64) -> Self {
+        let bounds = |&row: &u32| {
+            let [low, high] = setup.static_box(row, step);
+            (row as usize, low, high)
+        };
+        Self { setup, others: Bounds::new(setup.terrain.at_large().iter().map(bounds).collect()) }
+    }
+
+    /// Hands over the rows of those whose box meets a rectangle, in any order, and maybe more than once.
+    pub(super) fn meeting(&self, low: DVec2, high: DVec2, mut found: impl FnMut(u32)) {
+        self.others.meeting(low, high).for_each(|row| found(row as u32));
+        self.setup.terrain.meeting(low, high, found);
     }
 }

@@ -1,7 +1,7 @@
 //! Who has gone far is held back, after the step, where it met a static.
 
 use super::any;
-use super::bounds::Bounds;
+use super::bounds::StaticsByPlace;
 use crate::collide::manifold::nearest;
 use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot, min};
@@ -23,10 +23,10 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     if !any(&bodies.velocity[..tile.owned + tile.ghosts()], setup) {
         return Vec::new();
     }
-    // Of others there are contacts. Who was hit may go as far as who hits.
-    if bodies.len() == tile.owned + tile.ghosts() {
+    if setup.statics.is_empty() {
         return Vec::new();
     }
+    // Of others there are contacts. Who was hit may go as far as who hits.
     let may = |&row: &usize| {
         let much = 0.5 * setup.kind(bodies.kind[row]).inner_radius;
         let moved = |moved: Vec2| moved.abs().max_element() > much;
@@ -39,23 +39,23 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
 /// next step has the contact, and goes on from there.
 ///
 /// Source: continuous collision against statics after the solver, as in Box2D v3 (E. Catto), which a body pays for with time.
-pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup) {
+pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
     if ways.is_empty() {
         return;
     }
     tile.rim.is_known = false;
-    let bounds = Bounds::of_statics(tile, setup);
+    let statics = StaticsByPlace::new(setup, step);
     for &Way { row, start } in ways {
         let whole = tile.bodies.position[row] - start;
         let body = tile.bodies.get(row);
         let (kind, way) = (setup.kind(body.kind), whole.as_vec2());
         let (half, middle) = (kind.half_extents(body.rotation).as_dvec2() + 0.5 * whole.abs(), start + 0.5 * whole);
         let mut part = 1.0_f32;
-        for fixed in bounds.meeting(middle - half, middle + half) {
-            let fixed = tile.bodies.get(fixed);
+        statics.meeting(middle - half, middle + half, |fixed| {
+            let fixed = setup.static_at(fixed, step);
             let (other, offset) = (setup.kind(fixed.kind), (fixed.position - start).as_vec2());
             part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
-        }
+        });
         tile.bodies.position[row] = start + whole * f64::from(part);
     }
 }

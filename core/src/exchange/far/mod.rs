@@ -27,12 +27,12 @@ use crate::exchange::record::{GhostRecord, Unseen};
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::id::TileId;
-use crate::model::math::max;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
+use crate::tiling::statics::surroundings;
 use crate::tiling::terrain::Rows;
 use crate::tiling::tile::Tile;
-use bounds::Bounds;
+use bounds::{Bounds, StaticsByPlace};
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 use unseen::unseen_of;
@@ -178,15 +178,14 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
         }
     }
     let dynamic = owned + tile.ghosts();
-    let fastest =
-        far_rows(tile, 0..dynamic, setup).map(|row| tile.bodies.velocity[row].abs().max_element()).reduce(max);
-    if fastest.is_none() && !has_more {
+    let go_far = any(&tile.bodies.velocity[..dynamic], setup);
+    if !go_far && !has_more {
         return;
     }
     tile.bodies.truncate(dynamic);
     let mut met = Rows::default();
-    if let Some(speed) = fastest {
-        find_on_the_way(tile, speed, setup, step, &mut met);
+    if go_far {
+        find_on_the_way(tile, setup, step, &mut met);
     }
     let on_the_way: Vec<u32> = met.drain().collect();
     on_the_way.iter().for_each(|&row| met.insert(row));
@@ -199,18 +198,13 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
     }
 }
 
-/// Adds the statics that a tile's bodies and ghosts may come to, the fastest of which has this speed along an axis.
-fn find_on_the_way(tile: &Tile, speed: f32, setup: &Setup, step: u64, met: &mut Rows) {
-    // Whoever is hit may go twice as far as who hits, whichever way.
-    let reach = DVec2::splat(2.0 * f64::from(speed * setup.params.dt) + setup.halo_width);
-    let corners = |(low, high): (DVec2, DVec2), place: &DVec2| (low.min(*place), high.max(*place));
-    let (low, high) = tile.bodies.position.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), corners);
-    let (low, high) = (low - reach, high + reach);
-    setup.terrain.meeting(low, high, |row| met.insert(row));
-    for &row in setup.terrain.at_large() {
-        let [own_low, own_high] = setup.static_box(row, step);
-        if own_low.cmple(high).all() && own_high.cmpge(low).all() {
-            met.insert(row);
+/// Adds the statics that those may come to who go far, or who are in nobody's usual halo here. The others do not leave the tile's own.
+fn find_on_the_way(tile: &Tile, setup: &Setup, step: u64, met: &mut Rows) {
+    let statics = StaticsByPlace::new(setup, step);
+    for row in 0..tile.bodies.len() {
+        if row >= tile.owned || setup.goes_far(tile.bodies.velocity[row]) {
+            let (low, high) = surroundings(&tile.bodies, row, tile.rectangle.min, setup);
+            statics.meeting(low, high, |row| met.insert(row));
         }
     }
 }
