@@ -185,7 +185,7 @@ mod tests {
             let (column, row) = (k % 20, k / 20);
             let place = DVec2::new(3.0 * f64::from(column) + f64::from(row % 3), 2.0 + 2.5 * f64::from(row));
             let mut kind = rectangle(1.6, 0.3);
-            kind.material.surface_speed = if k % 5 == 0 { 1.0 } else { 0.0 };
+            kind.material.surface_speed = if k.is_multiple_of(5) { 1.0 } else { 0.0 };
             let travel = Travel::Sine { amplitude: DVec2::new(2.0, 0.5), period: 1.5, phase: 0.0 };
             let path = (k % 61 == 3).then_some(Path { travel, ..Path::default() });
             StaticBody { path, ..StaticBody::new(GlobalId(u64::from(k)), kind, place) }
@@ -197,7 +197,7 @@ mod tests {
         for k in 0..90_u32 {
             let place = DVec2::new(0.65 * f64::from(k) + 0.7, 3.1 + 2.5 * f64::from(k * 7 % 20));
             let speed = if far > 0 && k % far == 1 { 60.0 } else { 4.0 };
-            let velocity = speed * Vec2::new(if k % 2 == 0 { 1.0 } else { -1.0 }, 0.3);
+            let velocity = speed * Vec2::new(if k.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.3);
             let body = Body { velocity, ..Body::at_rest(GlobalId(u64::from(k) + 441), KindId(k % 2), place) };
             assert!(world.add(body).unwrap());
         }
