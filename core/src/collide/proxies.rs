@@ -248,8 +248,8 @@ impl Load<'_> {
         let any_way = speed.mul(dt).max(V::splat(params.margin_floor)).min(V::splat(params.margin_cap));
         let margin_x = absolute(vx).mul(dt).max(any_way).mul(grows);
         let margin_y = absolute(vy).mul(dt).max(any_way).mul(grows);
-        let half_x = c.mul(width).add(s.mul(height)).add(rounding).add(margin_x);
-        let half_y = s.mul(width).add(c.mul(height)).add(rounding).add(margin_y);
+        let half_x = c.mul(width).add(s.mul(height)).add(rounding).min(bound).add(margin_x);
+        let half_y = s.mul(width).add(c.mul(height)).add(rounding).min(bound).add(margin_y);
         // Turning brings no point of a round body nearer.
         let sweep = not_round.mul(bound.mul(absolute(V::load(&spin)))).mul(dt);
         let reach = bound.add(sweep).add(V::splat(0.5 * params.speculative_distance));

@@ -2,6 +2,7 @@
 
 use crate::model::error::SetupError;
 use crate::model::id::KindId;
+use crate::model::math::min;
 use crate::model::params::Params;
 use crate::model::piece::{Piece, pieces};
 use crate::model::shape::Shape;
@@ -266,13 +267,14 @@ impl KindRow {
         self.pieces.len() > 1
     }
 
-    /// Half width and half height of the AABB at a rotation, in meters.
+    /// Half width and half height of an AABB at a rotation, in meters. Never more than the bounding radius, of which halos are made: a
+    /// rectangle around a polygon reaches further at its corners than the polygon.
     #[inline(always)]
     pub(crate) fn half_extents(&self, rotation: crate::model::math::Rot) -> Vec2 {
         let (c, s) = (rotation.c.abs(), rotation.s.abs());
         Vec2::new(
-            c * self.extent.x + s * self.extent.y + self.radius,
-            s * self.extent.x + c * self.extent.y + self.radius,
+            min(c * self.extent.x + s * self.extent.y + self.radius, self.bounding_radius),
+            min(s * self.extent.x + c * self.extent.y + self.radius, self.bounding_radius),
         )
     }
 }

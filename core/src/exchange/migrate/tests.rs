@@ -8,7 +8,7 @@ use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
 use crate::step;
-use crate::testing::{any_kind, any_rotation, cases, rectangle};
+use crate::testing::{any_convex, any_kind, any_rotation, cases, rectangle};
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
@@ -65,8 +65,9 @@ fn any_body(kinds: usize, domain: DVec2) -> impl Strategy<Value = Body> {
 }
 
 fn any_scene(bodies: usize, gravity: f32) -> impl Strategy<Value = Scene> {
-    let kinds = prop::collection::vec(any_kind(0.1, 4.0), 1..5);
-    let grid = (1_u32..=7, 1_u32..=5, 0.4_f64..4.0);
+    let kinds = prop::collection::vec(prop_oneof![2 => any_kind(0.1, 4.0), 1 => any_convex(0.1, 2.0)], 1..5);
+    // Some tiles have bodies that are too far inside to matter to others.
+    let grid = (1_u32..=7, 1_u32..=5, prop_oneof![2 => 0.4_f64..4.0, 1 => 4.0_f64..25.0]);
     let exchange = prop_oneof![Just(Exchange::Step), Just(Exchange::Substep)];
     let large = prop_oneof![Just(f32::INFINITY), 0.1_f32..2.0];
     (kinds, grid, (exchange, large), 1_u32..=5)
