@@ -95,8 +95,7 @@ impl Proxies {
     /// Statics have no margin. Those that move get room for all that they sweep in the step.
     fn sweep(&mut self, bodies: &Bodies, dynamic: usize, setup: &Setup) {
         for i in dynamic..bodies.len() {
-            let turns = setup.kind(bodies.kind[i]).bounding_radius * bodies.angular_velocity[i].abs();
-            let swept = setup.params.dt * (bodies.velocity[i].abs().max_element() + turns);
+            let swept = setup.swept(bodies.kind[i], bodies.velocity[i], bodies.angular_velocity[i]);
             self.extent[i] += swept;
             self.outline[i][0] += swept;
             self.outline[i][1] += swept;

@@ -11,7 +11,7 @@ use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
 use crate::tiling::partition::Partition;
-use crate::tiling::terrain::{Rows, Terrain};
+use crate::tiling::terrain::{Terrain, ascend};
 use glam::{DVec2, Vec2};
 use std::sync::Arc;
 
@@ -55,6 +55,15 @@ pub fn halo_width(kinds: &[Kind], params: &Params) -> f64 {
 fn width_for(radius: f32, params: &Params) -> f64 {
     // A thousandth more, so that the rounding of a sum never decides who sees a contact.
     f64::from(radius + params.margin_cap) * 1.001
+}
+
+/// The low and the high corner of all that a static ever comes to.
+fn box_of_static(body: &Body, kind: &KindRow, path: Option<&Path>) -> [DVec2; 2] {
+    let (half, [least, most]) = match path {
+        None => (kind.half_extents(body.rotation), [DVec2::ZERO; 2]),
+        Some(path) => (Vec2::splat(kind.bounding_radius), path.extent()),
+    };
+    [body.position + least - half.as_dvec2(), body.position + most + half.as_dvec2()]
 }
 
 /// Whether bodies of a kind do not touch all others.
@@ -151,11 +160,9 @@ impl Setup {
             return Err(SetupError::BadStatic { id: pair[0] });
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
-        let boxes = blueprint.statics.iter().zip(&statics).map(|(fixed, body)| {
-            let half = kinds[body.kind.0 as usize].half_extents(body.rotation).as_dvec2();
-            fixed.path.is_none().then(|| [body.position - half, body.position + half])
-        });
-        let terrain = Arc::new(Terrain::new(boxes, halo_width));
+        let boxes = blueprint.statics.iter().zip(&statics);
+        let boxes = boxes.map(|(fixed, body)| box_of_static(body, &kinds[body.kind.0 as usize], fixed.path.as_ref()));
+        let terrain = Arc::new(Terrain::new(boxes.collect(), halo_width));
         let wide_halo = width_for(largest_radius(&blueprint.kinds, f32::INFINITY), &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
@@ -286,36 +293,27 @@ impl Setup {
         self.kind(kind).half_extents(rotation) + self.margin(velocity)
     }
 
-    /// The statics that a tile must know: those that reach its region grown by the halo of the largest; where it solves contacts of
+    /// The statics that a tile may have to know: those that reach its region grown by the halo of the largest; where it solves contacts of
     /// ghosts, by three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {
-        let (region, mut rows) = (self.partition.region(tile), Rows::default());
+        let (region, mut rows) = (self.partition.region(tile), self.terrain.at_large().to_vec());
         // Rounding decides nothing here.
         let reach = DVec2::splat(1.001 * self.reach_of_statics());
-        self.terrain.meeting(region.min - reach, region.max + reach, |row| rows.insert(row));
-        self.terrain.at_large().iter().for_each(|&row| rows.insert(row));
-        rows.drain().filter(|&row| self.static_reaches(row, tile)).collect()
+        self.terrain.meeting(region.min - reach, region.max + reach, |row| rows.push(row));
+        ascend(&mut rows);
+        rows.retain(|&row| self.static_reaches(row, tile));
+        rows
     }
 
     /// Whether a static is one of [these](Self::statics_of).
     pub(crate) fn static_reaches(&self, row: u32, tile: TileId) -> bool {
-        let (body, reach) = (&self.statics[row as usize], self.reach_of_statics());
-        match self.path(row) {
-            None => {
-                let half = self.kind(body.kind).half_extents(body.rotation);
-                self.partition.reaches(tile, body.position, half, reach)
-            }
-            // Wherever it may be at any time, turned any way.
-            Some(path) => {
-                let bound = DVec2::splat(f64::from(self.kind(body.kind).bounding_radius) + reach);
-                let [least, most] = path.extent().map(|moved| body.position + moved);
-                self.partition.region(tile).meets(least - bound, most + bound)
-            }
-        }
+        let (body, reach) = (&self.statics[row as usize], DVec2::splat(self.reach_of_statics()));
+        let [low, high] = box_of_static(body, self.kind(body.kind), self.path(row));
+        self.partition.region(tile).meets(low - reach, high + reach)
     }
 
     /// How near a tile's region it must know statics, in meters.
-    fn reach_of_statics(&self) -> f64 {
+    pub(crate) fn reach_of_statics(&self) -> f64 {
         if self.overlap.is_some() { 3.0 * self.wide_halo } else { self.wide_halo }
     }
 
@@ -333,11 +331,18 @@ impl Setup {
         Body { position, rotation, velocity, angular_velocity, ..body }
     }
 
-    /// The low and the high corner of a static's box as a step begins.
+    /// The low and the high corner of all that a static sweeps in a step.
     pub(crate) fn static_box(&self, row: u32, step: u64) -> [DVec2; 2] {
         let fixed = self.static_at(row, step);
-        let half = self.kind(fixed.kind).half_extents(fixed.rotation).as_dvec2();
+        let swept = self.swept(fixed.kind, fixed.velocity, fixed.angular_velocity);
+        let half = (self.kind(fixed.kind).half_extents(fixed.rotation) + swept).as_dvec2();
         [fixed.position - half, fixed.position + half]
+    }
+
+    /// How much wider a static's AABB is, on each side, for the way that it goes in a step. In meters.
+    pub(crate) fn swept(&self, kind: KindId, velocity: Vec2, angular_velocity: f32) -> f32 {
+        let turns = self.kind(kind).bounding_radius * angular_velocity.abs();
+        self.params.dt * (velocity.abs().max_element() + turns)
     }
 
     /// All statics as a step begins, by their rows.

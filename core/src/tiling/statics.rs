@@ -2,7 +2,7 @@
 //! wide landscape costs what is near its bodies.
 
 use super::blueprint::Setup;
-use super::terrain::Rows;
+use super::terrain::ascend;
 use super::tile::Tile;
 use crate::model::body::Bodies;
 use crate::model::contact::{PairKey, Slot, SlotKind};
@@ -55,7 +55,7 @@ pub(crate) fn surroundings(bodies: &Bodies, row: usize, corner: DVec2, setup: &S
 
 impl Near {
     /// Adds the statics that some bodies may come to, of so many that reach their tile, whose low corner this is.
-    fn find(&mut self, bodies: &Bodies, reached: usize, corner: DVec2, setup: &Setup, rows: &mut Rows) -> Found {
+    fn find(&mut self, bodies: &Bodies, reached: usize, corner: DVec2, setup: &Setup, rows: &mut Vec<u32>) -> Found {
         if self.pause > 0 {
             self.pause -= 1;
             return Found::Nothing;
@@ -74,7 +74,7 @@ impl Near {
                 looks = looks.saturating_sub(1);
                 if self.squares.insert(square) {
                     let those = setup.terrain.rows_of(square);
-                    those.iter().for_each(|&row| rows.insert(row));
+                    rows.extend(those);
                     looks = looks.saturating_sub(those.len());
                 }
             }
@@ -83,7 +83,7 @@ impl Near {
             return Found::More;
         }
         self.first = self.squares.len();
-        setup.terrain.at_large().iter().for_each(|&row| rows.insert(row));
+        rows.extend(setup.terrain.at_large());
         Found::All
     }
 
@@ -95,8 +95,8 @@ impl Near {
 
 impl Tile {
     /// Takes in the statics that its bodies and ghosts may come to in this step, and those of `others` that reach its region: before they
-    /// are put behind the bodies. Contacts go on with those that the tile knew and still knows.
-    pub(crate) fn meet_statics(&mut self, others: Rows, setup: &Setup) {
+    /// are put behind the bodies. Contacts go on with all that reach its region.
+    pub(crate) fn meet_statics(&mut self, others: Vec<u32>, setup: &Setup) {
         let Self { near, bodies, rectangle, reached, .. } = self;
         let mut rows = others;
         let found = if reached.len() > FEW.max(bodies.len()) {
@@ -109,15 +109,20 @@ impl Tile {
             Found::More if rows.is_empty() => return,
             Found::Nothing if self.statics == self.reached => return,
             Found::Nothing => return self.change_statics(self.reached.clone()),
-            Found::All | Found::More => {}
+            // What contacts did may still have to be told.
+            Found::All => rows.extend(self.contacts.keys.iter().filter_map(|key| match key.high().kind() {
+                SlotKind::Static(known) => Some(self.statics[known]),
+                _ => None,
+            })),
+            Found::More => {}
         }
-        let mut known: Vec<u32> = rows.drain().filter(|&row| setup.static_reaches(row, self.id)).collect();
+        ascend(&mut rows);
+        rows.retain(|&row| setup.static_reaches(row, self.id));
         if let Found::More = found {
-            known.iter().chain(&self.statics).for_each(|&row| rows.insert(row));
-            known.clear();
-            known.extend(rows.drain());
+            rows.extend(&self.statics);
+            ascend(&mut rows);
         }
-        self.change_statics(known);
+        self.change_statics(rows);
     }
 
     /// Takes in other statics: both lists ascend, so contacts stay in order.

@@ -42,7 +42,8 @@ pub(crate) struct Tile {
     pub(crate) unseen: Vec<Unseen>,
     /// One per ghost, ascending.
     pub(crate) ghost_owners: Vec<TileId>,
-    /// Rows of the setup's statics, ascending: those that its bodies may come to in this step.
+    /// Rows of the setup's statics, ascending: those that its bodies may come to in this step, and maybe more, of those reached. Between a
+    /// change of its region and the next sync point those that it knew before.
     pub(crate) statics: Vec<u32>,
     /// Of all that reach its region.
     pub(crate) reached: Vec<u32>,

@@ -3,7 +3,7 @@
 use crate::tiling::blueprint::Setup;
 use glam::DVec2;
 
-/// Some of a tile's bodies, with the low and high corners of upright rectangles around them: from left to right by the low ones.
+/// Some bodies' places in a list, with the low and high corners of upright rectangles around them: from left to right by the low ones.
 pub(super) struct Bounds {
     all: Vec<(usize, DVec2, DVec2)>,
     /// How far to the right any comes of those up to each.
@@ -31,9 +31,10 @@ impl Bounds {
     }
 }
 
-/// All statics as a step begins, in an order in which those that meet a rectangle are found.
+/// All statics, to find those that sweep over a rectangle in a step.
 pub(super) struct StaticsByPlace<'a> {
     setup: &'a Setup,
+    step: u64,
     /// Those that the terrain does not find.
     others: Bounds,
 }
@@ -44,12 +45,17 @@ impl<'a> StaticsByPlace<'a> {
             let [low, high] = setup.static_box(row, step);
             (row as usize, low, high)
         };
-        Self { setup, others: Bounds::new(setup.terrain.at_large().iter().map(bounds).collect()) }
+        Self { setup, step, others: Bounds::new(setup.terrain.at_large().iter().map(bounds).collect()) }
     }
 
-    /// Hands over the rows of those whose box meets a rectangle, in any order, and maybe more than once.
-    pub(super) fn meeting(&self, low: DVec2, high: DVec2, mut found: impl FnMut(u32)) {
-        self.others.meeting(low, high).for_each(|row| found(row as u32));
-        self.setup.terrain.meeting(low, high, found);
+    /// Adds the rows of those that meet a rectangle, in any order, and maybe more than once.
+    pub(super) fn meeting(&self, low: DVec2, high: DVec2, rows: &mut Vec<u32>) {
+        rows.extend(self.others.meeting(low, high).map(|row| row as u32));
+        self.setup.terrain.meeting(low, high, |row| {
+            let meets = |[own_low, own_high]: [DVec2; 2]| own_low.cmple(high).all() && own_high.cmpge(low).all();
+            if self.setup.path(row).is_none() || meets(self.setup.static_box(row, self.step)) {
+                rows.push(row);
+            }
+        });
     }
 }

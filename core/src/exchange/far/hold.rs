@@ -7,6 +7,7 @@ use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot, min};
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
+use crate::tiling::terrain::ascend;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 
@@ -44,18 +45,22 @@ pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
         return;
     }
     tile.rim.is_known = false;
-    let statics = StaticsByPlace::new(setup, step);
+    let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
     for &Way { row, start } in ways {
         let whole = tile.bodies.position[row] - start;
         let body = tile.bodies.get(row);
         let (kind, way) = (setup.kind(body.kind), whole.as_vec2());
         let (half, middle) = (kind.half_extents(body.rotation).as_dvec2() + 0.5 * whole.abs(), start + 0.5 * whole);
         let mut part = 1.0_f32;
-        statics.meeting(middle - half, middle + half, |fixed| {
+        statics.meeting(middle - half, middle + half, &mut met);
+        ascend(&mut met);
+        for fixed in met.drain(..) {
             let fixed = setup.static_at(fixed, step);
             let (other, offset) = (setup.kind(fixed.kind), (fixed.position - start).as_vec2());
-            part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
-        });
+            if kind.touches(other) {
+                part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
+            }
+        }
         tile.bodies.position[row] = start + whole * f64::from(part);
     }
 }

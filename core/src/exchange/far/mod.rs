@@ -30,7 +30,7 @@ use crate::model::id::TileId;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
 use crate::tiling::statics::surroundings;
-use crate::tiling::terrain::Rows;
+use crate::tiling::terrain::ascend;
 use crate::tiling::tile::Tile;
 use bounds::{Bounds, StaticsByPlace};
 use glam::{DVec2, Vec2};
@@ -183,13 +183,8 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
         return;
     }
     tile.bodies.truncate(dynamic);
-    let mut met = Rows::default();
-    if go_far {
-        find_on_the_way(tile, setup, step, &mut met);
-    }
-    let on_the_way: Vec<u32> = met.drain().collect();
-    on_the_way.iter().for_each(|&row| met.insert(row));
-    tile.meet_statics(met, setup);
+    let on_the_way = if go_far { find_on_the_way(tile, setup, step) } else { Vec::new() };
+    tile.meet_statics(on_the_way.clone(), setup);
     tile.push_statics(setup, step);
     for row in on_the_way {
         if tile.statics.binary_search(&row).is_err() {
@@ -198,15 +193,22 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
     }
 }
 
-/// Adds the statics that those may come to who go far, or who are in nobody's usual halo here. The others do not leave the tile's own.
-fn find_on_the_way(tile: &Tile, setup: &Setup, step: u64, met: &mut Rows) {
-    let statics = StaticsByPlace::new(setup, step);
+/// The rows of the statics that those may come to who go far, or who are in nobody's usual halo here. The others stay near those that
+/// reach the tile's region.
+fn find_on_the_way(tile: &Tile, setup: &Setup, step: u64) -> Vec<u32> {
+    let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
+    // Rounding decides nothing here.
+    let near = tile.region.shrunk(-0.999 * setup.reach_of_statics());
     for row in 0..tile.bodies.len() {
         if row >= tile.owned || setup.goes_far(tile.bodies.velocity[row]) {
             let (low, high) = surroundings(&tile.bodies, row, tile.rectangle.min, setup);
-            statics.meeting(low, high, |row| met.insert(row));
+            if !(low.cmpge(near.min) & high.cmple(near.max)).all() {
+                statics.meeting(low, high, &mut met);
+            }
         }
     }
+    ascend(&mut met);
+    met
 }
 
 /// After a step, forgets contacts with statics that only lay on somebody's way: they have no slot in the next.

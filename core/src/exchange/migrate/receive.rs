@@ -8,7 +8,6 @@ use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
 use crate::tiling::blueprint::Setup;
-use crate::tiling::terrain::Rows;
 use crate::tiling::tile::Tile;
 
 /// Ghosts as they come in, and in order.
@@ -48,7 +47,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
         tile.find_interior(setup);
     }
     take_ghosts(tile, mail, &mut work.ghosts, setup);
-    tile.meet_statics(Rows::default(), setup);
+    tile.meet_statics(Vec::new(), setup);
     tile.push_statics(setup, step);
 }
 
