@@ -1,6 +1,6 @@
 //! Bodies that go further within a step than everything around them is wide pass through nothing, wherever tiles end.
 
-use atoll_core::{Exchange, Material, Rot, Shape};
+use atoll_core::{Exchange, Filter, Material, Path, Rot, Shape, Travel};
 use atoll_tests::world::{Scene, noise};
 use glam::{DVec2, Vec2};
 
@@ -54,6 +54,43 @@ fn a_disc_never_passes_a_thin_wall() {
             assert!(beyond < 0.0, "{what}: {beyond} m beyond the wall after step {step}");
         }
     });
+}
+
+#[test]
+fn a_disc_never_passes_a_wall_that_comes_to_meet_it() {
+    each(&[0.0, 0.4], |what, place, grid, exchange, velocity, from| {
+        let (mut scene, coming) = (Scene::new(MIDDLE, 0.0), DVec2::new(-30.0, 0.0));
+        scene.wall(place, (0.05, 200.0), 0.0, Material::default());
+        let travel = Travel::Line { velocity: coming };
+        scene.statics[0].path = Some(Path { travel, ..Path::default() });
+        let disc = scene.kind(Shape::circle(0.1), Material::default());
+        let id = scene.body(disc, place + from, velocity);
+        let mut sim = scene.start_on(grid, exchange);
+        for step in 1..8 {
+            sim.run(1);
+            let beyond = sim.body(id).position.x - (place + coming * (f64::from(step) / 60.0)).x;
+            assert!(beyond < 0.0, "{what}: {beyond} m beyond the wall after step {step}");
+        }
+    });
+}
+
+#[test]
+fn a_disc_passes_what_it_does_not_touch() {
+    let of_one_group = Filter { group: -1, ..Filter::default() };
+    for (sensor, filter) in [(true, Filter::default()), (false, of_one_group)] {
+        each(&[0.4], |what, place, grid, exchange, velocity, from| {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            scene.wall(place, (0.05, 200.0), 0.0, Material::default());
+            (scene.statics[0].kind.sensor, scene.statics[0].kind.filter) = (sensor, filter);
+            let disc = scene.kind(Shape::circle(0.1), Material::default());
+            scene.kinds[0].filter = filter;
+            let id = scene.body(disc, place + from, velocity);
+            let mut sim = scene.start_on(grid, exchange);
+            sim.run(8);
+            let off = sim.body(id).position.distance(place + from + velocity.as_dvec2() * (8.0 / 60.0));
+            assert!(off < 1e-4, "{what}, sensor {sensor}: {off} m off its free way");
+        });
+    }
 }
 
 #[test]

@@ -177,15 +177,15 @@ mod tests {
     use crate::model::path::{Path, Travel};
     use crate::testing::{circle, rectangle};
     use crate::tiling::partition::{Bisector, Partition};
-    use crate::{Blueprint, Loopback, World, step};
+    use crate::{Blueprint, Command, Loopback, World, step};
     use glam::Vec2;
 
     const SIDE: f64 = 60.0;
 
     /// Shelves one above the other, a ground below all of them, and some that move; and bodies that fall from shelf to shelf, of which
-    /// every so many go far in a step.
+    /// every so many go far in a step, and some are large.
     fn landscape(exchange: Exchange, far: u32, partition: Partition) -> World {
-        let params = Params { gravity: Vec2::new(0.0, -10.0), exchange, ..Params::default() };
+        let params = Params { gravity: Vec2::new(0.0, -10.0), exchange, large_radius: 1.0, ..Params::default() };
         let shelf = |k: u32| {
             let (column, row) = (k % 20, k / 20);
             let place = DVec2::new(3.0 * f64::from(column) + f64::from(row % 3), 2.0 + 2.5 * f64::from(row));
@@ -197,13 +197,15 @@ mod tests {
         };
         let ground = StaticBody::new(GlobalId(440), rectangle(80.0, 1.0), DVec2::new(0.5 * SIDE, 0.0));
         let statics: Vec<StaticBody> = (0..440).map(shelf).chain([ground]).collect();
-        let blueprint = Blueprint { params, partition, kinds: vec![circle(0.2), rectangle(0.5, 0.4)], statics };
+        let kinds = vec![circle(0.2), rectangle(0.5, 0.4), circle(2.5)];
+        let blueprint = Blueprint { params, partition, kinds, statics };
         let mut world = World::whole(&blueprint).unwrap();
         for k in 0..90_u32 {
             let place = DVec2::new(0.65 * f64::from(k) + 0.7, 3.1 + 2.5 * f64::from(k * 7 % 20));
             let speed = if far > 0 && k % far == 1 { 60.0 } else { 4.0 };
             let velocity = speed * Vec2::new(if k.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.3);
-            let body = Body { velocity, ..Body::at_rest(GlobalId(u64::from(k) + 441), KindId(k % 2), place) };
+            let kind = KindId(if k % 45 == 22 { 2 } else { k % 2 });
+            let body = Body { velocity, ..Body::at_rest(GlobalId(u64::from(k) + 441), kind, place) };
             assert!(world.add(body).unwrap());
         }
         world
@@ -231,6 +233,12 @@ mod tests {
                         let moved = halves(0.4 + 0.002 * f64::from(at));
                         [&mut ever, &mut all, &mut anew].into_iter().for_each(|world| world.retile(&moved).unwrap());
                     }
+                    // Who is brought to rest is still told to large ones with what he did to what he is no longer near.
+                    let halted = GlobalId(441 + at as u64 * 31 % 90);
+                    let halt = Command::SetVelocity { id: halted, velocity: Vec2::ZERO, angular_velocity: 0.0 };
+                    [&mut ever, &mut all, &mut anew].into_iter().for_each(|world| {
+                        world.command(&halt).unwrap();
+                    });
                     each_tile(&mut all, |near| near.pause = PAUSE);
                     each_tile(&mut anew, |near| *near = Near::default());
                     let [report, by_all, by_anew] =
