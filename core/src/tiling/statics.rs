@@ -275,4 +275,24 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn contacts_stay_with_statics_that_nobody_is_near_any_more() {
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(SIDE), 1, 1).unwrap();
+        let mut world = landscape(Exchange::Step, 0, partition);
+        for _ in 0..60 {
+            step(&mut world, &mut Loopback).unwrap();
+        }
+        let setup = world.setup.clone();
+        let tile = &mut world.tile_states_mut()[0];
+        let pairs = |tile: &Tile| -> Vec<_> { tile.contacts.keys.iter().map(|&key| tile.pair_of(key)).collect() };
+        let (before, known) = (pairs(tile), tile.statics.len());
+        tile.bodies.truncate(tile.owned);
+        tile.bodies.position.fill(DVec2::splat(1.0));
+        tile.near = Near::default();
+        tile.meet_statics(Vec::new(), &setup);
+        tile.push_statics(&setup, 60);
+        assert!(before.len() > 40 && tile.statics.len() < known, "{} of {known} statics", tile.statics.len());
+        assert_eq!(pairs(tile), before);
+    }
 }
