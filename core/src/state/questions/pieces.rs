@@ -36,7 +36,8 @@ pub(super) fn enter(piece: &Piece, start: DVec2, along: DVec2) -> Option<(f64, D
     let free = if piece.side.is_some() { 1 } else { piece.outline.count() };
     let faces = edges(piece).take(free).filter_map(|(from, to, normal)| {
         let (speed, edge) = (normal.dot(along), to - from);
-        if speed >= 0.0 {
+        // A line has faces at its ends that are no wider than a point: corners are looked at below.
+        if speed >= 0.0 || edge == DVec2::ZERO {
             return None;
         }
         let fraction = (normal.dot(from - start) + radius) / speed;

@@ -3,14 +3,17 @@ use super::*;
 use crate::Loopback;
 use crate::model::body::StaticBody;
 use crate::model::id::KindId;
+use crate::model::kind::{Kind, KindRow};
 use crate::model::math::Rot;
 use crate::model::params::Params;
+use crate::model::shape::{Part, Shape};
 use crate::step::step;
-use crate::testing::{circle, rectangle};
+use crate::testing::{any_convex, any_rotation, cases, circle, rectangle};
 use crate::tiling::blueprint::Blueprint;
 use crate::tiling::partition::Partition;
 use crate::{Command, TileId};
 use glam::Vec2;
+use proptest::prelude::*;
 
 fn blueprint(columns: u32, rows: u32, far: DVec2) -> Blueprint {
     let partition = Partition::uniform(far, far + DVec2::new(40.0, 20.0), columns, rows).unwrap();
@@ -136,4 +139,39 @@ fn a_ray_that_begins_inside_hits_at_once_and_one_that_ends_before_does_not() {
     assert_eq!((inside.id, inside.fraction, inside.normal), (GlobalId(7), 0.0, DVec2::ZERO));
     assert_eq!(world.cast_ray(DVec2::new(12.5, 5.0), DVec2::new(12.5, 5.0)), None);
     assert!(World::whole(&blueprint(1, 1, DVec2::ZERO)).unwrap().in_rectangle(DVec2::ZERO, DVec2::ONE).len() < 3);
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    /// Whoever looks along a ray point by point finds the same.
+    #[test]
+    fn a_ray_meets_a_shape_where_the_shape_begins(
+        parts in prop::collection::vec((any_convex(0.1, 2.0), any_rotation(), -1.0_f32..1.0, -1.0_f32..1.0), 1..4),
+        rotation in any_rotation(),
+        from in (-4.0..4.0, -4.0..4.0),
+        to in (-4.0..4.0, -4.0..4.0),
+    ) {
+        let part = |(kind, rotation, x, y): &(Kind, Rot, f32, f32)| {
+            Part { shape: kind.shape.clone(), position: Vec2::new(*x, *y), rotation: *rotation }
+        };
+        let kind = match &parts[..] {
+            [(alone, ..)] => alone.clone(),
+            several => Kind { shape: Shape::compound(several.iter().map(part).collect()).unwrap(), ..parts[0].0.clone() },
+        };
+        let (from, to) = (DVec2::from(from), DVec2::from(to));
+        let body = Body { rotation, ..Body::at_rest(GlobalId(0), KindId(0), DVec2::ZERO) };
+        let outline = Outline::new(&body, &KindRow::fixed(&kind).unwrap());
+        const LOOKS: u32 = 2000;
+        let begins = (0..=LOOKS).map(|k| f64::from(k) / f64::from(LOOKS)).find(|&part| outline.holds(from.lerp(to, part)));
+        match outline.cast_ray(from, to) {
+            Some(hit) => {
+                let about = 1e-4 / from.distance(to);
+                prop_assert!(begins.is_none_or(|begins| hit.fraction <= begins + about), "{hit:?}, {begins:?}");
+                let near = DVec2::splat(1e-4);
+                prop_assert!(outline.meets_rectangle(hit.point - near, hit.point + near), "{hit:?} is beside it");
+            }
+            None => prop_assert_eq!(begins, None),
+        }
+    }
 }
