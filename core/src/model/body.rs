@@ -3,7 +3,7 @@
 use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::Kind;
 use crate::model::math::Rot;
-use crate::model::path::Path;
+use crate::model::path::{Path, Travel};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, Vec2};
 use std::ops::Range;
@@ -64,6 +64,16 @@ impl StaticBody {
     /// Where it is and how it is turned as a step begins; `dt` is the length of a step in seconds.
     pub fn pose(&self, step: u64, dt: f32) -> (DVec2, Rot) {
         self.path.map_or((self.position, self.rotation), |path| path.pose(self.position, self.rotation, step, dt))
+    }
+
+    /// One that is in its first step where this one is when so many steps were made, and goes on as it does; `dt` is the length of a step
+    /// in seconds.
+    pub fn from_step(&self, step: u64, dt: f32) -> Self {
+        let Some(path) = self.path else { return self.clone() };
+        let (position, rotation) = self.pose(step, dt);
+        // Other ways have a middle, which stays.
+        let position = if matches!(path.travel, Travel::Line { .. }) { position } else { self.position };
+        Self { position, rotation, path: Some(path.from_step(step, dt)), ..self.clone() }
     }
 }
 

@@ -106,6 +106,18 @@ impl Path {
         (position, rotation)
     }
 
+    /// The path of a body that begins where this one's is when so many steps were made: where a line starts, and how it is turned, is the
+    /// body's own. `dt` is the length of a step in seconds.
+    pub(crate) fn from_step(&self, step: u64, dt: f32) -> Self {
+        let part = |period: f64, phase: f64| (step as f64 * f64::from(dt) / period + phase).fract();
+        let travel = match self.travel {
+            Travel::Rest | Travel::Line { .. } => self.travel,
+            Travel::Sine { amplitude, period, phase } => Travel::Sine { amplitude, period, phase: part(period, phase) },
+            Travel::Circle { radius, period, phase } => Travel::Circle { radius, period, phase: part(period, phase) },
+        };
+        Self { travel, turning: self.turning }
+    }
+
     /// The least and the greatest displacement along each axis, whatever the time.
     pub(crate) fn extent(&self) -> [DVec2; 2] {
         match self.travel {

@@ -30,6 +30,8 @@ pub(super) struct Kept<'a> {
     pub configuration: Option<&'a Path>,
     /// The files of its scene, if it has some.
     pub scene: Vec<PathBuf>,
+    /// The file of its commands, if it has one.
+    pub commands: Option<&'a Path>,
 }
 
 impl Kept<'_> {
@@ -59,6 +61,9 @@ impl Kept<'_> {
         let configuration = self.configuration.and_then(|file| file.canonicalize().ok());
         if configuration.is_some_and(|file| places.contains(&file)) {
             return Some("the configuration of this run".to_owned());
+        }
+        if self.commands.and_then(|file| file.canonicalize().ok()).is_some_and(|file| places.contains(&file)) {
+            return Some("the file of this run's commands".to_owned());
         }
         let scene: Vec<PathBuf> = self.scene.iter().filter_map(|file| file.canonicalize().ok()).collect();
         if places.iter().any(|place| scene.contains(place)) {

@@ -24,7 +24,7 @@ pub(super) fn run(args: &ProjectArgs) -> Result<Exit, RunError> {
     }
     let Some((mut config, network, measured)) = begin(args)? else { return Ok(Exit::Done) };
     let options = [("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())];
-    Kept { runs: Vec::new(), configuration: Some(&args.config), scene: config.scene_files() }.check(options)?;
+    Kept { configuration: Some(&args.config), scene: config.scene_files(), ..Kept::default() }.check(options)?;
     let [json, plot] = WholeFile::check_all(options)?;
     (config.run.ranks, config.run.threads, config.run.transport) = (1, Some(1), Some(TransportKind::Local));
     let plan = Plan::new(&config)?;

@@ -223,7 +223,8 @@ fn files(args: &RunArgs) -> [(&'static str, Option<&Path>); 5] {
 /// Refuses to write them over what this run reads or keeps, or what another has left.
 fn check_kept(args: &RunArgs, config: &Config) -> Result<(), RunError> {
     let runs = args.out.iter().chain(&args.resume).map(PathBuf::as_path).collect();
-    Kept { runs, configuration: args.config.as_deref(), scene: config.scene_files() }.check(files(args))
+    let commands = args.commands.as_deref().filter(|path| !is_standard(path));
+    Kept { runs, configuration: args.config.as_deref(), scene: config.scene_files(), commands }.check(files(args))
 }
 
 /// Keeps other runs from the folder of this one, if it has one that is there.

@@ -280,10 +280,10 @@ fn action(raw: Raw) -> Result<Action, String> {
         each(ids.into_iter().map(|id| Command::Wake(GlobalId(id))).collect());
     }
     if let Some(RayText { from, to }) = raw.ray {
-        actions.push(Action::Ask(Question::Ray { from: from.into(), to: to.into() }));
+        actions.push(Action::Ask(Question::Ray { from: place(from)?, to: place(to)? }));
     }
     if let Some(RectangleText { low, high }) = raw.rectangle {
-        let (low, high) = (DVec2::from(low), DVec2::from(high));
+        let (low, high) = (place(low)?, place(high)?);
         if !low.cmple(high).all() {
             return Err("the high corner of a rectangle lies above and right of the low one".to_owned());
         }
@@ -306,6 +306,13 @@ fn action(raw: Raw) -> Result<Action, String> {
         (Some(_), _) => Err(format!("it asks for several things; give each a line: {ACTIONS}")),
         (None, _) => Err(format!("it asks for nothing; give one of {ACTIONS}")),
     }
+}
+
+/// A place that is asked about.
+fn place(point: [f64; 2]) -> Result<DVec2, String> {
+    const FURTHEST: f64 = 1e100;
+    let is_near = point.iter().all(|part| part.abs() <= FURTHEST);
+    is_near.then(|| point.into()).ok_or_else(|| format!("places must be within {FURTHEST:e} m of the origin"))
 }
 
 fn new_body(text: &BodyText) -> Result<NewBody, String> {

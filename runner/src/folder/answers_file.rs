@@ -20,8 +20,9 @@ enum To {
 #[derive(Deserialize)]
 struct Head {
     step: u64,
-    /// Of contacts that began: told at the end of a step, and not at the beginning of the next.
+    /// Of contacts that began, and of bodies that entered sensors: told at the end of a step, and not at the beginning of the next.
     began: Option<serde::de::IgnoredAny>,
+    entered: Option<serde::de::IgnoredAny>,
 }
 
 impl AnswersFile {
@@ -50,7 +51,8 @@ impl AnswersFile {
         };
         let stays = |line: &&str| {
             let head: Result<Head, _> = serde_json::from_str(line);
-            line.ends_with('\n') && head.is_ok_and(|head| head.step < from || head.step == from && head.began.is_some())
+            let is_event = |head: &Head| head.began.is_some() || head.entered.is_some();
+            line.ends_with('\n') && head.is_ok_and(|head| head.step < from || head.step == from && is_event(&head))
         };
         Ok(text.split_inclusive('\n').take_while(stays).collect())
     }
@@ -79,13 +81,14 @@ mod tests {
     fn a_run_that_goes_on_says_nothing_twice() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("answers.jsonl");
-        let said = ["{\"step\":3,\"ray\":null}\n", "{\"step\":5,\"began\":[[1,2]],\"ended\":[]}\n"];
+        let began = "{\"step\":5,\"began\":[[1,2]],\"ended\":[]}\n";
+        let said = ["{\"step\":3,\"ray\":null}\n", began, "{\"step\":5,\"entered\":[],\"left\":[[7,2]]}\n"];
         let later = ["{\"step\":5,\"ray\":null}\n", "{\"step\":6,\"began\":[],\"ended\":[[1,2]]}\n", "{\"st"];
         let mut file = AnswersFile::open(&path, 0).unwrap();
         said.iter().chain(&later).for_each(|line| file.add(line).unwrap());
         let mut file = AnswersFile::open(&path, 5).unwrap();
         file.add("{\"step\":5}\n").unwrap();
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), [said[0], said[1], "{\"step\":5}\n"].concat());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), [said.concat(), "{\"step\":5}\n".to_owned()].concat());
         drop(AnswersFile::open(&path, 0).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
     }

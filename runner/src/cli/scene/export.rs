@@ -2,6 +2,7 @@
 
 use super::super::args::SceneExportArgs;
 use super::target::Target;
+use crate::command::{Action, Script};
 use crate::config::Config;
 use crate::error::{Exit, RunError};
 use crate::folder::RunFolder;
@@ -10,7 +11,7 @@ use crate::look::frame::Frame;
 use crate::look::recorded::Recorded;
 use crate::scene::file::write::World;
 use crate::scene::{Scene, SceneFile};
-use atoll_core::{Body, GlobalId, KindId, Rot};
+use atoll_core::{Body, Command, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 
 /// Does it.
@@ -50,20 +51,42 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
         return Err(unsuitable(option, "a run that was made has its values; leave it out"));
     }
     let recorded = Recorded::open(&args.from)?;
-    let config = Config::load_begun(&RunFolder::new("export", &args.from).configuration())?;
+    let folder = RunFolder::new("export", &args.from);
+    let mut config = Config::load_begun(&folder.configuration())?;
+    if let Some(gravity) = gravity_of_commands(&folder, step)? {
+        config.params.gravity = gravity;
+    }
     let mut frame = Frame::default();
     recorded.read(step, &mut frame)?;
     let (setting, [low, high]) = (recorded.setting(), recorded.recording().facts().domain);
     let name = format!("{}, step {step}", config.scene.kind.name());
+    let statics: Vec<_> = setting.statics.iter().map(|fixed| fixed.from_step(step, config.params.dt)).collect();
     let world = World {
         name: Some(&name),
         domain: (low, high),
         physics: config.unusual_physics(),
         kinds: &setting.kinds,
         names: &[],
-        statics: &setting.statics,
+        statics: &statics,
     };
     target.write(&world, frame.bodies.iter().map(body).collect())
+}
+
+/// What commands made of gravity until a step, if any did.
+fn gravity_of_commands(folder: &RunFolder, step: u64) -> Result<Option<Vec2>, RunError> {
+    let path = folder.commands();
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let script = Script::load_recorded(&path)?;
+    let made = script.lines.iter().filter(|line| line.step <= step).rev().find_map(|line| match &line.action {
+        Action::Do(commands) => commands.iter().rev().find_map(|command| match command {
+            Command::SetGravity(gravity) => Some(*gravity),
+            _ => None,
+        }),
+        _ => None,
+    });
+    Ok(made)
 }
 
 /// A body as it was recorded.

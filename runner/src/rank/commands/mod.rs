@@ -276,7 +276,7 @@ impl Commander {
             self.answer(&std::mem::take(&mut asked), world, transport)?;
             let commands = match &line.action {
                 Action::Add(bodies) => self.name(bodies),
-                Action::Do(commands) => commands.clone(),
+                Action::Do(commands) => Ok(commands.clone()),
                 Action::Tell(event, is_told) => {
                     self.state.tell(*event, *is_told);
                     self.followed.set(*event, *is_told, world, transport)?;
@@ -285,10 +285,13 @@ impl Commander {
                 }
                 Action::Ask(_) => continue,
             };
-            if let Err(reason) = check(&commands, &mut present, world) {
-                self.refuse(source, line.number, step, &reason, observer)?;
-                continue;
-            }
+            let commands = match commands.and_then(|all| check(&all, &mut present, world).map(|()| all)) {
+                Ok(commands) => commands,
+                Err(reason) => {
+                    self.refuse(source, line.number, step, &reason, observer)?;
+                    continue;
+                }
+            };
             for command in &commands {
                 world.command(command).map_err(RankError::Setup)?;
                 self.state.note(command, step);
@@ -304,16 +307,19 @@ impl Commander {
         self.answer(&asked, world, transport)
     }
 
-    /// Bodies that have no name of their own get the next ones.
-    fn name(&self, bodies: &[NewBody]) -> Vec<Command> {
+    /// Bodies that have no name of their own get the next ones, as long as there are some.
+    fn name(&self, bodies: &[NewBody]) -> Result<Vec<Command>, String> {
         let mut next = self.state.next;
         let named = |new: &NewBody| {
             let mut body = new.body;
             if !new.is_named {
+                if next == u64::MAX {
+                    return Err("no name is left above those of all bodies; give it one of its own".to_owned());
+                }
                 body.id = GlobalId(next);
             }
             next = next.max(body.id.0.saturating_add(1));
-            Command::Add(body)
+            Ok(Command::Add(body))
         };
         bodies.iter().map(named).collect()
     }

@@ -44,11 +44,10 @@ pub(super) fn kind_lines(kind: &Kind) -> Vec<String> {
     lines
 }
 
-/// The lines of a static.
+/// The lines of a static, but for its id.
 pub(super) fn static_lines(fixed: &StaticBody) -> Vec<String> {
-    let StaticBody { id, position, rotation, kind, path } = fixed;
-    let mut lines = vec![format!("id = {id}")];
-    lines.extend(kind_lines(kind));
+    let StaticBody { position, rotation, kind, path, .. } = fixed;
+    let mut lines = kind_lines(kind);
     lines.extend([format!("x = {}", Value::from(position.x)), format!("y = {}", Value::from(position.y))]);
     lines.extend(turn(*rotation));
     lines.extend(path.as_ref().map(path_line));

@@ -184,7 +184,7 @@ impl SceneFile {
 
     /// Statics without ids of their own get those above all bodies.
     fn name_statics(&mut self, last: Option<u64>) -> Result<(), SceneError> {
-        if self.description.are_named {
+        if self.description.are_named || self.statics.is_empty() {
             return Ok(());
         }
         let first = last.map_or(Some(0), |last| last.checked_add(1));

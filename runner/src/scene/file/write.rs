@@ -3,7 +3,7 @@
 use super::description::FORMAT;
 use super::lines::{angle, kind_lines, static_lines};
 use super::row::Column;
-use atoll_core::{Body, Kind, StaticBody};
+use atoll_core::{Body, GlobalId, Kind, StaticBody};
 use glam::{DVec2, Vec2};
 use parquet::basic::{Compression, Encoding};
 use parquet::data_type::{DoubleType, FloatType, Int32Type, Int64Type};
@@ -44,8 +44,26 @@ pub(crate) struct BodiesFile<'a> {
     pub(crate) count: u64,
 }
 
+/// How a scene says the ids of its statics.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum StaticIds {
+    /// Each has its own.
+    Said,
+    /// They are those that statics get where none are said.
+    LeftOut,
+}
+
+/// How ids of statics can be said, beside bodies of which this is the greatest id; if they can. Texts have no numbers above 2^63 - 1.
+pub(crate) fn static_ids(statics: &[StaticBody], last: Option<GlobalId>) -> Option<StaticIds> {
+    if statics.iter().all(|fixed| fixed.id.0 <= i64::MAX.cast_unsigned()) {
+        return Some(StaticIds::Said);
+    }
+    let first = last.map_or(Some(0), |last| last.0.checked_add(1))?;
+    (first..).zip(statics).all(|(id, fixed)| fixed.id.0 == id).then_some(StaticIds::LeftOut)
+}
+
 /// The text of a scene.
-pub(crate) fn text(world: &World<'_>, bodies: &BodiesFile<'_>) -> String {
+pub(crate) fn text(world: &World<'_>, ids: StaticIds, bodies: &BodiesFile<'_>) -> String {
     let mut text = format!("format = {}\n", Value::from(FORMAT));
     let mut line = |line: &str| writeln!(text, "{line}").expect("a string takes any text");
     if let Some(name) = world.name {
@@ -67,6 +85,9 @@ pub(crate) fn text(world: &World<'_>, bodies: &BodiesFile<'_>) -> String {
     }
     for fixed in world.statics {
         line("\n[[statics]]");
+        if ids == StaticIds::Said {
+            line(&format!("id = {}", fixed.id));
+        }
         static_lines(fixed).iter().for_each(|of_static| line(of_static));
     }
     let BodiesFile { name, xxh3, count } = *bodies;
