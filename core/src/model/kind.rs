@@ -212,6 +212,11 @@ impl KindRow {
         !(self.sensor | other.sensor) && self.filter.admits(&other.filter)
     }
 
+    /// The angular velocity that a body of this kind has where it is to have this one.
+    pub(crate) fn turning(&self, angular_velocity: f32) -> f32 {
+        if self.dynamics.fixed_rotation { 0.0 } else { angular_velocity }
+    }
+
     /// Half extents, radius, bounding radius: of a round body the first are zero.
     #[inline(always)]
     pub(crate) fn outline(&self) -> [f32; 4] {

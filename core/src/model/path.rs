@@ -135,6 +135,10 @@ impl Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::body::StaticBody;
+    use crate::model::id::GlobalId;
+    use crate::model::kind::{Kind, Material};
+    use crate::model::shape::Shape;
 
     fn course(path: Path, step: u64) -> Course {
         path.course(DVec2::new(3.0, 4.0), Rot::IDENTITY, step, 1.0 / 64.0)
@@ -152,6 +156,26 @@ mod tests {
         let circle = Travel::Circle { radius: 2.0, period: -4.0, phase: 0.0 };
         let at = [0, 64].map(|step| course(Path { travel: circle, turning: 0.0 }, step).position);
         assert!((at[0] - DVec2::new(5.0, 4.0)).length() < 1e-9 && (at[1] - DVec2::new(3.0, 2.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn a_path_can_begin_at_any_step() {
+        for travel in [
+            Travel::Rest,
+            Travel::Line { velocity: DVec2::new(0.3, 7.0) },
+            Travel::Sine { amplitude: DVec2::new(5.0, 1.0), period: 0.7, phase: 0.3 },
+            Travel::Circle { radius: 4.0, period: -1.3, phase: 0.9 },
+        ] {
+            let wheel = Kind::new(Shape::circle(1.0), Material::default());
+            let path = Some(Path { travel, turning: -2.0 });
+            let fixed = StaticBody { path, ..StaticBody::new(GlobalId(0), wheel, DVec2::new(3.0, 4.0)) };
+            let (later, dt) = (fixed.from_step(77, 1.0 / 64.0), 1.0 / 64.0);
+            for step in [0, 1, 500] {
+                let ((at, turned), (expected, rotation)) = (later.pose(step, dt), fixed.pose(77 + step, dt));
+                assert!((at - expected).length() < 1e-9, "{travel:?}, {step}: {at}, not {expected}");
+                assert!((turned.c - rotation.c).abs() + (turned.s - rotation.s).abs() < 1e-6, "{travel:?}, {step}");
+            }
+        }
     }
 
     /// A body that goes on by its velocity for a step is where the next step finds it.

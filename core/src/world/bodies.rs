@@ -62,7 +62,8 @@ impl World {
     }
 
     /// Adds a body under a name that is free to a tile.
-    fn put(&mut self, place: usize, body: Body) {
+    fn put(&mut self, place: usize, mut body: Body) {
+        body.angular_velocity = self.setup.kind(body.kind).turning(body.angular_velocity);
         let at = self.tiles[place].add(body);
         if let Some(locator) = self.locator.get_mut() {
             locator.insert(body.id, Place { tile: place as u32, at });

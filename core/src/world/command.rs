@@ -154,6 +154,7 @@ impl World {
         let mut body = tile.at(at);
         let kind = self.setup.kind(body.kind);
         change(&mut body, kind);
+        body.angular_velocity = self.setup.kind(body.kind).turning(body.angular_velocity);
         tile.change_at(at, body);
         self.questions.take();
         true

@@ -209,6 +209,19 @@ fn a_path_that_cannot_be_written_is_refused_before_anything_heavy() {
 }
 
 #[test]
+fn commands_are_not_written_over() {
+    let (desk, acts) = (Desk::new(SMALL), "{\"step\": 2, \"gravity\": [0, -1]}\n");
+    fs::write(desk.path().join("acts.jsonl"), acts).unwrap();
+    for option in ["--answers", "--json", "--log", "--timings", "--trace"] {
+        let ended = run(&mut desk.atoll(["--commands", "acts.jsonl", option, "acts.jsonl"]));
+        let expected =
+            format!("{option} acts.jsonl: that is the file of this run's commands and must not be written over");
+        assert_refused(&ended, 2, &expected);
+        assert_eq!(fs::read_to_string(desk.path().join("acts.jsonl")).unwrap(), acts, "{option}");
+    }
+}
+
+#[test]
 fn a_world_larger_than_the_machine_is_refused_before_anything_heavy() {
     for options in ["--tiles 65535x65535", "--bodies 10000000000", "--tiles 60000x60000 --ranks 1024"] {
         refused(options, "too large for this machine: ");

@@ -7,8 +7,8 @@ use crate::folder::durable::{create_folder_durably, write_durably};
 use crate::scene::file::digest_of_file;
 use crate::scene::file::write::{self, BodiesFile, World};
 use atoll_core::Body;
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 /// What the text of a scene is called that is written here.
 const TEXT: &str = "scene.toml";
@@ -61,14 +61,15 @@ impl<'a> Target<'a> {
     pub(super) fn write(&self, world: &World<'_>, mut bodies: Vec<Body>) -> Result<(), RunError> {
         let failed = |path: &Path| {
             let path = path.to_owned();
-            move |error: io::Error| RunError::Output { path, reason: error.to_string() }
+            move |error: std::io::Error| RunError::Output { path, reason: error.to_string() }
         };
         write::sort_in_space(&mut bodies, world.domain);
         let last = bodies.iter().map(|body| body.id).max();
-        let ids = write::static_ids(world.statics, last).ok_or_else(|| {
-            let reason =
-                "a static's id is above 2^63 - 1, which the text of a scene cannot say; give statics ids of their own";
-            failed(&self.text())(io::Error::other(reason))
+        let ids = write::static_ids(world.statics, last).ok_or_else(|| RunError::Unsuitable {
+            option: format!("--out {}", self.folder.display()),
+            reason:
+                "a static's id is above 2^63 - 1, which the text of a scene cannot say; give statics ids of their own"
+                    .to_owned(),
         })?;
         create_folder_durably(self.folder).map_err(failed(self.folder))?;
         let (text, file) = (self.text(), self.bodies());
@@ -81,7 +82,7 @@ impl<'a> Target<'a> {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let told = BodiesFile { name: &name, xxh3: &xxh3, count: bodies.len() as u64 };
         let said = write::text(world, ids, &told);
-        write_durably(&text, |out| io::Write::write_all(out, said.as_bytes())).map_err(failed(&text))?;
+        write_durably(&text, |out| std::io::Write::write_all(out, said.as_bytes())).map_err(failed(&text))?;
         let bytes =
             [&text, &file].iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum::<u64>();
         let World { kinds, statics, .. } = world;

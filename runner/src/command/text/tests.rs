@@ -36,6 +36,17 @@ fn every_action_is_read() {
 }
 
 #[test]
+fn places_that_are_asked_about_can_be_reckoned_with() {
+    for text in [
+        r#"{"step": 1, "ray": {"from": [0, 1e308], "to": [0, -1e308]}}"#,
+        r#"{"step": 1, "rectangle": {"low": [-1e101, 0], "high": [1, 1]}}"#,
+    ] {
+        assert_eq!(parse(3, text).unwrap_err(), "places must be within 1e100 m of the origin", "{text}");
+    }
+    assert!(parse(3, r#"{"step": 1, "rectangle": {"low": [-1e100, -1e100], "high": [1e100, 1e100]}}"#).is_ok());
+}
+
+#[test]
 fn bodies_are_named_or_not_and_turned_in_two_ways() {
     let text = r#"{"step": 0, "add": [{"id": 3, "x": 0.1, "y": -2e8, "angle": 0.5, "vx": 0.1},
                    {"kind": 1, "x": 1, "y": 2, "cos": 0.6, "sin": 0.8}]}"#;
