@@ -1,6 +1,6 @@
 //! Shapes, paths and all that kinds may say: what is read, what is written, and what is refused.
 
-use super::write::{BodiesFile, World, text};
+use super::write::{BodiesFile, StaticIds, World, text};
 use super::*;
 use atoll_core::{Dynamics, Filter, Material, Part, Path as Course, Rot, Segment, Shape, Travel};
 use glam::Vec2;
@@ -99,7 +99,7 @@ fn what_is_written_is_read_again_bit_for_bit() {
         names: &[],
         statics: &statics,
     };
-    let written = text(&world, &BodiesFile { name: "bodies.csv", xxh3: "", count: 0 });
+    let written = text(&world, StaticIds::Said, &BodiesFile { name: "bodies.csv", xxh3: "", count: 0 });
     let alone = written.split("\n[bodies]").next().unwrap();
     let scene = read(alone).unwrap_or_else(|error| panic!("{error}\n{alone}"));
     // What tells all bits: zeros of either sign are not the same text.
@@ -108,6 +108,7 @@ fn what_is_written_is_read_again_bit_for_bit() {
     assert_eq!(
         text(
             &World { kinds: scene.kinds(), statics: scene.statics(), ..world },
+            StaticIds::Said,
             &BodiesFile { name: "bodies.csv", xxh3: "", count: 0 }
         ),
         written
