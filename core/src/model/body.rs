@@ -68,12 +68,12 @@ impl StaticBody {
 
     /// One that is in its first step where this one is when so many steps were made, and goes on as it does; `dt` is the length of a step
     /// in seconds.
-    pub fn from_step(&self, step: u64, dt: f32) -> Self {
+    pub fn begun_at(&self, step: u64, dt: f32) -> Self {
         let Some(path) = self.path else { return self.clone() };
         let (position, rotation) = self.pose(step, dt);
         // Other ways have a middle, which stays.
         let position = if matches!(path.travel, Travel::Line { .. }) { position } else { self.position };
-        Self { position, rotation, path: Some(path.from_step(step, dt)), ..self.clone() }
+        Self { position, rotation, path: Some(path.begun_at(step, dt)), ..self.clone() }
     }
 }
 

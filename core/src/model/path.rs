@@ -108,7 +108,7 @@ impl Path {
 
     /// The path of a body that begins where this one's is when so many steps were made: where a line starts, and how it is turned, is the
     /// body's own. `dt` is the length of a step in seconds.
-    pub(crate) fn from_step(&self, step: u64, dt: f32) -> Self {
+    pub(crate) fn begun_at(&self, step: u64, dt: f32) -> Self {
         let part = |period: f64, phase: f64| (step as f64 * f64::from(dt) / period + phase).fract();
         let travel = match self.travel {
             Travel::Rest | Travel::Line { .. } => self.travel,
@@ -169,7 +169,7 @@ mod tests {
             let wheel = Kind::new(Shape::circle(1.0), Material::default());
             let path = Some(Path { travel, turning: -2.0 });
             let fixed = StaticBody { path, ..StaticBody::new(GlobalId(0), wheel, DVec2::new(3.0, 4.0)) };
-            let (later, dt) = (fixed.from_step(77, 1.0 / 64.0), 1.0 / 64.0);
+            let (later, dt) = (fixed.begun_at(77, 1.0 / 64.0), 1.0 / 64.0);
             for step in [0, 1, 500] {
                 let ((at, turned), (expected, rotation)) = (later.pose(step, dt), fixed.pose(77 + step, dt));
                 assert!((at - expected).length() < 1e-9, "{travel:?}, {step}: {at}, not {expected}");
