@@ -5,9 +5,9 @@
 #[allow(unsafe_code)]
 pub(crate) mod ahead;
 pub(crate) mod crew;
-pub(crate) mod deal;
 #[allow(unsafe_code)]
 pub(crate) mod lanes;
+pub(crate) mod schedule;
 #[allow(unsafe_code)]
 pub(crate) mod shared;
 pub(crate) mod team;

@@ -1,24 +1,81 @@
-//! The threads that work inside one tile, where a rank has fewer tiles than threads.
+//! The threads that work inside one tile, where others would else have done long before ([`super::schedule`]).
 //!
 //! How many there are never shows in a result: work is cut into ranges, each range's result is a function of the range,
 //! and results are taken in the order of the ranges or are independent of it.
 
 use rayon::prelude::*;
+use std::cell::Cell;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// How many threads may work on a tile at once.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Team {
     threads: usize,
+    /// By which what they work is booked, if it is.
+    clock: Option<Clock>,
+}
+
+/// How long the thread that asks has worked so far.
+type Clock = fn() -> Duration;
+
+thread_local! {
+    /// Nanoseconds that others have worked for what this thread works on, less those in which it has worked for others.
+    static HELP: Cell<i64> = const { Cell::new(0) };
+}
+
+/// What a team works on one thing that is shared.
+struct Account {
+    clock: Option<Clock>,
+    worked: AtomicU64,
+}
+
+impl Account {
+    /// Lets `share` have work booked here, wherever it is done.
+    fn open<R>(clock: Option<Clock>, share: impl FnOnce(&Self) -> R) -> R {
+        let account = Self { clock, worked: AtomicU64::new(0) };
+        let begun = clock.map(|clock| clock());
+        let result = share(&account);
+        if let Some((clock, begun)) = clock.zip(begun) {
+            let here = clock().saturating_sub(begun).as_nanos() as i64;
+            HELP.set(HELP.get() + account.worked.into_inner() as i64 - here);
+        }
+        result
+    }
+
+    fn book<R>(&self, work: impl FnOnce() -> R) -> R {
+        let Some(clock) = self.clock else { return work() };
+        let begun = clock();
+        let result = work();
+        self.worked.fetch_add(clock().saturating_sub(begun).as_nanos() as u64, Ordering::Relaxed);
+        result
+    }
 }
 
 impl Team {
     /// One thread: everything in order.
-    pub(crate) const ALONE: Self = Self { threads: 1 };
+    pub(crate) const ALONE: Self = Self { threads: 1, clock: None };
 
-    /// All threads of this pool. Only for who holds no lock that another piece of the pool's work may ask for.
+    /// So many threads. Only for who holds no lock that another piece of the pool's work may ask for.
+    pub(crate) fn of(threads: usize) -> Self {
+        Self { threads, clock: None }
+    }
+
+    /// All threads of this pool.
     pub(crate) fn of_pool() -> Self {
-        Self { threads: rayon::current_num_threads() }
+        Self::of(rayon::current_num_threads())
+    }
+
+    /// The same team, whose work is booked by this clock.
+    pub(crate) fn booked_by(self, clock: Option<Clock>) -> Self {
+        Self { clock, ..self }
+    }
+
+    /// What is to be booked for what this thread worked on since it last asked, if its own clock has told so much.
+    pub(crate) fn add_help(worked: Duration) -> Duration {
+        let worked = worked.as_nanos() as i64 + HELP.take();
+        Duration::from_nanos(worked.max(0) as u64)
     }
 
     pub(crate) fn is_alone(self) -> bool {
@@ -67,26 +124,30 @@ impl Team {
         if self.is_alone() || things.len() == 1 {
             things.into_iter().map(work).collect()
         } else {
-            let piece = |thing| {
-                let _span = tracing::trace_span!("piece").entered();
-                work(thing)
-            };
-            things.into_par_iter().with_max_len(1).map(piece).collect()
+            Account::open(self.clock, |account| {
+                let piece = |thing| {
+                    let _span = tracing::trace_span!("piece").entered();
+                    account.book(|| work(thing))
+                };
+                things.into_par_iter().with_max_len(1).map(piece).collect()
+            })
         }
     }
 
     /// Runs `work` once for every thread: on this thread, and on those that come to help. Some may run one after the
     /// other, if nobody comes.
     pub(crate) fn together(self, work: impl Fn() + Sync) {
-        let work = || {
-            let _span = tracing::trace_span!("crew").entered();
-            work();
-        };
-        rayon::in_place_scope(|scope| {
-            for _ in 1..self.threads {
-                scope.spawn(|_| work());
-            }
-            work();
+        Account::open(self.clock, |account| {
+            let work = || {
+                let _span = tracing::trace_span!("crew").entered();
+                account.book(&work);
+            };
+            rayon::in_place_scope(|scope| {
+                for _ in 1..self.threads {
+                    scope.spawn(|_| work());
+                }
+                work();
+            });
         });
     }
 }
@@ -99,7 +160,7 @@ mod tests {
     fn ranges_make_up_the_whole() {
         for threads in [1, 2, 7] {
             for len in [0, 1, 9, 1000] {
-                let team = Team { threads };
+                let team = Team::of(threads);
                 let ranges: Vec<_> = team.ranges(len, 10).collect();
                 let mut all = vec![usize::MAX];
                 team.append(&mut all, len, 10, |range, part| part.extend(range));

@@ -72,7 +72,8 @@ struct Arranged {
     /// Bodies that others hear of within the step.
     sent: Vec<u32>,
     keeps_rows: bool,
-    team: Team,
+    /// Whether there is nobody to share a batch with.
+    alone: bool,
     islands: IslandSizes,
 }
 
@@ -89,9 +90,10 @@ impl Solver {
         setup: &Setup,
         team: Team,
     ) -> IslandSizes {
-        let counts = [tile.owned, tile.ghosts(), tile.bodies.len()];
+        let (counts, alone) = ([tile.owned, tile.ghosts(), tile.bodies.len()], team.is_alone());
         let is_same = |arranged: &Arranged| {
-            (arranged.counts, arranged.keeps_rows, arranged.team) == (counts, keeps_rows, team) && arranged.sent == sent
+            (arranged.counts, arranged.keeps_rows, arranged.alone) == (counts, keeps_rows, alone)
+                && arranged.sent == sent
         };
         // Who sleeps may change though contacts do not.
         match self.arranged.as_ref().filter(|_| !setup.params.sleep && contacts.are_between_the_same()) {
@@ -101,7 +103,7 @@ impl Solver {
             _ => {
                 let islands = self.arrange_anew(tile, &contacts.bodies, sent, keeps_rows, setup, team);
                 self.colors = 0;
-                self.arranged = Some(Arranged { counts, sent: sent.to_vec(), keeps_rows, team, islands });
+                self.arranged = Some(Arranged { counts, sent: sent.to_vec(), keeps_rows, alone, islands });
                 islands
             }
         }

@@ -77,16 +77,15 @@ pub(crate) struct Bench<'a> {
 pub(crate) struct Shop<'a> {
     pub(crate) setup: &'a Setup,
     pub(crate) step: u64,
-    pub(crate) team: Team,
     pub(crate) measures: bool,
     /// Whether this step takes figures.
     pub(crate) takes_figures: bool,
 }
 
 impl<'a> Bench<'a> {
-    pub(crate) fn new(shop: Shop<'a>, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
+    pub(crate) fn new(shop: Shop<'a>, team: Team, tile: &'a mut Tile, mail: Mail<'a>, hand: &'a mut Hand) -> Self {
         let Hand { migrate, timings, outgoing, figures, detection, work, .. } = hand;
-        let Shop { setup, step, team, measures, takes_figures } = shop;
+        let Shop { setup, step, measures, takes_figures } = shop;
         let figures = takes_figures.then_some(figures);
         let watch = Stopwatch::start();
         Self { tile, detection, work, migrate, outgoing, mail, setup, step, team, measures, figures, timings, watch }

@@ -12,6 +12,7 @@ use crate::exchange::verdict::Verdict;
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, TileId};
 use crate::model::names::{Names, Noted};
+use crate::parallel::schedule::Schedule;
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
@@ -58,6 +59,8 @@ pub struct World {
     forces: Vec<Force>,
     /// One per thread.
     hands: Vec<Mutex<Hand>>,
+    /// Which thread takes which of the busy tiles.
+    schedule: Schedule,
     /// Per tile what it keeps between the stages of a step with several sync points.
     works: Vec<Option<Box<Work>>>,
     outbox: Outbox,
@@ -136,6 +139,7 @@ impl World {
             questions: OnceLock::new(),
             forces: Vec::new(),
             hands: Vec::new(),
+            schedule: Schedule::default(),
             inbox,
             step: 0,
             sync: 0,

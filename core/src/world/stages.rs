@@ -7,20 +7,11 @@ use crate::exchange::verdict::Verdict;
 use crate::model::error::StepError;
 use crate::model::id::GlobalId;
 use crate::model::math::float_mode_is_default;
-use crate::parallel::deal::dealt;
 use crate::parallel::team::Team;
 use crate::step::phase::{Phase, Stopwatch};
-use crate::step::stage::{Bench, Shop, Work};
+use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::tile::{Fault, Tile, TileCounts};
-use rayon::prelude::*;
 use std::sync::Mutex;
-
-/// Whether every thread works on tiles of its own. Where there are fewer tiles than threads, all work on one tile after
-/// the other; not both, as who waits for others within a tile might be handed another tile, and its work is taken.
-fn apart(tiles: usize) -> bool {
-    let threads = rayon::current_num_threads();
-    threads > 1 && tiles >= threads
-}
 
 impl World {
     /// Starts a step: no sync point passed, nothing counted.
@@ -40,11 +31,19 @@ impl World {
         for &place in &self.busy {
             self.tiles[place as usize].counts = TileCounts::default();
         }
+        self.share_out();
+    }
+
+    /// Shares out the busy tiles to threads.
+    fn share_out(&mut self) {
+        let work = self.busy.iter().map(|&place| self.tiles[place as usize].work());
+        self.schedule.share_out(work, rayon::current_num_threads());
+        self.schedule.begin_with(self.first);
     }
 
     /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
     pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
-        let threads = if apart(self.busy.len()) { rayon::current_num_threads() as u32 } else { 1 };
+        let threads = self.busy.len().clamp(1, rayon::current_num_threads()) as u32;
         self.figures = std::mem::take(&mut self.takes_figures).then(Box::default);
         for hand in &mut self.hands {
             let hand = hand.get_mut().expect("no stage panicked");
@@ -112,6 +111,7 @@ impl World {
         if busy.len() > owners {
             busy.sort_unstable();
             busy.dedup();
+            self.share_out();
         }
     }
 
@@ -124,9 +124,9 @@ impl World {
         for &place in &*dismissed {
             works[place as usize] = None;
         }
-        let helped = rayon::current_num_threads() > 1 && !apart(busy.len());
-        if helped && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok) {
-            busy.iter().for_each(|&place| tiles[place as usize].counts.fault = Some(Fault::FloatMode));
+        self.share_out();
+        if self.schedule.helps() && !rayon::broadcast(|_| float_mode_is_default()).into_iter().all(|ok| ok) {
+            self.busy.iter().for_each(|&place| self.tiles[place as usize].counts.fault = Some(Fault::FloatMode));
         }
     }
 
@@ -141,26 +141,23 @@ impl World {
     }
 
     fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
-        let apart = apart(self.busy.len());
-        let Self { setup, hands, works, tiles, busy, inbox, step, measures, takes_figures, clock, first, .. } = self;
-        let team = if apart { Team::ALONE } else { Team::of_pool() };
-        let workers = if apart { 1 } else { rayon::current_num_threads() as u32 };
-        let shop = Shop { setup, step: *step, team, measures: *measures, takes_figures: *takes_figures };
+        let Self { setup, hands, schedule, works, tiles, busy, inbox, .. } = self;
+        let &mut Self { step, measures, takes_figures, clock, .. } = self;
+        let shop = Shop { setup, step, measures, takes_figures };
         for hand in hands.iter_mut() {
             hand.get_mut().expect("no stage panicked").booked_until = None;
         }
-        let (hands, inbox) = (&*hands, &*inbox);
-        let run = |(place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>)| {
-            let mut hand = hands[rayon::current_thread_index().unwrap_or(0)].lock().expect("no stage panicked");
+        let inbox = &*inbox;
+        let run = |team: Team, (place, tile, own): (usize, &mut Tile, &mut Option<Box<Work>>), hand: &mut Hand| {
             if !float_mode_is_default() {
                 tile.counts.fault = Some(Fault::FloatMode);
             }
             // Reading such a clock takes a while: where one tile ends the thread's next begins.
             let begun = clock.map(|clock| hand.booked_until.take().unwrap_or_else(clock));
-            let result = stage(&mut Bench::new(shop, tile, inbox.mail(place), &mut hand), own);
+            let result = stage(&mut Bench::new(shop, team.booked_by(clock), tile, inbox.mail(place), hand), own);
             if let Some((clock, begun)) = clock.zip(begun) {
                 let now = clock();
-                let worked = now.saturating_sub(begun) * workers;
+                let worked = Team::add_help(now.saturating_sub(begun));
                 tile.booked += worked;
                 hand.booked += worked;
                 hand.booked_until = Some(now);
@@ -176,19 +173,6 @@ impl World {
             rest = (place + 1, tiles, works);
             (place, tile, work)
         });
-        let in_place = |job: (usize, &mut Tile, &mut Option<Box<Work>>)| (job.0, run(job));
-        let mut results: Vec<_> = if apart {
-            let dealt = dealt(tiles.collect(), |(_, tile, _)| tile.work(), rayon::current_num_threads());
-            dealt.into_par_iter().with_max_len(1).map(in_place).collect()
-        } else if *first == 0 {
-            return tiles.map(run).collect();
-        } else {
-            let mut jobs: Vec<_> = tiles.collect();
-            let first = *first % jobs.len().max(1);
-            jobs.rotate_left(first);
-            jobs.into_iter().map(in_place).collect()
-        };
-        results.sort_unstable_by_key(|&(place, _)| place);
-        results.into_iter().map(|(_, result)| result).collect()
+        schedule.run(tiles, hands, run)
     }
 }
