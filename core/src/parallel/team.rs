@@ -3,6 +3,7 @@
 //! How many there are never shows in a result: work is cut into ranges, each range's result is a function of the range,
 //! and results are taken in the order of the ranges or are independent of it.
 
+use super::crew::{Crew, Member, Needed};
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::ops::Range;
@@ -135,12 +136,15 @@ impl Team {
     }
 
     /// Runs `work` once for every thread: on this thread, and on those that come to help. Some may run one after the
-    /// other, if nobody comes.
-    pub(crate) fn together(self, work: impl Fn() + Sync) {
+    /// other, if nobody comes. Each is a member of one crew.
+    pub(crate) fn together(self, work: impl Fn(Member<'_>) + Sync) {
+        let crew = Crew::<Needed>::new(self.threads);
+
         Account::open(self.clock, |account| {
             let work = || {
                 let _span = tracing::trace_span!("crew").entered();
-                account.book(&work);
+                // The same seat for the same thread, in whatever it helps.
+                account.book(|| work(crew.member(rayon::current_thread_index().unwrap_or(0))));
             };
             rayon::in_place_scope(|scope| {
                 for _ in 1..self.threads {

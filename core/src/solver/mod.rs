@@ -34,7 +34,7 @@ use crate::collide::narrow_phase::Contacts;
 use crate::islands::{IslandSizes, Islands};
 use crate::model::contact::ContactCache;
 use crate::model::params::{Exchange, Parallel};
-use crate::parallel::crew::{Crew, Member, Needed};
+use crate::parallel::crew::Member;
 use crate::parallel::team::Team;
 use crate::state::violation::Violation;
 use crate::tiling::blueprint::Setup;
@@ -226,8 +226,7 @@ impl Solver {
         let to_do = self.jobs().filter(|job| !substeps(job).is_empty());
         let (large, small): (Vec<_>, Vec<_>) = to_do.partition(|job| job.large);
         for job in &large {
-            let crew = Crew::<Needed>::new();
-            team.together(|| setup.lanes.run(Run { job, member: crew.member(), substeps: substeps(job), setup }));
+            team.together(|member| setup.lanes.run(Run { job, member, substeps: substeps(job), setup }));
         }
         team.for_each(small, alone);
     }

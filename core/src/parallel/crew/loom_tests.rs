@@ -15,15 +15,15 @@ struct Work<O> {
 }
 
 impl<O: Orderings> Work<O> {
-    fn new(stages: u32, pieces: u32) -> Self {
-        Self { crew: Crew::new(), things: (0..pieces).map(|_| Seen::new(0)).collect(), stages }
+    fn new(seats: u32, stages: u32, pieces: u32) -> Self {
+        Self { crew: Crew::new(seats as usize), things: (0..pieces).map(|_| Seen::new(0)).collect(), stages }
     }
 
     /// What one member does; returns how many pieces fell to it. A stage's pieces are the things in another order than
     /// in the stage before, so that what one member wrote is another's to read. The cells see to it that whoever touches
     /// a thing has seen what was done to it before; the counts, that it was done once in each stage.
-    fn member(&self) -> u32 {
-        let (member, pieces) = (self.crew.member(), self.things.len() as u32);
+    fn member(&self, seat: u32) -> u32 {
+        let (member, pieces) = (self.crew.member(seat as usize), self.things.len() as u32);
         let mut taken = 0;
         for stage in 0..self.stages {
             for piece in member.pieces(pieces) {
@@ -45,13 +45,13 @@ fn check<O: Orderings + 'static>(members: u32, stages: u32, pieces: u32, interru
     let mut model = loom::model::Builder::new();
     model.preemption_bound = Some(interrupted);
     model.check(move || {
-        let work = Arc::new(Work::<O>::new(stages, pieces));
-        let spawn = |_| {
+        let work = Arc::new(Work::<O>::new(members.min(2), stages, pieces));
+        let spawn = |seat| {
             let work = work.clone();
-            thread::spawn(move || work.member())
+            thread::spawn(move || work.member(seat))
         };
         let others: Vec<_> = (1..members).map(spawn).collect();
-        let own = work.member();
+        let own = work.member(0);
         let all = own + others.into_iter().map(|other| other.join().unwrap()).sum::<u32>();
         assert_eq!(all, stages * pieces);
     });
@@ -68,20 +68,20 @@ fn loom_each_piece_is_done_once_and_seen_in_the_next_stage() {
 #[test]
 fn loom_a_member_that_comes_late_finds_all_done() {
     loom::model(|| {
-        let work = Arc::new(Work::<Needed>::new(2, 2));
-        assert_eq!(work.member(), 4);
+        let work = Arc::new(Work::<Needed>::new(2, 2, 2));
+        assert_eq!(work.member(0), 4);
         let late = work.clone();
-        assert_eq!(thread::spawn(move || late.member()).join().unwrap(), 0);
+        assert_eq!(thread::spawn(move || late.member(1)).join().unwrap(), 0);
     });
 }
 
 #[test]
 fn loom_nobody_waits_for_a_member_that_panicked() {
     loom::model(|| {
-        let crew = Arc::new(Crew::<Needed>::new());
+        let crew = Arc::new(Crew::<Needed>::new(1));
         // Whoever gets the piece drops it undone, as a panic does.
         let run = |crew: &Crew<Needed>| {
-            let member = crew.member();
+            let member = crew.member(0);
             let mut pieces = member.pieces(1);
             catch_unwind(AssertUnwindSafe(|| pieces.next())).map_err(drop)
         };
@@ -101,10 +101,10 @@ fn misses_something<O: Orderings + 'static>() {
 }
 
 #[test]
-fn loom_a_piece_that_is_done_must_be_handed_on() {
+fn loom_pieces_that_are_done_must_be_handed_on() {
     struct Weak;
     impl Orderings for Weak {
-        const PIECE_DONE: Ordering = Ordering::Acquire;
+        const PIECES_DONE: Ordering = Ordering::Acquire;
     }
     misses_something::<Weak>();
 }
@@ -113,7 +113,7 @@ fn loom_a_piece_that_is_done_must_be_handed_on() {
 fn loom_whoever_is_last_must_take_up_what_others_did() {
     struct Weak;
     impl Orderings for Weak {
-        const PIECE_DONE: Ordering = Ordering::Release;
+        const PIECES_DONE: Ordering = Ordering::Release;
     }
     misses_something::<Weak>();
 }
