@@ -219,20 +219,27 @@ impl ContactCache {
         self.contacts.clear();
     }
 
-    pub(crate) fn append(&mut self, other: &mut Self) {
-        self.keys.append(&mut other.keys);
-        self.contacts.append(&mut other.contacts);
-    }
-
-    /// Becomes a copy of another. Room is made for little more than is needed: there is one cache per tile.
+    /// Becomes a copy of another.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.clear();
-        if self.keys.capacity() < other.len() {
-            self.keys.reserve_exact(other.len() + other.len() / 8);
-            self.contacts.reserve_exact(other.len() + other.len() / 8);
-        }
+        self.reserve(other.len());
         self.keys.extend_from_slice(&other.keys);
         self.contacts.extend_from_slice(&other.contacts);
+    }
+
+    /// Has so many contacts, which are yet to be written.
+    pub(crate) fn resize(&mut self, count: usize) {
+        self.reserve(count);
+        self.keys.resize(count, PairKey::default());
+        self.contacts.resize(count, Contact::zeroed());
+    }
+
+    /// Makes room for little more than is needed: there is one cache per tile.
+    fn reserve(&mut self, count: usize) {
+        if self.keys.capacity() < count {
+            self.keys.reserve_exact(count + count / 8 - self.keys.len());
+            self.contacts.reserve_exact(count + count / 8 - self.contacts.len());
+        }
     }
 
     /// Those of the pair whose first contact is at this place.

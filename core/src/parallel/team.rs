@@ -4,9 +4,9 @@
 //! and results are taken in the order of the ranges or are independent of it.
 
 use super::crew::{Crew, Member, Needed};
-use rayon::prelude::*;
 use std::cell::Cell;
 use std::ops::Range;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -24,34 +24,6 @@ type Clock = fn() -> Duration;
 thread_local! {
     /// Nanoseconds that others have worked for what this thread works on, less those in which it has worked for others.
     static HELP: Cell<i64> = const { Cell::new(0) };
-}
-
-/// What a team works on one thing that is shared.
-struct Account {
-    clock: Option<Clock>,
-    worked: AtomicU64,
-}
-
-impl Account {
-    /// Lets `share` have work booked here, wherever it is done.
-    fn open<R>(clock: Option<Clock>, share: impl FnOnce(&Self) -> R) -> R {
-        let account = Self { clock, worked: AtomicU64::new(0) };
-        let begun = clock.map(|clock| clock());
-        let result = share(&account);
-        if let Some((clock, begun)) = clock.zip(begun) {
-            let here = clock().saturating_sub(begun).as_nanos() as i64;
-            HELP.set(HELP.get() + account.worked.into_inner() as i64 - here);
-        }
-        result
-    }
-
-    fn book<R>(&self, work: impl FnOnce() -> R) -> R {
-        let Some(clock) = self.clock else { return work() };
-        let begun = clock();
-        let result = work();
-        self.worked.fetch_add(clock().saturating_sub(begun).as_nanos() as u64, Ordering::Relaxed);
-        result
-    }
 }
 
 impl Team {
@@ -81,6 +53,10 @@ impl Team {
 
     pub(crate) fn is_alone(self) -> bool {
         self.threads == 1
+    }
+
+    pub(crate) fn size(self) -> usize {
+        self.threads
     }
 
     /// How many ranges to cut `len` things into, none shorter than `grain`: some for each thread, so that none waits
@@ -120,39 +96,47 @@ impl Team {
         parts.iter().for_each(|part| all.extend_from_slice(part));
     }
 
-    /// Runs `work` on each of some things; the results in order.
+    /// Runs `work` on each of some things; the results in order. Which thread begins with which is the same wherever there are as many.
     pub(crate) fn for_each<T: Send, R: Send>(self, things: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
-        if self.is_alone() || things.len() == 1 {
-            things.into_iter().map(work).collect()
-        } else {
-            Account::open(self.clock, |account| {
-                let piece = |thing| {
-                    let _span = tracing::trace_span!("piece").entered();
-                    account.book(|| work(thing))
-                };
-                things.into_par_iter().with_max_len(1).map(piece).collect()
-            })
+        const TAKEN_ONCE: &str = "each piece is taken once, by one thread";
+        let count = things.len();
+        if self.is_alone() || count <= 1 {
+            return things.into_iter().map(work).collect();
         }
+        let slots: Vec<_> = things.into_iter().map(|thing| Mutex::new((Some(thing), None))).collect();
+        Self { threads: self.threads.min(count), ..self }.together(|member| {
+            for piece in member.pieces(count as u32) {
+                let _span = tracing::trace_span!("piece").entered();
+                let mut slot = slots[piece as usize].lock().expect(TAKEN_ONCE);
+                slot.1 = slot.0.take().map(&work);
+            }
+        });
+        slots.into_iter().filter_map(|slot| slot.into_inner().expect(TAKEN_ONCE).1).collect()
     }
 
     /// Runs `work` once for every thread: on this thread, and on those that come to help. Some may run one after the
     /// other, if nobody comes. Each is a member of one crew.
     pub(crate) fn together(self, work: impl Fn(Member<'_>) + Sync) {
         let crew = Crew::<Needed>::new(self.threads);
-
-        Account::open(self.clock, |account| {
-            let work = || {
-                let _span = tracing::trace_span!("crew").entered();
-                // The same seat for the same thread, in whatever it helps.
-                account.book(|| work(crew.member(rayon::current_thread_index().unwrap_or(0))));
-            };
-            rayon::in_place_scope(|scope| {
-                for _ in 1..self.threads {
-                    scope.spawn(|_| work());
-                }
-                work();
-            });
+        let begun = self.clock.map(|clock| clock());
+        let worked = AtomicU64::new(0);
+        let work = || {
+            let _span = tracing::trace_span!("crew").entered();
+            let begun = self.clock.map(|clock| clock());
+            // The same seat for the same thread, in whatever it helps.
+            work(crew.member(rayon::current_thread_index().unwrap_or(0)));
+            worked.fetch_add(self.nanoseconds_since(begun) as u64, Ordering::Relaxed);
+        };
+        rayon::in_place_scope(|scope| {
+            (1..self.threads).for_each(|_| scope.spawn(|_| work()));
+            work();
         });
+        HELP.set(HELP.get() + worked.into_inner() as i64 - self.nanoseconds_since(begun));
+    }
+
+    /// By the clock, if there is one.
+    fn nanoseconds_since(self, begun: Option<Duration>) -> i64 {
+        self.clock.zip(begun).map_or(0, |(clock, begun)| clock().saturating_sub(begun).as_nanos() as i64)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::ContactCache;
+use crate::parallel::team::Team;
 use crate::tiling::tile::Tile;
 
 /// What a step knows of each of a tile's contacts beside what outlives it, in their canonical order: ascending by their bodies' slots,
@@ -20,6 +21,28 @@ impl Contacts {
     /// Whether they are between the same bodies as those that were found before, as what rests has them.
     pub(crate) fn are_between_the_same(&self) -> bool {
         self.bodies == self.before
+    }
+
+    /// Puts together what was found in several parts, one after another.
+    pub(super) fn gather(&mut self, parts: &[Found], cache: &mut ContactCache, team: Team) {
+        let count = parts.iter().map(|part| part.cache.len()).sum();
+        cache.resize(count);
+        self.separation.resize(count, [0.0; 2]);
+        self.bodies.resize(count, [0, 0]);
+        let (mut keys, mut contacts) = (&mut cache.keys[..], &mut cache.contacts[..]);
+        let (mut separation, mut bodies) = (&mut self.separation[..], &mut self.bodies[..]);
+        let copies = parts.iter().map(|part| {
+            let count = part.cache.len();
+            let keys = keys.split_off_mut(..count).zip(contacts.split_off_mut(..count));
+            let beside = separation.split_off_mut(..count).zip(bodies.split_off_mut(..count));
+            (part, keys.zip(beside).expect("there is room for all"))
+        });
+        team.for_each(copies.collect(), |(part, ((keys, contacts), (separation, bodies)))| {
+            keys.copy_from_slice(&part.cache.keys);
+            contacts.copy_from_slice(&part.cache.contacts);
+            separation.copy_from_slice(&part.separation);
+            bodies.copy_from_slice(&part.bodies);
+        });
     }
 
     /// Contacts of a tile, and border contacts, of which body A is owned: so that each is counted by one tile.
@@ -49,11 +72,5 @@ impl Found {
         self.cache.clear();
         self.separation.clear();
         self.bodies.clear();
-    }
-
-    pub(super) fn append(&mut self, other: &mut Self) {
-        self.cache.append(&mut other.cache);
-        self.separation.append(&mut other.separation);
-        self.bodies.append(&mut other.bodies);
     }
 }

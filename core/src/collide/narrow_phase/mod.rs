@@ -2,11 +2,11 @@
 
 mod contacts;
 mod names;
+mod sorted;
 
 pub(crate) use contacts::Contacts;
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::cull::Cull;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch, touch_pieces};
@@ -20,6 +20,7 @@ use crate::tiling::tile::Tile;
 use bytemuck::Zeroable;
 use contacts::Found;
 use names::{Named, Names};
+use sorted::Sorted;
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -29,10 +30,7 @@ const GRAIN: usize = 2048;
 /// Buffers of the narrow phase, shared by all tiles of a thread.
 #[derive(Default, Debug)]
 pub(crate) struct NarrowPhase {
-    near: Vec<Pair>,
-    sorted: Vec<Pair>,
-    /// Per body that may be a pair's first where its pairs begin in `sorted`.
-    start: Vec<u32>,
+    sorted: Sorted,
     /// For each body whether its contacts are known by name alone.
     by_name: Vec<bool>,
     boxes: PieceBoxes,
@@ -52,52 +50,29 @@ impl NarrowPhase {
         team: Team,
         contacts: &mut Contacts,
     ) {
-        self.cull(tile, proxies, candidates, setup, team);
-        self.sort(proxies.pairing);
+        self.sorted.find(tile, proxies, candidates, setup, team);
         self.mark_newcomers(tile);
         self.boxes.place(tile, setup);
-        // What outlives the step is found where it was for the tile before, in the cache.
         std::mem::swap(&mut contacts.bodies, &mut contacts.before);
-        std::mem::swap(&mut contacts.bodies, &mut self.found.bodies);
-        std::mem::swap(&mut contacts.separation, &mut self.found.separation);
-        self.find_among(tile, setup, team);
-        std::mem::swap(&mut contacts.bodies, &mut self.found.bodies);
-        std::mem::swap(&mut contacts.separation, &mut self.found.separation);
-        tile.contacts.copy_from(&self.found.cache);
-    }
-
-    /// Finds the contacts among the sorted pairs.
-    fn find_among(&mut self, tile: &Tile, setup: &Setup, team: Team) {
-        let (sorted, by_name, boxes, found) = (&self.sorted[..], &self.by_name[..], &self.boxes, &mut self.found);
+        let Self { sorted, by_name, boxes, found, parts } = self;
+        let (sorted, among) = (sorted.pairs(), FindAmong { sorted: sorted.pairs(), by_name, boxes, tile, setup });
+        if team.pieces(sorted.len(), GRAIN) > 1 {
+            parts.resize_with(team.pieces(sorted.len(), GRAIN), Found::default);
+            let ranges = team.ranges(sorted.len(), GRAIN).zip(&mut *parts);
+            team.for_each(ranges.collect(), |(range, part): (Range<usize>, &mut Found)| {
+                part.clear();
+                setup.lanes.run((FindAmong { sorted: &sorted[range], ..among }, part));
+            });
+            return contacts.gather(parts, &mut tile.contacts, team);
+        }
+        // What outlives the step is found where it was for the tile before, in the cache.
+        std::mem::swap(&mut contacts.bodies, &mut found.bodies);
+        std::mem::swap(&mut contacts.separation, &mut found.separation);
         found.clear();
-        let pieces = team.pieces(sorted.len(), GRAIN);
-        if pieces == 1 {
-            return setup.lanes.run((FindAmong { sorted, by_name, boxes, tile, setup }, found));
-        }
-        self.parts.resize_with(pieces, Found::default);
-        let parts = team.ranges(sorted.len(), GRAIN).zip(&mut self.parts).collect();
-        team.for_each(parts, |(range, part): (Range<usize>, &mut Found)| {
-            let among = FindAmong { sorted: &sorted[range], by_name, boxes, tile, setup };
-            setup.lanes.run((among, part));
-        });
-        self.parts.iter_mut().for_each(|part| found.append(part));
-    }
-
-    /// Keeps the candidates that are pairs, and counts them by their lower index.
-    fn cull(&mut self, tile: &Tile, proxies: &Proxies, candidates: &[Pair], setup: &Setup, team: Team) {
-        self.near.clear();
-        team.append(&mut self.near, candidates.len(), GRAIN, |range, near| {
-            setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates: &candidates[range], near });
-        });
-        if setup.filters {
-            let kind = |body: u32| setup.kind(tile.bodies.kind[body as usize]);
-            self.near.retain(|&[a, b]| kind(a).touches(kind(b)));
-        }
-        self.start.clear();
-        self.start.resize(proxies.pairing + 2, 0);
-        for pair in &self.near {
-            self.start[pair[0] as usize + 2] += 1;
-        }
+        setup.lanes.run((among, &mut *found));
+        std::mem::swap(&mut contacts.bodies, &mut found.bodies);
+        std::mem::swap(&mut contacts.separation, &mut found.separation);
+        tile.contacts.copy_from(&found.cache);
     }
 
     fn mark_newcomers(&mut self, tile: &Tile) {
@@ -107,31 +82,10 @@ impl NarrowPhase {
         self.by_name.resize(tile.owned + tile.ghosts(), true);
         self.by_name.resize(tile.bodies.len(), false);
     }
-
-    /// Sorts the pairs: counted by their lower index, then by hand within the few of each body.
-    fn sort(&mut self, firsts: usize) {
-        let mut sum = 0;
-        for start in &mut self.start {
-            sum += *start;
-            *start = sum;
-        }
-        self.sorted.clear();
-        self.sorted.resize(self.near.len(), [0, 0]);
-        for &pair in &self.near {
-            let place = &mut self.start[pair[0] as usize + 1];
-            self.sorted[*place as usize] = pair;
-            *place += 1;
-        }
-        for body in 0..firsts {
-            let (first, end) = (self.start[body] as usize, self.start[body + 1] as usize);
-            if end - first > 1 {
-                self.sorted[first..end].sort_unstable();
-            }
-        }
-    }
 }
 
 /// Appends the contacts among some sorted pairs to those there are.
+#[derive(Clone, Copy)]
 struct FindAmong<'a> {
     sorted: &'a [Pair],
     by_name: &'a [bool],
