@@ -247,7 +247,10 @@ impl Solver {
     }
 
     /// Copies the impulses of the last substep back to the contacts, but of batches that were solved at once.
-    pub(crate) fn store_impulses(&self, contacts: &mut ContactCache) {
+    pub(crate) fn store_impulses(&self, contacts: &mut ContactCache, team: Team) {
+        if !team.is_alone() {
+            return self.groups.store_all_impulses(&mut contacts.contacts, team);
+        }
         let batches = self.batches.all.iter().filter(|batch| !batch.at_once);
         batches.for_each(|batch| self.groups.store_impulses(batch, &mut contacts.contacts));
     }

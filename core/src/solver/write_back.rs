@@ -17,7 +17,7 @@ use bytemuck::cast_slice_mut;
 use std::ops::Range;
 
 /// Bodies in a piece of work, at least.
-const GRAIN: usize = 4096;
+const GRAIN: usize = 2048;
 
 /// Writes the solved bodies' new state back, and moves those without contacts. Ghosts' results are scratch: their
 /// owners' stand. Who sleeps is left alone. Notes who may concern other tiles from now on.

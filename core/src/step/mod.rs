@@ -249,7 +249,7 @@ fn finalize(bench: &mut Bench<'_>) {
         if b.measures {
             b.tile.violation = solver.violation(&b.tile.contacts, b.setup);
         }
-        solver.store_impulses(&mut b.tile.contacts);
+        solver.store_impulses(&mut b.tile.contacts, b.team);
         let ways = far::ways(b.tile, &solver.bodies, b.setup);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
         far::hold(b.tile, &ways, b.setup, b.step);

@@ -16,7 +16,7 @@ use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
 use crate::parallel::team::Team;
 
 /// Bodies in a piece of work, at least.
-const GRAIN: usize = 4096;
+const GRAIN: usize = 1024;
 
 /// Up to this many bodies are simply tried against each other.
 const FEW: usize = 24;

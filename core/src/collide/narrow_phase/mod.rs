@@ -25,7 +25,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Candidates, and pairs, in a piece of work, at least.
-const GRAIN: usize = 2048;
+const GRAIN: usize = 1024;
 
 /// Buffers of the narrow phase, shared by all tiles of a thread.
 #[derive(Default, Debug)]

@@ -5,8 +5,12 @@ use super::group::{PointRows, Sides};
 use crate::model::contact::Contact;
 use crate::model::math::max;
 use crate::parallel::lanes::{Quad, WideRow};
+use crate::parallel::team::Team;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
+
+/// Contacts in a piece of work, at least.
+const GRAIN: usize = 2048;
 
 /// All constraints of a tile, batch by batch and color by color.
 #[derive(Default, Debug)]
@@ -94,6 +98,15 @@ impl Lane {
     }
 }
 
+/// Copies the impulses of one lane back to its contact.
+#[inline(always)]
+fn store_impulses(contact: &mut Contact, rows: &[PointRows], lane: usize) {
+    for (point, rows) in contact.points.iter_mut().zip(rows) {
+        point.normal_impulse = rows.normal_impulse[lane];
+        point.tangent_impulse = rows.tangent_impulse[lane];
+    }
+}
+
 impl Groups {
     /// The groups of all batches that keep theirs, and the colors of all batches.
     pub(crate) fn kept(&mut self) -> (Slices<'_>, &[Color]) {
@@ -111,10 +124,22 @@ impl Groups {
         columns.each(&batch.groups, batch.members_of(&self.members), |rows, members| {
             for (lane, &contact) in members.iter().enumerate() {
                 let Some(contact) = contacts.get_mut(contact as usize) else { continue };
-                for (point, rows) in contact.points.iter_mut().zip(rows) {
-                    point.normal_impulse = rows.normal_impulse[lane];
-                    point.tangent_impulse = rows.tangent_impulse[lane];
-                }
+                store_impulses(contact, rows, lane);
+            }
+        });
+    }
+
+    /// Copies the impulses of the last substep back to all contacts, whose batches keep their rows, with the help of others.
+    pub(crate) fn store_all_impulses(&self, contacts: &mut [Contact], team: Team) {
+        let (count, mut contacts) = (contacts.len(), contacts);
+        let parts = team.ranges(count, GRAIN).map(|range| {
+            let contacts = contacts.split_off_mut(..range.len()).expect("as many are left");
+            (contacts, &self.lanes[range])
+        });
+        team.for_each(parts.collect(), |(contacts, lanes)| {
+            for (contact, lane) in contacts.iter_mut().zip(lanes).filter(|(_, lane)| **lane != Lane::NONE) {
+                let (_, rows, lane) = lane.rows(&self.kept);
+                store_impulses(contact, rows, lane);
             }
         });
     }

@@ -30,6 +30,8 @@ struct Unit<'a> {
     groups: Slices<'a>,
     members: Each<&'a [Members]>,
     local: Local,
+    /// Where among the slices of its color it is, from 0 to 1023.
+    order: u32,
 }
 
 /// Writes the rows of a unit.
@@ -42,7 +44,7 @@ impl Kernel for Write<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Unit { groups, members, local } = self.unit;
+        let Unit { groups, members, local, .. } = self.unit;
         let inputs = Inputs::nothing(local);
         groups.visit(members, &mut WriteRows::<V::Wide> { source: self.source, local, inputs, lanes: PhantomData });
     }
@@ -261,7 +263,11 @@ impl Groups {
                 |unit| if team.is_alone() { write(unit) } else { units.push(unit) },
             );
         }
-        team.for_each(units, write);
+        // Who begins with the first slices of each color writes the rows of these as well.
+        units.sort_by_key(|unit| unit.order);
+        let mut units = units.into_iter();
+        let runs = team.ranges(units.len(), 1).map(|range| units.by_ref().take(range.len()).collect());
+        team.for_each(runs.collect(), |run: Vec<_>| run.into_iter().for_each(write));
     }
 
     /// Writes the rows of the contacts of a batch that is solved at once.
@@ -285,7 +291,8 @@ fn each_unit<'a>(
             let counts = lengths(&color.slice(slice));
             let own = |column: usize| members[column].split_off(..counts[column]).expect("as many as groups");
             let (groups, members) = (groups.split_off(counts), std::array::from_fn(own));
-            show(Unit { groups, members, local: Local { base: batch.bodies.start as u32, slice } });
+            let (local, order) = (Local { base: batch.bodies.start as u32, slice }, 1024 * slice / color.slices);
+            show(Unit { groups, members, local, order });
         }
     }
 }
