@@ -1,10 +1,15 @@
 //! Upright rectangles around the convex pieces of bodies, by which most pairs of pieces are seen to be apart.
 
+use crate::model::id::KindId;
 use crate::model::math::{Rot, max};
 use crate::model::piece::Piece;
+use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
+
+/// Bodies in a piece of work, at least.
+const GRAIN: usize = 512;
 
 /// Low and high corner of a rectangle, from the center of the body, in meters.
 #[derive(Clone, Copy, Debug)]
@@ -38,19 +43,28 @@ pub(super) struct PieceBoxes {
 
 impl PieceBoxes {
     /// Places them around the bodies of several pieces as they are now, if there are any.
-    pub(super) fn place(&mut self, tile: &Tile, setup: &Setup) {
+    pub(super) fn place(&mut self, tile: &Tile, setup: &Setup, team: Team) {
         self.start.clear();
         self.boxes.clear();
         if !setup.compounds {
             return;
         }
-        for (&kind, &rotation) in tile.bodies.kind.iter().zip(&tile.bodies.rotation) {
-            self.start.push(self.boxes.len() as u32);
-            if let all @ [_, _, ..] = &setup.kind(kind).pieces[..] {
-                self.boxes.extend(all.iter().map(|piece| PieceBox::new(piece, rotation)));
-            }
+        let several = |kind: KindId| match &setup.kind(kind).pieces[..] {
+            all @ [_, _, ..] => all,
+            _ => &[],
+        };
+        let (kinds, rotations) = (&tile.bodies.kind[..], &tile.bodies.rotation[..]);
+        let mut count = 0;
+        for &kind in kinds {
+            self.start.push(count as u32);
+            count += several(kind).len();
         }
-        self.start.push(self.boxes.len() as u32);
+        self.start.push(count as u32);
+        team.append(&mut self.boxes, kinds.len(), GRAIN, |range, boxes| {
+            for (&kind, &rotation) in kinds[range.clone()].iter().zip(&rotations[range]) {
+                boxes.extend(several(kind).iter().map(|piece| PieceBox::new(piece, rotation)));
+            }
+        });
     }
 
     /// Those of a body, in the order of its pieces; `only` is room for that of a body that has one.

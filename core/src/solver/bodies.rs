@@ -331,6 +331,9 @@ impl SolverBodies {
     /// Which of these the bodies of a contact are, given their places: of a static whose surface moves, the one that carries there.
     #[cold]
     pub(crate) fn carried_in(&self, contact: u32, places: [SolverIndex; 2]) -> [SolverIndex; 2] {
+        if !places.contains(&SolverIndex::STATIC) {
+            return places;
+        }
         let Ok(found) = self.carriers.binary_search_by_key(&contact, |carrier| carrier.contact) else { return places };
         let carrier = self.index[self.index.len() - self.carriers.len() + found];
         places.map(|place| if place == SolverIndex::STATIC { carrier } else { place })

@@ -288,11 +288,14 @@ mod tests {
 
     #[test]
     fn each_seat_has_its_own_pieces_and_then_those_of_others() {
-        for (seat, pieces, order) in
-            [(0, 4, vec![0, 1, 2, 3]), (1, 4, vec![2, 3, 0, 1]), (4, 5, vec![3, 4, 0, 1, 2]), (2, 1, vec![0])]
-        {
-            let crew = Crew::<Needed>::new(if pieces == 4 { 2 } else { 3 });
-            assert!(crew.member(seat).pieces(pieces).eq(order), "seat {seat}");
+        for (seats, seat, pieces, order) in [
+            (2, 0, 4, vec![0, 1, 2, 3]),
+            (2, 1, 4, vec![2, 3, 0, 1]),
+            (3, 4, 5, vec![2, 3, 4, 0, 1]),
+            (3, 2, 1, vec![0]),
+        ] {
+            let crew = Crew::<Needed>::new(seats);
+            assert!(crew.member(seat).pieces(pieces).eq(order), "seat {seat} of {seats}");
         }
     }
 }
