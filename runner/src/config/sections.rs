@@ -214,9 +214,7 @@ impl Config {
     /// The files that its scene is read from, if they are open.
     pub(crate) fn scene_files(&self) -> Vec<PathBuf> {
         let SceneKind::File(spec) = &self.scene.kind else { return Vec::new() };
-        let file = spec.file().ok();
-        let bodies = file.as_ref().and_then(|file| file.bodies_path()).map(Path::to_owned);
-        file.iter().map(|file| file.path().to_owned()).chain(bodies).collect()
+        spec.file().iter().flat_map(|file| file.paths()).map(Path::to_owned).collect()
     }
 
     /// Steps in a second.

@@ -54,6 +54,14 @@ impl<'a> CsvRows<'a> {
         Ok(Self { scenery, header, reader, record: ByteRecord::new(), row: 0, failed: false })
     }
 
+    /// Whether a file has that column.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(super) fn has(path: &Path, column: Column) -> Result<bool, SceneError> {
+        Ok(open(path)?.1.has(column))
+    }
+
     /// The body of the record that was read.
     fn body(&self) -> Result<Body, SceneError> {
         let values = Values {

@@ -4,8 +4,8 @@ use super::super::{Place, SceneError};
 use super::entries::{Entries, place};
 use super::kinds::kinds;
 use super::row::FARTHEST;
-use super::statics::statics;
-use atoll_core::{Kind, StaticBody};
+use super::statics::{Statics, statics};
+use atoll_core::Kind;
 use glam::DVec2;
 use std::path::Path;
 use toml::{Table, Value};
@@ -27,10 +27,7 @@ pub(super) struct Description {
     pub(super) physics: Table,
     pub(super) kinds: Vec<Kind>,
     pub(super) names: Vec<Option<String>>,
-    /// With ids from 0 where they have none of their own.
-    pub(super) statics: Vec<StaticBody>,
-    /// Whether those are their own.
-    pub(super) are_named: bool,
+    pub(super) statics: Statics,
     pub(super) bodies: Bodies,
 }
 
@@ -70,7 +67,7 @@ impl Description {
         let domain = domain(&mut entries)?;
         let physics = entries.table("physics")?.cloned().unwrap_or_default();
         let (kinds, names) = kinds(file, &entries.tables("kinds")?)?;
-        let (statics, are_named) = statics(file, &entries.tables("statics")?)?;
+        let statics = statics(file, &entries.tables("statics")?)?;
         let in_file = entries.table("bodies")?;
         let inline: Vec<Table> = entries.tables("body")?.into_iter().cloned().collect();
         entries.finish()?;
@@ -83,7 +80,7 @@ impl Description {
             Some(table) => self::in_file(file, table)?,
             None => Bodies::Inline(inline),
         };
-        Ok(Self { name, domain, physics, kinds, names, statics, are_named, bodies })
+        Ok(Self { name, domain, physics, kinds, names, statics, bodies })
     }
 }
 

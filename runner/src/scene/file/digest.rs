@@ -3,7 +3,7 @@
 use super::super::SceneError;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3Default;
 
 /// Files up to this many bytes are read whole for it.
@@ -12,14 +12,22 @@ const WHOLE: u64 = 256 << 20;
 /// Of larger ones, so many bytes at either end, and how many there are.
 const END: u64 = 64 << 20;
 
-/// That of a scene: of its text, and of the file that holds its bodies, if there is one. `told` is what the text says of that
+/// That of a scene: of its text, of the files with places of statics, and of the one that holds its bodies, if there is one. `told` is what the text says of that
 /// file, which is then read whole and compared.
 ///
 /// # Errors
 /// If the file cannot be read, or is another than the text says.
-pub(super) fn of_scene(text: &str, bodies: Option<(&Path, Option<&str>)>) -> Result<String, SceneError> {
+pub(super) fn of_scene(
+    text: &str,
+    places: &[PathBuf],
+    bodies: Option<(&Path, Option<&str>)>,
+) -> Result<String, SceneError> {
     let mut hash = Xxh3Default::new();
     hash.update(text.as_bytes());
+    for path in places {
+        let own = of_bodies(path, WHOLE, END).map_err(|error| SceneError::read(path, "these places", error))?;
+        hash.update(own.as_bytes());
+    }
     if let Some((path, told)) = bodies {
         let failed = |error: io::Error| SceneError::read(path, "these bodies", error);
         let whole = if told.is_some() { u64::MAX } else { WHOLE };

@@ -20,6 +20,7 @@ mod row;
 #[cfg(test)]
 pub(crate) mod shape_tests;
 mod statics;
+mod table;
 #[cfg(test)]
 mod tests;
 pub(crate) mod write;
@@ -36,13 +37,14 @@ use atoll_core::{Body, GlobalId, Kind, StaticBody};
 use csv_rows::CsvRows;
 use description::{Bodies, Description};
 use glam::DVec2;
-use parquet_file::ParquetFile;
 use parquet_rows::{ParquetRows, Wanted};
 use row::{Column, Scenery};
+use statics::Statics;
 use std::fs::{self, File};
 use std::io::Read;
 use std::iter;
 use std::path::{Path, PathBuf};
+use table::TableFile;
 use toml::Table;
 
 /// More bodies than this at one and the same place are no scene that can be computed.
@@ -75,8 +77,7 @@ pub struct SceneFile {
 #[derive(Debug)]
 enum Rows {
     Inline(Vec<Body>),
-    Csv(PathBuf),
-    Parquet(Box<ParquetFile>),
+    File(TableFile),
 }
 
 /// Bodies as they are read.
@@ -101,8 +102,9 @@ impl SceneFile {
         let description = Description::read(path, &text)?;
         let mut told = None;
         let mut static_ids: Vec<GlobalId> = Vec::new();
-        if description.are_named {
-            static_ids = description.statics.iter().map(|fixed| fixed.id).collect();
+        let Statics { all: statics, are_named, tables: places } = &description.statics;
+        if *are_named {
+            static_ids = statics.iter().map(|fixed| fixed.id).collect();
             static_ids.sort_unstable();
         }
         let scenery =
@@ -110,25 +112,21 @@ impl SceneFile {
         let (rows, digest) = match &description.bodies {
             Bodies::Inline(tables) => {
                 let (bodies, _) = inline::read(path, tables, &scenery)?;
-                (Rows::Inline(bodies), digest::of_scene(&text, None)?)
+                (Rows::Inline(bodies), digest::of_scene(&text, places, None)?)
             }
             Bodies::File { path: bodies, xxh3, count } => {
                 let file = path.parent().unwrap_or(Path::new("")).join(bodies);
                 told = *count;
                 check_regular(&file, "these bodies")?;
-                let digest = digest::of_scene(&text, Some((&file, xxh3.as_deref())))?;
-                match file.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase).as_deref()
-                {
-                    Some("csv") => (Rows::Csv(file), digest),
-                    Some("parquet") => (Rows::Parquet(Box::new(ParquetFile::open(&file)?)), digest),
-                    _ => {
-                        let place = Place { name: Some(format!("[bodies], path = {bodies:?}")), ..Place::default() };
-                        return Err(SceneError::bad(path, place, "must end in .csv or .parquet, by what the file is"));
-                    }
-                }
+                let digest = digest::of_scene(&text, places, Some((&file, xxh3.as_deref())))?;
+                let table = TableFile::open(&file, "these bodies")?.ok_or_else(|| {
+                    let place = Place { name: Some(format!("[bodies], path = {bodies:?}")), ..Place::default() };
+                    SceneError::bad(path, place, TableFile::MUST_END)
+                })?;
+                (Rows::File(table), digest)
             }
         };
-        let statics = description.statics.clone();
+        let statics = statics.clone();
         Ok((
             Self { path: path.to_owned(), digest, description, statics, static_ids, rows, count: 0, by_kind: None },
             told,
@@ -146,10 +144,12 @@ impl SceneFile {
     /// Counts the bodies, and where kinds differ much in size how many there are of each. Gives the greatest of their ids, if there are
     /// any and statics are to be called by it.
     fn look_through(&mut self) -> Result<Option<u64>, SceneError> {
-        let wants_last = !self.statics.is_empty() && !self.description.are_named;
+        let wants_last = !self.statics.is_empty() && !self.description.statics.are_named;
         let (count, last) = match &self.rows {
-            Rows::Parquet(parquet) if !wants_last => (parquet.rows, None),
-            Rows::Parquet(parquet) if !parquet.header.has(Column::Id) => (parquet.rows, parquet.rows.checked_sub(1)),
+            Rows::File(TableFile::Parquet(parquet)) if !wants_last => (parquet.rows, None),
+            Rows::File(TableFile::Parquet(parquet)) if !parquet.header.has(Column::Id) => {
+                (parquet.rows, parquet.rows.checked_sub(1))
+            }
             _ => {
                 let (mut count, mut last, mut by_kind) = (0, None, vec![0; self.kinds().len()]);
                 for body in self.iter() {
@@ -165,7 +165,7 @@ impl SceneFile {
         self.count = count;
         if self.by_kind.is_none()
             && large::may_be(self.kinds())
-            && let Rows::Parquet(parquet) = &self.rows
+            && let Rows::File(TableFile::Parquet(parquet)) = &self.rows
         {
             let mut by_kind = vec![0; self.kinds().len()];
             for body in ParquetRows::open(parquet, Wanted::Columns(&[Column::Kind]), |_, _| true)? {
@@ -184,7 +184,7 @@ impl SceneFile {
 
     /// Statics without ids of their own get those above all bodies.
     fn name_statics(&mut self, last: Option<u64>) -> Result<(), SceneError> {
-        if self.description.are_named || self.statics.is_empty() {
+        if self.description.statics.are_named || self.statics.is_empty() {
             return Ok(());
         }
         let first = last.map_or(Some(0), |last| last.checked_add(1));
@@ -213,9 +213,15 @@ impl SceneFile {
     pub fn bodies_path(&self) -> Option<&Path> {
         match &self.rows {
             Rows::Inline(_) => None,
-            Rows::Csv(path) => Some(path),
-            Rows::Parquet(parquet) => Some(&parquet.path),
+            Rows::File(TableFile::Csv(path)) => Some(path),
+            Rows::File(TableFile::Parquet(parquet)) => Some(&parquet.path),
         }
+    }
+
+    /// The files that it is read from: its text, and the tables that this names.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = &Path> {
+        let tables = self.description.statics.tables.iter().map(PathBuf::as_path);
+        iter::once(self.path()).chain(self.bodies_path()).chain(tables)
     }
 
     /// What it is called.
@@ -269,8 +275,8 @@ impl SceneFile {
     pub(super) fn near<'a>(&'a self, meets: impl Fn(DVec2, DVec2) -> bool + 'a) -> BodyIter<'a> {
         let all: BodyIter<'a> = match &self.rows {
             Rows::Inline(bodies) => Box::new(bodies.iter().copied().map(Ok)),
-            Rows::Csv(path) => or_error(CsvRows::open(self.scenery(path))),
-            Rows::Parquet(parquet) => {
+            Rows::File(TableFile::Csv(path)) => or_error(CsvRows::open(self.scenery(path))),
+            Rows::File(TableFile::Parquet(parquet)) => {
                 or_error(ParquetRows::open(parquet, Wanted::Bodies(self.scenery(&parquet.path)), &meets))
             }
         };
@@ -283,7 +289,7 @@ impl SceneFile {
     /// Where all bodies are.
     pub(super) fn places(&self) -> Box<dyn Iterator<Item = Result<DVec2, SceneError>> + '_> {
         let all = match &self.rows {
-            Rows::Parquet(parquet) => {
+            Rows::File(TableFile::Parquet(parquet)) => {
                 or_error(ParquetRows::open(parquet, Wanted::Columns(&[Column::X, Column::Y]), |_, _| true))
             }
             _ => self.iter(),

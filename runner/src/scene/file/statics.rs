@@ -1,37 +1,62 @@
-//! Statics as scenes say them: kinds at a place, pieces of ground, and what moves as its path has it.
+//! Statics as scenes say them: kinds at a place or at those of a table, pieces of ground, and what moves as its path has it.
 
 use super::super::SceneError;
 use super::entries::{Entries, pair, place};
 use super::kinds::{check_one, of_shape, shape, turn};
-use super::row::FARTHEST;
-use atoll_core::{GlobalId, Kind, Path as Course, Rot, Segment, Shape, StaticBody, Travel};
+use super::row::{Column, FARTHEST, Scenery};
+use super::table::TableFile;
+use atoll_core::{GlobalId, Kind, Material, Path as Course, Rot, Segment, Shape, StaticBody, Travel};
 use glam::{DVec2, Vec2};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// What a coordinate of a center is.
 const PLACE: &str = "a number within -1e9 to 1e9, in meters";
 
-/// Reads all statics, and whether they have ids of their own. Those of a chain have ids that follow each other.
+/// All statics of a scene.
+#[derive(Clone, PartialEq, Default, Debug)]
+pub(super) struct Statics {
+    /// With ids from 0 where they have none of their own.
+    pub(super) all: Vec<StaticBody>,
+    /// Whether those are their own.
+    pub(super) are_named: bool,
+    /// The files that say where some of them are.
+    pub(super) tables: Vec<PathBuf>,
+}
+
+/// Reads all statics. Those of a chain have ids that follow each other.
 ///
 /// # Errors
 /// If one of them cannot be.
-pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<(Vec<StaticBody>, bool), SceneError> {
-    let mut statics: Vec<StaticBody> = Vec::with_capacity(tables.len());
+pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<Statics, SceneError> {
+    let mut statics = Statics { all: Vec::with_capacity(tables.len()), ..Statics::default() };
     let mut taken = BTreeSet::new();
-    let are_named = tables.first().is_some_and(|first| first.contains_key("id"));
     for (number, table) in tables.iter().enumerate() {
         let mut entries = Entries::new(file, format!("[[statics]] {number}"), table);
         let id = entries.whole("id")?;
-        if id.is_some() != are_named {
+        check_one(&entries)?;
+        let (mut ids, mut path_of_table) = (None, None);
+        let placed = if entries.has("chain") {
+            chain(&mut entries)?
+        } else if let Some(name) =
+            entries.text("places", "the path of a file, .csv or .parquet, from the folder of this one")?
+        {
+            let path = file.parent().unwrap_or(Path::new("")).join(name);
+            let placed;
+            (placed, ids) = in_table(&mut entries, &path)?;
+            path_of_table = Some(path);
+            placed
+        } else {
+            vec![alone(&mut entries)?]
+        };
+        let is_named = id.is_some() || ids.is_some();
+        if number > 0 && is_named != statics.are_named {
             return Err(
                 entries.refuse("id", "either every static has an id or none; give all of them one, or leave all out")
             );
         }
-        let first = id.unwrap_or(statics.len() as u64);
-        check_one(&entries)?;
-        let placed = if entries.has("chain") { chain(&mut entries)? } else { vec![alone(&mut entries)?] };
+        statics.are_named = is_named;
         let path = path(&mut entries)?;
         if path.is_some_and(|path| path.turning != 0.0) && entries.has("chain") {
             return Err(entries.refuse("path", "a chain cannot turn; leave turning out, or give parts"));
@@ -39,18 +64,23 @@ pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<(Vec<StaticBody>
         // Of a chain, every segment is of the same stuff.
         let like = of_shape(&mut entries, Shape::circle(1.0))?;
         entries.finish()?;
-        for (id, (shape, position, rotation)) in (first..).zip(placed) {
+        let first = id.unwrap_or(statics.all.len() as u64);
+        for (place, (shape, position, rotation)) in placed.into_iter().enumerate() {
+            let id = ids.as_ref().map_or(first + place as u64, |ids: &Vec<u64>| ids[place]);
             if !taken.insert(id) {
-                return Err(entries.refuse("id", "another static has that id; give each its own"));
+                return Err(match &path_of_table {
+                    Some(table) => {
+                        SceneError::whole(table, format!("another static has the id {id}; give each its own"))
+                    }
+                    None => entries.refuse("id", "another static has that id; give each its own"),
+                });
             }
-            statics.push(StaticBody {
-                rotation,
-                path,
-                ..StaticBody::new(GlobalId(id), Kind { shape, ..like.clone() }, position)
-            });
+            let kind = Kind { shape, ..like.clone() };
+            statics.all.push(StaticBody { rotation, path, ..StaticBody::new(GlobalId(id), kind, position) });
         }
+        statics.tables.extend(path_of_table);
     }
-    Ok((statics, are_named))
+    Ok(statics)
 }
 
 /// A shape, where its center is, and how it is turned.
@@ -58,20 +88,55 @@ type Placed = (Shape, DVec2, Rot);
 
 /// A static with a place of its own.
 fn alone(entries: &mut Entries<'_>) -> Result<Placed, SceneError> {
-    let (shape, middle) = match entries.table("segment")? {
-        Some(table) => segment(entries, table)?,
-        None => (shape(entries)?, Vec2::ZERO),
-    };
+    let form = form(entries)?;
     let mut place = |key| match entries.number(key, PLACE)? {
         Some(number) if number.abs() <= FARTHEST => Ok(number),
         Some(_) => Err(entries.refuse(key, format!("must be {PLACE}"))),
         None => Err(entries.missing(key, PLACE)),
     };
     let position = DVec2::new(place("x")?, place("y")?);
-    let rotation = turn(entries)?;
+    Ok(put(form, position, turn(entries)?))
+}
+
+/// Statics of one shape at the places of a table, and their ids, if it says these.
+fn in_table(entries: &mut Entries<'_>, path: &Path) -> Result<(Vec<Placed>, Option<Vec<u64>>), SceneError> {
+    for key in ["id", "x", "y", "angle", "cos", "sin"] {
+        if entries.has(key) {
+            return Err(entries.refuse(key, "the table of places says that; leave one out"));
+        }
+    }
+    let form = form(entries)?;
+    let table = TableFile::open(path, "these places")?.ok_or_else(|| entries.refuse("places", TableFile::MUST_END))?;
+    for column in [Column::Kind, Column::Vx, Column::Vy, Column::Omega] {
+        if table.has(column)? {
+            let reason = format!("a static has no {}; leave the column out", column.name());
+            return Err(SceneError::whole(path, reason));
+        }
+    }
+    // Rows are read as those of bodies are.
+    let kinds = [Kind::new(form.0.clone(), Material::default())];
+    let scenery = Scenery { file: path, kinds: &kinds, names: &[], static_ids: &[] };
+    let (mut placed, mut ids) = (Vec::new(), Vec::new());
+    for body in table.rows(scenery)? {
+        let body = body?;
+        placed.push(put(form.clone(), body.position, body.rotation));
+        ids.push(body.id.0);
+    }
+    Ok((placed, table.has(Column::Id)?.then_some(ids)))
+}
+
+/// A shape, and where its center is, seen from what `x` and `y` say.
+fn form(entries: &mut Entries<'_>) -> Result<(Shape, Vec2), SceneError> {
+    match entries.table("segment")? {
+        Some(table) => segment(entries, table),
+        None => Ok((shape(entries)?, Vec2::ZERO)),
+    }
+}
+
+fn put((shape, middle): (Shape, Vec2), position: DVec2, rotation: Rot) -> Placed {
     // Nothing is added to what must keep its bits.
     let position = if middle == Vec2::ZERO { position } else { position + rotation.rotate(middle).as_dvec2() };
-    Ok((shape, position, rotation))
+    (shape, position, rotation)
 }
 
 /// A segment, and its middle.

@@ -147,6 +147,62 @@ fn bodies_may_stand_in_the_scene_itself() {
     }
 }
 
+/// The statics of a scene whose `[[statics]]` are these, with `places.csv` beside it, and its digest; or what is said of them.
+fn placed(statics: &str, places: &str) -> Result<(Vec<StaticBody>, String), String> {
+    let (head, tail) = WORLD.split_once("[[statics]]").unwrap();
+    let tail = tail.split_once("[bodies]").unwrap().1;
+    let folder = folder(&format!("{head}{statics}\n[bodies]{tail}"), BODIES.as_bytes());
+    fs::write(folder.path().join("places.csv"), places).unwrap();
+    let scene =
+        open(&folder).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))?;
+    assert_eq!(scene.paths().count(), 2 + usize::from(statics.contains("places")));
+    Ok((scene.statics().to_vec(), scene.digest().to_owned()))
+}
+
+#[test]
+fn statics_of_one_form_may_stand_in_a_table() {
+    let shelf = "box = [2.0, 0.1]\nfriction = 0.3\npath = { line = [1.0, 0.0] }\n";
+    let other = "[[statics]]\ncircle = 0.5\nx = 3\ny = 4\n";
+    let each = |x: f64, y: f64, angle: f64| format!("[[statics]]\n{shelf}x = {x:?}\ny = {y:?}\nangle = {angle:?}\n");
+    let (expected, _) = placed(&(each(1.5, 2.0, 0.25) + &each(-3.0, 1e6, 0.0) + other), "").unwrap();
+    let table = format!("[[statics]]\n{shelf}places = \"places.csv\"\n{other}");
+    let (statics, digest) = placed(&table, "y,x,angle\n2,1.5,0.25\n1e6,-3,0\n").unwrap();
+    assert_eq!(statics, expected);
+    // What stands in the table is a part of what the scene says.
+    assert_ne!(placed(&table, "y,x,angle\n2,1.5,0.25\n1e6,-3,0.5\n").unwrap().1, digest);
+    // With ids of their own, a segment from its beginning, and none at all.
+    let segment = "[[statics]]\nsegment = { from = [0.0, 0.0], to = [2.0, 0.0] }\nplaces = \"places.csv\"\n";
+    let (statics, _) =
+        placed(&format!("{segment}[[statics]]\nid = 8\ncircle = 1\nx = 0\ny = 0"), "id,x,y,cos,sin\n12,1,1,0,1")
+            .unwrap();
+    assert_eq!(statics.iter().map(|fixed| fixed.id.0).collect::<Vec<_>>(), [12, 8]);
+    assert_eq!(statics[0].position, DVec2::new(1.0, 2.0));
+    assert_eq!(placed(segment, "x,y\n").unwrap().0, []);
+
+    let refused = |statics: &str, places: &str, expected: &str| {
+        let told = placed(statics, places).expect_err(expected);
+        assert!(told.starts_with(expected) && !told.contains('\n'), "{told}");
+    };
+    refused(&table, "x\n1\n", "places.csv, line 1: the column y is missing");
+    refused(&table, "x,y\n1,2\n1,two\n", "places.csv, row 2 (line 3), y = two: must be a finite number");
+    refused(&table, "x,y\n1,2e9\n", "places.csv, row 1 (line 2), y = 2000000000: must be within -1e9 to 1e9 m");
+    refused(&table, "x,y,vx\n1,2,0\n", "places.csv: a static has no vx; leave the column out");
+    refused(&table, "id,x,y\n1,1,2\n", "world.toml: [[statics]] 1, id: either every static has an id or none");
+    refused(segment, "id,x,y\n5,1,2\n5,1,3\n", "places.csv: another static has the id 5");
+    refused(segment, "id,x,y\n9,1,2\n", "bodies.csv, row 2 (line 3), id = 9: a static has that id");
+    refused(
+        &table.replace("places =", "x = 1\nplaces ="),
+        "x,y\n",
+        "world.toml: [[statics]] 0, x = 1: the table of places says that",
+    );
+    refused(&table.replace("places.csv", "places.txt"), "", "places.txt: cannot read these places");
+    refused(
+        &table.replace("places.csv", "world.toml"),
+        "",
+        "world.toml: [[statics]] 0, places = \"world.toml\": must end in .csv",
+    );
+}
+
 #[test]
 fn the_digest_is_of_what_is_said_and_not_of_where_it_lies() {
     let digest = |world: &str, bodies: &str| open(&folder(world, bodies.as_bytes())).unwrap().digest().to_owned();
