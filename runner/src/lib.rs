@@ -112,7 +112,8 @@ pub mod internals {
     /// What the library says.
     pub fn parquet_of_bodies(bodies: &[atoll_core::Body]) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        crate::scene::file::write::parquet(&mut bytes, bodies)?;
+        let columns = crate::scene::file::write::columns(bodies);
+        crate::scene::file::write::parquet(&mut bytes, &columns, bodies)?;
         Ok(bytes)
     }
 }

@@ -44,12 +44,17 @@ pub(super) fn kind_lines(kind: &Kind) -> Vec<String> {
     lines
 }
 
-/// The lines of a static, but for its id.
-pub(super) fn static_lines(fixed: &StaticBody) -> Vec<String> {
+/// The lines of a static, but for its id; or of many, with the line that says where these are.
+pub(super) fn static_lines(fixed: &StaticBody, places: Option<String>) -> Vec<String> {
     let StaticBody { position, rotation, kind, path, .. } = fixed;
     let mut lines = kind_lines(kind);
-    lines.extend([format!("x = {}", Value::from(position.x)), format!("y = {}", Value::from(position.y))]);
-    lines.extend(turn(*rotation));
+    match places {
+        Some(places) => lines.push(places),
+        None => {
+            lines.extend([format!("x = {}", Value::from(position.x)), format!("y = {}", Value::from(position.y))]);
+            lines.extend(turn(*rotation));
+        }
+    }
     lines.extend(path.as_ref().map(path_line));
     lines
 }

@@ -29,6 +29,7 @@ pub(crate) use check::Found;
 pub(crate) use description::is_scene;
 pub(crate) use digest::of_file as digest_of_file;
 pub(crate) use kinds::of_command as kind_of_command;
+pub(crate) use row::Column;
 pub(super) use row::{FARTHEST, is_turn};
 pub(super) use statics::chain_of;
 
@@ -38,7 +39,7 @@ use csv_rows::CsvRows;
 use description::{Bodies, Description};
 use glam::DVec2;
 use parquet_rows::{ParquetRows, Wanted};
-use row::{Column, Scenery};
+use row::Scenery;
 use statics::Statics;
 use std::fs::{self, File};
 use std::io::Read;

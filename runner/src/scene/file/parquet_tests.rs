@@ -42,7 +42,7 @@ fn many() -> Vec<Body> {
 
 fn written(bodies: &[Body]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    write::parquet(&mut bytes, bodies).unwrap();
+    write::parquet(&mut bytes, &write::columns(bodies), bodies).unwrap();
     bytes
 }
 
@@ -60,7 +60,8 @@ fn what_is_written_is_read_bit_for_bit() {
     bodies[70_000].rotation = Rot { c: 0.6, s: 0.800_000_1 };
     assert!(bits(&read(&written(&bodies)).unwrap()) == bits(&bodies));
     let mut csv = Vec::new();
-    write::csv(&mut csv, &bodies[69_990..70_010]).unwrap();
+    let some = &bodies[69_990..70_010];
+    write::csv(&mut csv, &write::columns(some), some).unwrap();
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("world.toml"), HEAD.replace("parquet", "csv")).unwrap();
     fs::write(folder.path().join("b.csv"), csv).unwrap();

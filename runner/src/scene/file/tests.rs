@@ -1,8 +1,9 @@
 //! Scenes in files: what they say, and what is said of those that cannot be.
 
+use super::write::StaticIds;
 use super::*;
 use crate::scene::{FileSpec, Scene, SceneKind, SceneSpec};
-use atoll_core::{KindId, Rot};
+use atoll_core::{KindId, Material, Rot, Shape, Travel};
 use glam::Vec2;
 use tempfile::{TempDir, tempdir};
 
@@ -201,6 +202,42 @@ fn statics_of_one_form_may_stand_in_a_table() {
         "",
         "world.toml: [[statics]] 0, places = \"world.toml\": must end in .csv",
     );
+}
+
+#[test]
+fn many_statics_alike_are_written_as_a_table() {
+    let shelf = |id: u64| {
+        let kind = Kind::new(Shape::rectangle(0.1 + 1.0 / 3.0, 0.1), Material { friction: 0.1, ..Material::default() });
+        let turned = Rot::from_angle(0.01 * id as f32);
+        StaticBody { rotation: turned, ..StaticBody::new(GlobalId(id), kind, DVec2::new(0.1 * id as f64, 1.0 / 3.0)) }
+    };
+    let path = Some(atoll_core::Path { travel: Travel::Line { velocity: DVec2::new(0.1, 0.0) }, turning: 0.0 });
+    let ball = |id: u64| StaticBody::new(GlobalId(id), Kind::new(Shape::circle(0.3), Material::default()), DVec2::ONE);
+    let lifts = (200..350).map(|id| StaticBody { path, ..shelf(id) });
+    let statics: Vec<StaticBody> =
+        [ball(0)].into_iter().chain((1..130).map(shelf)).chain([ball(199)]).chain(lifts).collect();
+    for (statics, ids, tables) in [
+        (&statics[..], StaticIds::Said, 2),
+        // Which ids these get is known where there are no bodies: from 0 on.
+        (&statics[..130], StaticIds::LeftOut, 1),
+        (&statics[..50], StaticIds::Said, 0),
+    ] {
+        let folder = tempdir().unwrap();
+        let runs = write::Alike::runs(statics, ids, |number| format!("statics-{number}.csv"));
+        for alike in &runs {
+            let Some(table) = &alike.table else { continue };
+            let (columns, rows) = alike.rows();
+            write::csv(File::create(folder.path().join(table)).unwrap(), &columns, &rows).unwrap();
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), tables);
+        let (domain, physics) = ((DVec2::ZERO, DVec2::ONE), Vec::new());
+        let world = write::World { name: None, domain, physics, kinds: &[], names: &[], statics };
+        let text = write::text(&world, &runs, &write::BodiesFile { name: "b.csv", xxh3: "", count: 0 });
+        assert!(text.len() < 3000 + 60 * 150, "{text}");
+        let text = text.split_once("[bodies]").unwrap().0;
+        fs::write(folder.path().join("world.toml"), text).unwrap();
+        assert_eq!(open(&folder).unwrap().statics(), statics);
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use super::description::FORMAT;
 use super::lines::{angle, kind_lines, static_lines};
 use super::row::Column;
-use atoll_core::{Body, GlobalId, Kind, StaticBody};
-use glam::{DVec2, Vec2};
+use atoll_core::{Body, GlobalId, Kind, KindId, StaticBody};
+use glam::DVec2;
 use parquet::basic::{Compression, Encoding};
 use parquet::data_type::{DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -62,8 +62,66 @@ pub(crate) fn static_ids(statics: &[StaticBody], last: Option<GlobalId>) -> Opti
     (first..).zip(statics).all(|(id, fixed)| fixed.id.0 == id).then_some(StaticIds::LeftOut)
 }
 
+/// So many statics that differ only in where they are have a table of their own.
+const MANY: usize = 100;
+
+/// Statics that are alike but for where they are, one after the other.
+pub(crate) struct Alike<'a> {
+    statics: &'a [StaticBody],
+    ids: StaticIds,
+    /// The file that says where they are, if there are many.
+    pub(crate) table: Option<String>,
+}
+
+impl<'a> Alike<'a> {
+    /// All statics, in their order; `name` tells what the table of that number is called.
+    pub(crate) fn runs(statics: &'a [StaticBody], ids: StaticIds, name: impl Fn(usize) -> String) -> Vec<Self> {
+        // Zeros of either sign are equal, and not the same text.
+        let said = |fixed: &StaticBody| static_lines(fixed, Some(String::new()));
+        let are_alike = |a: &StaticBody, b: &StaticBody| a.path == b.path && a.kind == b.kind && said(a) == said(b);
+        let mut tables = 0..;
+        let run = |statics: &'a [StaticBody]| {
+            let table = (statics.len() >= MANY).then(|| name(tables.next().expect("there are more")));
+            Self { statics, ids, table }
+        };
+        let runs = statics.chunk_by(are_alike).map(run).collect();
+        runs
+    }
+
+    /// The rows of its table.
+    pub(crate) fn rows(&self) -> (Vec<Column>, Vec<Body>) {
+        let row = |fixed: &StaticBody| Body {
+            rotation: fixed.rotation,
+            ..Body::at_rest(fixed.id, KindId(0), fixed.position)
+        };
+        let rows: Vec<Body> = self.statics.iter().map(row).collect();
+        let mut columns = columns(&rows);
+        columns.retain(|column| match column {
+            Column::Id => self.ids == StaticIds::Said,
+            Column::Kind | Column::Vx | Column::Vy | Column::Omega => false,
+            _ => true,
+        });
+        (columns, rows)
+    }
+
+    /// What a scene says of them.
+    fn entries(&self) -> Vec<Vec<String>> {
+        let entry = |fixed: &StaticBody, lines: Vec<String>| {
+            let id = (self.ids == StaticIds::Said && self.table.is_none()).then(|| format!("id = {}", fixed.id));
+            id.into_iter().chain(lines).collect()
+        };
+        match (&self.table, self.statics) {
+            (Some(table), [first, ..]) => {
+                let places = format!("places = {}", Value::from(table.as_str()));
+                vec![entry(first, static_lines(first, Some(places)))]
+            }
+            _ => self.statics.iter().map(|fixed| entry(fixed, static_lines(fixed, None))).collect(),
+        }
+    }
+}
+
 /// The text of a scene.
-pub(crate) fn text(world: &World<'_>, ids: StaticIds, bodies: &BodiesFile<'_>) -> String {
+pub(crate) fn text(world: &World<'_>, statics: &[Alike<'_>], bodies: &BodiesFile<'_>) -> String {
     let mut text = format!("format = {}\n", Value::from(FORMAT));
     let mut line = |line: &str| writeln!(text, "{line}").expect("a string takes any text");
     if let Some(name) = world.name {
@@ -83,12 +141,9 @@ pub(crate) fn text(world: &World<'_>, ids: StaticIds, bodies: &BodiesFile<'_>) -
         }
         kind_lines(kind).iter().for_each(|of_kind| line(of_kind));
     }
-    for fixed in world.statics {
+    for entry in statics.iter().flat_map(Alike::entries) {
         line("\n[[statics]]");
-        if ids == StaticIds::Said {
-            line(&format!("id = {}", fixed.id));
-        }
-        static_lines(fixed).iter().for_each(|of_static| line(of_static));
+        entry.iter().for_each(|of_static| line(of_static));
     }
     let BodiesFile { name, xxh3, count } = *bodies;
     line(&format!("\n[bodies]\npath = {}\nxxh3 = \"{xxh3}\"\ncount = {count}", Value::from(name)));
@@ -123,7 +178,7 @@ fn hilbert(mut x: u32, mut y: u32) -> u32 {
 }
 
 /// The columns that these bodies need: angles, unless some rotation is none that an angle leads to.
-fn columns(bodies: &[Body]) -> Vec<Column> {
+pub(crate) fn columns(bodies: &[Body]) -> Vec<Column> {
     let turned = bodies.iter().any(|body| angle(body.rotation).is_none());
     let is_needed = |column: &Column| match column {
         Column::Angle => !turned,
@@ -133,39 +188,49 @@ fn columns(bodies: &[Body]) -> Vec<Column> {
     Column::ALL.into_iter().filter(is_needed).collect()
 }
 
-/// Writes bodies as CSV: each number as the shortest decimal that leads back to its bits.
+/// Writes these columns of bodies as CSV: each number as the shortest decimal that leads back to its bits.
 ///
 /// # Errors
 /// What the system says.
-pub(crate) fn csv(out: impl Write, bodies: &[Body]) -> io::Result<()> {
-    let (columns, mut out) = (columns(bodies), BufWriter::new(out));
+pub(crate) fn csv(out: impl Write, columns: &[Column], bodies: &[Body]) -> io::Result<()> {
+    let mut out = BufWriter::new(out);
     let names: Vec<&str> = columns.iter().map(|column| column.name()).collect();
     writeln!(out, "{}", names.join(","))?;
-    for Body { id, position, rotation, velocity: Vec2 { x: vx, y: vy }, angular_velocity, kind } in bodies {
-        write!(out, "{id},{},{:?},{:?}", kind.0, position.x, position.y)?;
-        if columns.contains(&Column::Angle) {
-            write!(out, ",{:?}", rotation.angle())?;
-        } else {
-            write!(out, ",{:?},{:?}", rotation.c, rotation.s)?;
+    for body in bodies {
+        for (place, column) in columns.iter().enumerate() {
+            if place > 0 {
+                write!(out, ",")?;
+            }
+            match column {
+                Column::Id => write!(out, "{}", body.id),
+                Column::Kind => write!(out, "{}", body.kind.0),
+                Column::X => write!(out, "{:?}", body.position.x),
+                Column::Y => write!(out, "{:?}", body.position.y),
+                Column::Angle => write!(out, "{:?}", body.rotation.angle()),
+                Column::Cos => write!(out, "{:?}", body.rotation.c),
+                Column::Sin => write!(out, "{:?}", body.rotation.s),
+                Column::Vx => write!(out, "{:?}", body.velocity.x),
+                Column::Vy => write!(out, "{:?}", body.velocity.y),
+                Column::Omega => write!(out, "{:?}", body.angular_velocity),
+            }?;
         }
-        writeln!(out, ",{vx:?},{vy:?},{angular_velocity:?}")?;
+        writeln!(out)?;
     }
     out.flush()
 }
 
-/// Writes bodies as Parquet, in groups that say where their bodies are.
+/// Writes these columns of bodies as Parquet, in groups that say where their bodies are.
 ///
 /// # Errors
 /// What the library or the system says.
-pub(crate) fn parquet(out: impl Write + Send, bodies: &[Body]) -> io::Result<()> {
-    write_groups(BufWriter::new(out), bodies).map_err(|error| match error {
+pub(crate) fn parquet(out: impl Write + Send, columns: &[Column], bodies: &[Body]) -> io::Result<()> {
+    write_groups(BufWriter::new(out), columns, bodies).map_err(|error| match error {
         ParquetError::External(error) => io::Error::other(error.to_string()),
         error => io::Error::other(error),
     })
 }
 
-fn write_groups(out: impl Write + Send, bodies: &[Body]) -> Result<(), ParquetError> {
-    let columns = columns(bodies);
+fn write_groups(out: impl Write + Send, columns: &[Column], bodies: &[Body]) -> Result<(), ParquetError> {
     let field = |column: &Column| {
         let form = match column {
             Column::Id => "int64 id (INTEGER(64, false))",
@@ -181,7 +246,7 @@ fn write_groups(out: impl Write + Send, bodies: &[Body]) -> Result<(), ParquetEr
         .set_dictionary_enabled(false)
         .set_statistics_enabled(EnabledStatistics::None)
         .set_compression(Compression::SNAPPY);
-    for column in &columns {
+    for column in columns {
         let path = ColumnPath::from(column.name());
         properties = match column {
             Column::Id => properties.set_column_encoding(path.clone(), Encoding::DELTA_BINARY_PACKED),
@@ -196,7 +261,7 @@ fn write_groups(out: impl Write + Send, bodies: &[Body]) -> Result<(), ParquetEr
     let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties.build()))?;
     for bodies in bodies.chunks(IN_A_GROUP) {
         let mut group = writer.next_row_group()?;
-        for column in &columns {
+        for column in columns {
             let mut next =
                 group.next_column()?.ok_or_else(|| ParquetError::General("a column is missing".to_owned()))?;
             let floats = |read: fn(&Body) -> f32| bodies.iter().map(read).collect::<Vec<f32>>();
