@@ -154,9 +154,10 @@ impl Solver {
         if self.colors == 0 {
             self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
         }
-        let (known, keeps) = (&tile.contacts.contacts, self.colors > 0);
-        let colors = self.groups.lay_out(known, keeps, &mut self.batches, &self.coloring, team);
-        self.colors = colors.map_or(self.colors, |colors| colors as u64);
+        let known = &tile.contacts.contacts;
+        if self.colors == 0 || !self.groups.fit(known) {
+            self.colors = self.groups.lay_out(known, &mut self.batches, &self.coloring) as u64;
+        }
         self.colors
     }
 

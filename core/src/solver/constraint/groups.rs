@@ -10,7 +10,7 @@ use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
 
 /// Contacts in a piece of work, at least.
-pub(super) const GRAIN: usize = 2048;
+const GRAIN: usize = 2048;
 
 /// All constraints of a tile, batch by batch and color by color.
 #[derive(Default, Debug)]

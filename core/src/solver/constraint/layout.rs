@@ -1,10 +1,9 @@
 //! In which group and lane each contact goes: by batch, color and column.
 
 use super::columns::{COLUMNS, Color, Each, NO_CONTACT, column_of};
-use super::groups::{GRAIN, Groups, Lane};
+use super::groups::{Groups, Lane};
 use crate::model::contact::Contact;
 use crate::parallel::lanes::WIDE;
-use crate::parallel::team::Team;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::coloring::{COLORS, Coloring};
 
@@ -14,48 +13,23 @@ fn any(counts: &Each<usize>) -> bool {
 }
 
 impl Groups {
-    /// Decides in which group and lane each contact goes, unless all are where they were (`keeps`) and as many points of each as then.
-    /// Returns the most colors of a batch, if they are laid out anew.
-    pub(crate) fn lay_out(
-        &mut self,
-        contacts: &[Contact],
-        keeps: bool,
-        batches: &mut Batches,
-        coloring: &Coloring,
-        team: Team,
-    ) -> Option<usize> {
-        if team.pieces(contacts.len(), GRAIN) == 1 {
-            return self.lay_out_by(contacts.len(), |i| column_of(&contacts[i]), keeps, batches, coloring);
-        }
-        // Contacts that other threads have just written are fetched by all, and not one by one here.
-        let mut columns = Vec::new();
-        team.append(&mut columns, contacts.len(), GRAIN, |range, columns| {
-            columns.extend(contacts[range].iter().map(|contact| column_of(contact) as u8));
-        });
-        self.lay_out_by(contacts.len(), |i| columns[i].into(), keeps, batches, coloring)
+    /// Whether contacts of the same bodies as those that were laid out have as many points each.
+    pub(crate) fn fit(&self, contacts: &[Contact]) -> bool {
+        self.lanes.iter().zip(contacts).fold(true, |fit, (lane, contact)| fit & lane.is_of(column_of(contact)))
     }
 
-    fn lay_out_by(
-        &mut self,
-        contacts: usize,
-        column_of: impl Fn(usize) -> usize + Copy,
-        keeps: bool,
-        batches: &mut Batches,
-        coloring: &Coloring,
-    ) -> Option<usize> {
-        if keeps && (0..contacts).zip(&self.lanes).fold(true, |fit, (i, lane)| fit & lane.is_of(column_of(i))) {
-            return None;
-        }
+    /// Decides in which group and lane each contact goes. Returns the most colors of a batch.
+    pub(crate) fn lay_out(&mut self, contacts: &[Contact], batches: &mut Batches, coloring: &Coloring) -> usize {
         self.colors.clear();
         self.members.iter_mut().for_each(Vec::clear);
         self.lanes.clear();
-        self.lanes.resize(contacts, Lane::NONE);
+        self.lanes.resize(contacts.len(), Lane::NONE);
         let (mut most_colors, mut at_once, mut kept) = (0, [0; COLUMNS], [0; COLUMNS]);
         for batch in &mut batches.all {
             let first = self.colors.len();
             let range = batch.contacts.clone();
             let (first_group, end) = if batch.at_once { ([0; COLUMNS], &mut at_once) } else { (kept, &mut kept) };
-            self.lay_out_batch(column_of, &batches.contacts[range.clone()], &coloring.color[range], batch, first_group);
+            self.lay_out_batch(contacts, &batches.contacts[range.clone()], &coloring.color[range], batch, first_group);
             end.iter_mut().zip(&batch.groups).for_each(|(end, groups)| *end = groups.end.max(*end));
             batch.colors = first..self.colors.len();
             // All that overflows counts as one color.
@@ -63,12 +37,12 @@ impl Groups {
         }
         self.kept.resize(kept);
         self.at_once.resize(at_once);
-        Some(most_colors)
+        most_colors
     }
 
     fn lay_out_batch(
         &mut self,
-        column_of: impl Fn(usize) -> usize,
+        contacts: &[Contact],
         own: &[u32],
         colors: &[u8],
         batch: &mut Batch,
@@ -76,7 +50,7 @@ impl Groups {
     ) {
         batch.members = self.members.each_ref().map(Vec::len);
         let first_member = batch.members;
-        let column_of = |contact: u32| column_of(contact as usize);
+        let column_of = |contact: u32| column_of(&contacts[contact as usize]);
         let mut counts = [[0; COLUMNS]; COLORS + 1];
         for (&contact, &color) in own.iter().zip(colors) {
             counts[color as usize][column_of(contact)] += 1;
