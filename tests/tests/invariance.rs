@@ -128,6 +128,24 @@ fn pile_on_8x8_tiles() {
     ranks_threads_and_transports_agree(PILE, "8x8");
 }
 
+/// Tiles that threads help with: all alone, several at once, and one or two that are left over; contacts of one island in each, enough
+/// for a crew, and of many.
+#[test]
+fn threads_that_help_show_nowhere() {
+    let large = Scene { config: "configs/large_pyramid.toml", bodies: 5050, steps: 8 };
+    let rooms = Scene { config: "configs/quickstart.toml", bodies: 20_000, steps: 12 };
+    for (scene, grids) in [(large, ["1x1", "3x1", "7x1"]), (rooms, ["1x1", "5x1", "4x4"])] {
+        for (grid, exchange) in grids.into_iter().zip(["step", "substep", "step"]) {
+            let run =
+                |threads| scene.run(&[("tiles", grid), ("ranks", "1"), ("exchange", exchange), ("threads", threads)]);
+            let alone = run("1");
+            for threads in ["2", "3", "6", "16"] {
+                assert_eq!(hashes(&run(threads)), hashes(&alone), "{} on {grid}, {threads} threads", scene.config);
+            }
+        }
+    }
+}
+
 /// The default grid follows from the configuration, never from ranks or threads.
 #[test]
 fn the_default_grid_is_the_same_for_everyone() {

@@ -84,8 +84,7 @@ impl<'a> Alike<'a> {
             let table = (statics.len() >= MANY).then(|| name(tables.next().expect("there are more")));
             Self { statics, ids, table }
         };
-        let runs = statics.chunk_by(are_alike).map(run).collect();
-        runs
+        statics.chunk_by(are_alike).map(run).collect()
     }
 
     /// The rows of its table.
