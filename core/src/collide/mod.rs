@@ -8,5 +8,7 @@ mod piece_boxes;
 pub(crate) mod proxies;
 mod touch;
 mod wide_boxes;
+mod wide_moments;
 mod wide_pairs;
+mod wide_polygons;
 mod wide_touches;

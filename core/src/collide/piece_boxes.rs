@@ -11,6 +11,9 @@ use glam::Vec2;
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 512;
 
+/// Of more pieces some have a rectangle around all of them, too.
+const FEW: usize = 8;
+
 /// Low and high corner of a rectangle, from the center of the body, in meters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PieceBox {
@@ -25,9 +28,16 @@ impl PieceBox {
         Self { low: low - piece.radius, high: high + piece.radius }
     }
 
-    /// Whether another, of a body at `offset` from this one's, is further than so far along an axis.
+    /// Around all of some.
+    fn around(all: &[Self]) -> Self {
+        let nothing = Self { low: Vec2::INFINITY, high: Vec2::NEG_INFINITY };
+        all.iter().fold(nothing, |one, two| Self { low: one.low.min(two.low), high: one.high.max(two.high) })
+    }
+
+    /// Whether another, of a body at `offset` from this one's, is further than so far along an axis. Who is apart from one that holds
+    /// others is apart from these, rounded as all is.
     #[inline(always)]
-    pub(super) fn is_apart(&self, other: &Self, offset: Vec2, far: f32) -> bool {
+    fn is_apart(&self, other: &Self, offset: Vec2, far: f32) -> bool {
         let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
         max(gap.x, gap.y) > far
     }
@@ -36,9 +46,43 @@ impl PieceBox {
 /// Those of the bodies of a tile that are made of several pieces.
 #[derive(Default, Debug)]
 pub(super) struct PieceBoxes {
-    /// For each body of the tile where its own begin; and their end.
+    /// For each body of the tile where its own begin; and their end. Where there are more than a few, those around groups of them follow.
     start: Vec<u32>,
     boxes: Vec<PieceBox>,
+}
+
+/// How many pieces make a group, of so many: about as many as there are groups.
+fn group(pieces: usize) -> usize {
+    if pieces <= FEW { pieces } else { pieces.isqrt() }
+}
+
+/// Those of a body: of each of its pieces, and of its groups, if it has any.
+#[derive(Clone, Copy)]
+struct OfBody<'a> {
+    pieces: &'a [PieceBox],
+    groups: &'a [PieceBox],
+}
+
+impl OfBody<'_> {
+    fn around(&self) -> PieceBox {
+        PieceBox::around(if self.groups.is_empty() { self.pieces } else { self.groups })
+    }
+
+    /// Tells the numbers of those that are not apart from something, ascending.
+    #[inline(always)]
+    fn each_near(&self, is_apart: impl Fn(&PieceBox) -> bool, mut near: impl FnMut(usize)) {
+        let size = group(self.pieces.len());
+        for (number, pieces) in self.pieces.chunks(size).enumerate() {
+            if self.groups.get(number).is_some_and(&is_apart) {
+                continue;
+            }
+            for (piece, number) in pieces.iter().zip(number * size..) {
+                if !is_apart(piece) {
+                    near(number);
+                }
+            }
+        }
+    }
 }
 
 impl PieceBoxes {
@@ -57,29 +101,59 @@ impl PieceBoxes {
         let mut count = 0;
         for &kind in kinds {
             self.start.push(count as u32);
-            count += several(kind).len();
+            let pieces = several(kind).len();
+            count += pieces + if pieces > FEW { pieces.div_ceil(group(pieces)) } else { 0 };
         }
         self.start.push(count as u32);
         team.append(&mut self.boxes, kinds.len(), GRAIN, |range, boxes| {
             for (&kind, &rotation) in kinds[range.clone()].iter().zip(&rotations[range]) {
-                boxes.extend(several(kind).iter().map(|piece| PieceBox::new(piece, rotation)));
+                let (pieces, first) = (several(kind), boxes.len());
+                boxes.extend(pieces.iter().map(|piece| PieceBox::new(piece, rotation)));
+                if pieces.len() > FEW {
+                    for begin in (0..pieces.len()).step_by(group(pieces.len())) {
+                        let end = pieces.len().min(begin + group(pieces.len()));
+                        boxes.push(PieceBox::around(&boxes[first + begin..first + end]));
+                    }
+                }
             }
         });
     }
 
-    /// Those of a body, in the order of its pieces; `only` is room for that of a body that has one.
+    /// Tells which two pieces of two bodies, of which B is at `offset` from A, are not apart by so far: in the order of their numbers.
     #[inline(always)]
-    pub(super) fn of<'a>(
-        &'a self,
-        body: u32,
+    pub(super) fn each_near(
+        &self,
+        bodies: [u32; 2],
         tile: &Tile,
         setup: &Setup,
-        only: &'a mut Option<PieceBox>,
-    ) -> &'a [PieceBox] {
+        (offset, far): (Vec2, f32),
+        mut near: impl FnMut(usize, usize),
+    ) {
+        let mut only = [None; 2];
+        let [only_a, only_b] = &mut only;
+        let (a, b) = (self.of(bodies[0], tile, setup, only_a), self.of(bodies[1], tile, setup, only_b));
+        let whole = if a.groups.is_empty() { None } else { Some(b.around()) };
+        let beyond = |box_a: &PieceBox| whole.is_some_and(|whole| box_a.is_apart(&whole, offset, far));
+        a.each_near(beyond, |number_a| {
+            let box_a = &a.pieces[number_a];
+            b.each_near(|box_b| box_a.is_apart(box_b, offset, far), |number_b| near(number_a, number_b));
+        });
+    }
+
+    /// Those of a body; `only` is room for that of one that has a single piece.
+    #[inline(always)]
+    fn of<'a>(&'a self, body: u32, tile: &Tile, setup: &Setup, only: &'a mut Option<PieceBox>) -> OfBody<'a> {
         let body = body as usize;
         match &setup.kind(tile.bodies.kind[body]).pieces[..] {
-            [piece] => std::slice::from_ref(only.insert(PieceBox::new(piece, tile.bodies.rotation[body]))),
-            _ => &self.boxes[self.start[body] as usize..self.start[body + 1] as usize],
+            [piece] => {
+                let only = only.insert(PieceBox::new(piece, tile.bodies.rotation[body]));
+                OfBody { pieces: std::slice::from_ref(only), groups: &[] }
+            }
+            pieces => {
+                let all = &self.boxes[self.start[body] as usize..self.start[body + 1] as usize];
+                let (pieces, groups) = all.split_at(pieces.len());
+                OfBody { pieces, groups }
+            }
         }
     }
 }

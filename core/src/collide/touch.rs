@@ -9,7 +9,9 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
 use crate::collide::piece_boxes::PieceBoxes;
+use crate::collide::wide_moments::Points;
 use crate::collide::wide_pairs::{ROLLING, TOUCHING};
+use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, cross, dot, max, min, turn};
@@ -337,15 +339,70 @@ pub(super) fn recycle(tile: &Tile, pair: Pair, known: &Contact, setup: &Setup) -
     Approach::new(tile, pair, setup).recycle(known, setup)
 }
 
-/// Appends the contacts of two bodies of which one is neither a circle nor a box: one for each two of their pieces that touch, in their
-/// order. `known` are those of the last step.
-pub(super) fn touch_pieces(
+/// Two pieces of a pair of bodies that may touch, and what came of it.
+pub(super) struct Meeting<'a> {
+    pub(super) bodies: Pair,
+    pub(super) pieces: [&'a Piece; 2],
+    features: u32,
+    /// The contact that they had in the last step.
+    known: Option<&'a Contact>,
+    pub(super) outcome: Met,
+}
+
+/// What comes of two pieces.
+pub(super) enum Met {
+    Nothing,
+    /// The contact that is known, whose points have these separations now.
+    Known([f32; 2]),
+    Found(Contact, [f32; 2]),
+    /// It is not known yet.
+    Open,
+}
+
+impl<'a> Meeting<'a> {
+    /// Looks again, which only those need that are open.
+    pub(super) fn touch(&mut self, tile: &Tile, setup: &Setup) {
+        let mut pair = Approach::new(tile, self.bodies, setup);
+        (pair.pieces, pair.features) = (Some(self.pieces), self.features);
+        self.outcome = Met::from(pair.touch(self.known, pair.far(setup.params.dt), setup));
+    }
+
+    /// Takes what was seen of it in a lane, if that could be told.
+    #[inline(always)]
+    pub(super) fn see(&mut self, lane: usize, points: &Points) {
+        if !points.is_unsure(lane) {
+            let found = points.meets(lane).then(|| points.contact(lane, self.features, self.known));
+            self.outcome = Met::from(found);
+        }
+    }
+
+    /// The contact, if there is one, and the separations of its points now.
+    pub(super) fn contact(&self) -> Option<(&Contact, [f32; 2])> {
+        match &self.outcome {
+            Met::Nothing => None,
+            Met::Known(separation) => self.known.map(|known| (known, *separation)),
+            Met::Found(contact, separation) => Some((contact, *separation)),
+            Met::Open => unreachable!("all are looked at"),
+        }
+    }
+}
+
+impl From<Option<(Contact, [f32; 2])>> for Met {
+    fn from(found: Option<(Contact, [f32; 2])>) -> Self {
+        found.map_or(Self::Nothing, |(contact, separation)| Self::Found(contact, separation))
+    }
+}
+
+/// Tells which pieces of two bodies may touch, of which one body is neither a circle nor a box: in their order, and what comes of
+/// those that had a contact that still serves, or of which one is a disc or a segment of a chain. `known` are the contacts of the
+/// last step.
+pub(super) fn meet<'a>(
     tile: &Tile,
     bodies: Pair,
     boxes: &PieceBoxes,
-    known: &[&Contact],
-    setup: &Setup,
-    mut found: impl FnMut(&Contact, [f32; 2]),
+    known: &[&'a Contact],
+    setup: &'a Setup,
+    mut met: impl FnMut(Meeting<'a>),
 ) {
     let mut pair = Approach::new(tile, bodies, setup);
     // Who touched will hardly have gone so far.
@@ -355,29 +412,27 @@ pub(super) fn touch_pieces(
     let far = pair.far(setup.params.dt);
     let is_slow = far < setup.params.speculative_distance;
     let rolls = pair.a.is_round() || pair.b.is_round();
-    let (near, offset) = (setup.params.speculative_distance + far, pair.offset);
-    let (pieces_a, pieces_b) = (&pair.a.kind.pieces, &pair.b.kind.pieces);
-    let (several, mut only) = (pieces_a.len() * pieces_b.len() > 1, [None; 2]);
-    let [only_a, only_b] = &mut only;
-    let boxes =
-        several.then(|| [(bodies[0], only_a), (bodies[1], only_b)].map(|(i, only)| boxes.of(i, tile, setup, only)));
-    for (number_a, a) in (0..).zip(pieces_a.iter()) {
-        for (number_b, b) in (0..).zip(pieces_b.iter()) {
-            if let Some([boxes_a, boxes_b]) = boxes
-                && boxes_a[number_a as usize].is_apart(&boxes_b[number_b as usize], offset, near)
-            {
-                continue;
-            }
-            (pair.pieces, pair.features) = (Some([a, b]), Contact::features_of(number_a, number_b));
-            let known = known.iter().copied().find(|known| known.pieces() == pair.features);
-            let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
-            if let Some(known) = known.filter(|_| is_slow && !rolls)
-                && let Some(separation) = pair.recycle(known, setup)
-            {
-                found(known, separation);
-            } else if let Some((contact, separation)) = rolled.or_else(|| pair.touch(known, far, setup)) {
-                found(&contact, separation);
-            }
-        }
+    let [pieces_a, pieces_b] = [&pair.a.kind, &pair.b.kind].map(|kind| &kind.pieces[..]);
+    let offset = pair.offset;
+    let mut meet = |number_a: usize, number_b: usize| {
+        let (pieces, features) =
+            ([&pieces_a[number_a], &pieces_b[number_b]], Contact::features_of(number_a as u32, number_b as u32));
+        (pair.pieces, pair.features) = (Some(pieces), features);
+        let known = known.iter().copied().find(|known| known.pieces() == features);
+        let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
+        let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
+        let outcome = match (kept, rolled) {
+            (Some(separation), _) => Met::Known(separation),
+            (None, Some((contact, separation))) => Met::Found(contact, separation),
+            _ if WidePolygons::hold(pieces) => Met::Open,
+            _ => Met::from(pair.touch(known, far, setup)),
+        };
+        met(Meeting { bodies, pieces, features, known, outcome });
+    };
+    if pieces_a.len() * pieces_b.len() == 1 {
+        meet(0, 0);
+    } else {
+        let far = setup.params.speculative_distance + far;
+        boxes.each_near(bodies, tile, setup, (offset, far), meet);
     }
 }

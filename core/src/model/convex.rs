@@ -42,6 +42,15 @@ impl Convex {
         }
     }
 
+    /// Columns by four: x and y of the corners, x and y of the normals, each of the first four and of the others.
+    #[inline(always)]
+    pub(crate) fn quads(&self) -> [[f32; 4]; MOST_CORNERS] {
+        let halves = |column: &[f32; MOST_CORNERS]| -> [[f32; 4]; 2] { bytemuck::cast(*column) };
+        let ([a, b], [c, d]) = (halves(&self.x), halves(&self.y));
+        let ([e, f], [g, h]) = (halves(&self.normal_x), halves(&self.normal_y));
+        [a, b, c, d, e, f, g, h]
+    }
+
     #[inline(always)]
     pub(crate) fn count(&self) -> usize {
         self.count

@@ -1,6 +1,7 @@
 //! Narrow phase: from pairs to contacts, in canonical order, each with the impulses it had.
 
 mod contacts;
+mod meetings;
 mod names;
 mod sorted;
 
@@ -9,7 +10,7 @@ pub(crate) use contacts::Contacts;
 use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
-use crate::collide::touch::{is_slow, recycle, touch, touch_pieces};
+use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::BoxOutlook;
 use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
 use crate::model::contact::{Contact, ContactCache, PairKey};
@@ -19,6 +20,7 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::Zeroable;
 use contacts::Found;
+use meetings::Meetings;
 use names::{Named, Names};
 use sorted::Sorted;
 use std::marker::PhantomData;
@@ -155,7 +157,7 @@ enum Outcome {
     /// The contact that is known, as it is.
     Known,
     Found,
-    /// Any number, which are yet to be found.
+    /// Any number, one for each two of their pieces.
     Several,
 }
 
@@ -174,6 +176,7 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             found: [Contact::zeroed(); BLOCK],
             separation: [[0.0; 2]; BLOCK],
         };
+        let mut meetings = Meetings::default();
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
@@ -186,7 +189,8 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
                 block.keep(pairs.len(), found);
             } else {
                 lists.get(OF_PIECES).iter().for_each(|&place| block.outcome[usize::from(place)] = Outcome::Several);
-                block.find_several(pairs.len(), &among, found);
+                meetings.find(lists.get(OF_PIECES), &block.named, &among);
+                block.keep_several(pairs.len(), &meetings, found);
             }
         }
     }
@@ -243,33 +247,26 @@ impl Block<'_> {
         bodies.truncate(kept);
     }
 
-    /// As [`keep`](Self::keep), and finds the contacts of pairs of which one body is made of pieces.
+    /// As [`keep`](Self::keep), with those contacts of pairs of which one body is made of pieces.
     #[inline(never)]
-    fn find_several(&self, pairs: usize, among: &FindAmong<'_>, found: &mut Found) {
-        let &FindAmong { by_name, boxes, tile, setup, .. } = among;
+    fn keep_several(&self, pairs: usize, meetings: &Meetings<'_>, found: &mut Found) {
         let Found { cache, separation, bodies } = found;
-        let mut several = Vec::new();
-        for (named, i) in self.named[..pairs].iter().zip(0..) {
-            let &Named { key, bodies: pair, known, old } = named;
+        let mut meetings = meetings.found();
+        for (named, place) in self.named[..pairs].iter().zip(0..) {
             let mut keep = |contact: &Contact, now: [f32; 2]| {
-                cache.keys.push(key);
+                cache.keys.push(named.key);
                 cache.contacts.push(*contact);
                 separation.push(now);
-                bodies.push(pair);
+                bodies.push(named.bodies);
             };
-            match self.outcome[i] {
+            match self.outcome[place] {
                 Outcome::Nothing => {}
-                Outcome::Known => keep(known.expect("it is known"), self.separation[i]),
-                Outcome::Found => keep(&self.found[i], self.separation[i]),
+                Outcome::Known => keep(named.known.expect("it is known"), self.separation[place]),
+                Outcome::Found => keep(&self.found[place], self.separation[place]),
                 Outcome::Several => {
-                    several.clear();
-                    if pair.iter().any(|&body| by_name[body as usize]) {
-                        let names = (tile.bodies.id[pair[0] as usize], tile.bodies.id[pair[1] as usize]);
-                        several.extend(tile.strays.find_all(names, key.is_own()));
-                    } else if known.is_some() {
-                        several.extend(tile.contacts.all_from(old as usize));
+                    while let Some((_, contact, now)) = meetings.next_if(|&(of, ..)| of == place) {
+                        keep(contact, now);
                     }
-                    touch_pieces(tile, pair, boxes, &several, setup, keep);
                 }
             }
         }

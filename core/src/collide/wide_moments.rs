@@ -1,0 +1,252 @@
+//! Where and when the bodies of sixteen pairs touch within the step, in up to two points: what `touch.rs` does for one pair, in the same
+//! words and with the same bits.
+//!
+//! Where speeds overflow, or shapes say so, it cannot tell, and leaves the pair to that.
+
+use super::touch::{DEEP, NEAR, ROUNDS};
+use super::wide_pairs::{Pairs, TOUCHING};
+use super::wide_touches::both;
+use crate::model::contact::{Contact, ContactPoint};
+use crate::model::math::Rot;
+use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
+use crate::parallel::vectors::{Vectors, less};
+use crate::tiling::blueprint::Setup;
+use glam::Vec2;
+
+/// Manifolds of up to two points, and the moments in which they are those. What is asked of them is one, or else zero.
+#[derive(Clone, Copy)]
+pub(super) struct Moments<V> {
+    /// From now, in s.
+    pub(super) time: V,
+    /// At that time: from the center of A to that of B, and how both have turned.
+    pub(super) offset: Vectors<V>,
+    pub(super) turning: [Vectors<V>; 2],
+    /// Whether there is a point, and whether there is a second.
+    pub(super) some: V,
+    pub(super) two: V,
+    /// Whether that cannot be told here.
+    pub(super) unsure: V,
+    pub(super) normal: Vectors<V>,
+    pub(super) anchor: [Vectors<V>; 2],
+    pub(super) separation: [V; 2],
+    pub(super) feature: [V; 2],
+}
+
+/// The shapes of sixteen pairs.
+pub(super) trait Shapes<V> {
+    /// Their manifolds after some seconds, in which B has come to `offset` from A, and both have turned so. Further ones than `reach`
+    /// may give none.
+    fn manifolds(
+        &self,
+        pairs: &Pairs<V>,
+        time: V,
+        offset: Vectors<V>,
+        turning: [Vectors<V>; 2],
+        reach: V,
+    ) -> Moments<V>;
+}
+
+/// What comes of sixteen pairs.
+#[derive(Default, Debug)]
+pub(super) struct Points {
+    /// Positive if that cannot be told here.
+    unsure: WideRow,
+    /// Positive if a contact has this point.
+    holds: [WideRow; 2],
+    feature: [WideRow; 2],
+    /// Normal and offset, both rotations, of a [`Contact`]; anchor, separation there and now of its points.
+    frames: [Quad; WIDE],
+    rotations: [Quad; WIDE],
+    points: [[Quad; WIDE]; 2],
+}
+
+/// With the sign that it has not.
+#[inline(always)]
+pub(super) fn negated<V: Wide>(x: V) -> V {
+    V::splat(-0.0).sub(x)
+}
+
+#[inline(always)]
+pub(super) fn opposite<V: Wide>(v: Vectors<V>) -> Vectors<V> {
+    Vectors::new(negated(v.x), negated(v.y))
+}
+
+impl<V: Wide> Moments<V> {
+    /// `yes` where a number is positive, else `no`.
+    #[inline(always)]
+    fn pick(positive: V, yes: &Self, no: &Self) -> Self {
+        Self {
+            time: positive.if_positive(yes.time, no.time),
+            offset: Vectors::pick(positive, yes.offset, no.offset),
+            turning: both(positive, &yes.turning, &no.turning),
+            some: positive.if_positive(yes.some, no.some),
+            two: positive.if_positive(yes.two, no.two),
+            // What could not be told is not forgotten.
+            unsure: positive.if_positive(yes.unsure.max(no.unsure), no.unsure),
+            normal: Vectors::pick(positive, yes.normal, no.normal),
+            anchor: both(positive, &yes.anchor, &no.anchor),
+            separation: [
+                positive.if_positive(yes.separation[0], no.separation[0]),
+                positive.if_positive(yes.separation[1], no.separation[1]),
+            ],
+            feature: [
+                positive.if_positive(yes.feature[0], no.feature[0]),
+                positive.if_positive(yes.feature[1], no.feature[1]),
+            ],
+        }
+    }
+
+    /// Anchor and separation of the point with the least.
+    #[inline(always)]
+    fn nearest(&self) -> (Vectors<V>, V) {
+        let second = self.two.mul(less(self.separation[1], self.separation[0]));
+        let anchor = Vectors::pick(second, self.anchor[1], self.anchor[0]);
+        (anchor, second.if_positive(self.separation[1], self.separation[0]))
+    }
+}
+
+impl Points {
+    /// Looks at pairs of whom it is asked: `asked` is one, or else zero; `fixed` where one of them is a static.
+    #[inline(always)]
+    pub(super) fn look<V: Wide>(
+        &mut self,
+        pairs: &Pairs<V>,
+        shapes: &impl Shapes<V>,
+        [asked, fixed]: [V; 2],
+        setup: &Setup,
+    ) {
+        let (one, zero) = (V::splat(1.0), V::splat(0.0));
+        let (dt, speculative) = (pairs.dt, V::splat(setup.params.speculative_distance));
+        let far = pairs.far();
+        let reach = speculative.add(far);
+        let identity = Vectors::new(one, zero);
+        let now = shapes.manifolds(pairs, zero, pairs.offset, [identity; 2], reach);
+        let (_, separation) = now.nearest();
+        let is_slow = less(far, speculative);
+        let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
+        let asked = asked.mul(now.some);
+        let later = is_now.if_positive(zero, asked);
+        let mut at = now;
+        let mut meets = is_now.max(less(separation, speculative));
+        if later.any_positive() {
+            let (then, found) = pairs.first_moments(shapes, &now, later, reach);
+            at = Moments::pick(found, &then, &now);
+            at.unsure = at.unsure.max(then.unsure);
+            meets = meets.max(found);
+        }
+        meets = meets.mul(asked).mul(at.some);
+        let moved = pairs.between.dot(at.normal).mul(at.time);
+        for point in 0..2 {
+            let (anchor, separation) = (at.anchor[point], at.separation[point]);
+            let closing = pairs.closing(anchor, at.offset, at.normal).max(zero);
+            let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
+            let there = if point == 0 { meets } else { meets.mul(at.two) };
+            less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
+            let on_a = pairs.swing(0, at.turning[0], anchor, at.normal);
+            let on_b = pairs.swing(1, at.turning[1], anchor.minus(at.offset), at.normal);
+            let before = separation.sub(moved.add(on_b.sub(on_a)));
+            let now = at.time.if_positive(before, separation);
+            V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
+            at.feature[point].store(&mut self.feature[point]);
+        }
+        // Speeds that overflow tell of no other moment.
+        less(far, V::splat(0.125 * f32::MAX)).if_positive(at.unsure, one).store(&mut self.unsure);
+        let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
+        V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
+        V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
+    }
+
+    #[inline(always)]
+    pub(super) fn is_unsure(&self, lane: usize) -> bool {
+        self.unsure[lane] > 0.0
+    }
+
+    #[inline(always)]
+    pub(super) fn meets(&self, lane: usize) -> bool {
+        self.holds[0][lane] + self.holds[1][lane] > 0.0
+    }
+
+    /// The contact of a pair, if it makes one, of these pieces, with the impulses of the last one, and the separation of its points now.
+    #[inline(always)]
+    pub(super) fn contact(&self, lane: usize, pieces: u32, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
+        // Of two points it may be the second alone that holds.
+        let first = usize::from(self.holds[0][lane] == 0.0);
+        let (mut contact, mut now) = (
+            Contact {
+                normal: Vec2::new(nx, ny),
+                offset: Vec2::new(x, y),
+                rotation_a: Rot { c: ca, s: sa },
+                rotation_b: Rot { c: cb, s: sb },
+                points: [self.point(lane, first, pieces, known), ContactPoint::NONE],
+            },
+            [self.points[first][lane][3], 0.0],
+        );
+        if first == 0 && self.holds[1][lane] > 0.0 {
+            contact.points[1] = self.point(lane, 1, pieces, known);
+            now[1] = self.points[1][lane][3];
+        }
+        (contact, now)
+    }
+
+    #[inline(always)]
+    fn point(&self, lane: usize, point: usize, pieces: u32, known: Option<&Contact>) -> ContactPoint {
+        let [x, y, separation, _] = self.points[point][lane];
+        let feature = self.feature[point][lane] as u32 | pieces;
+        let old = known.and_then(|known| known.points().iter().find(|old| old.feature == feature));
+        let (normal_impulse, tangent_impulse) = old.map_or((0.0, 0.0), |old| (old.normal_impulse, old.tangent_impulse));
+        ContactPoint { anchor: Vec2::new(x, y), separation, normal_impulse, tangent_impulse, feature }
+    }
+}
+
+impl<V: Wide> Pairs<V> {
+    /// What will be after some seconds if nothing else happens.
+    #[inline(always)]
+    fn moments(&self, shapes: &impl Shapes<V>, time: V, reach: V) -> Moments<V> {
+        let (offset, turning) = self.moved(time);
+        shapes.manifolds(self, time, offset, turning, reach)
+    }
+
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step.
+    #[inline(always)]
+    fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V) -> (Moments<V>, V) {
+        let (zero, dt) = (V::splat(0.0), self.dt);
+        let sweep = self.sweep(0).add(self.sweep(1));
+        let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
+        for _ in 0..ROUNDS {
+            let (anchor, separation) = at.nearest();
+            // What is apart along a direction stays so for as long as nothing moves further along it.
+            let bound = negated(self.between.dot(at.normal)).add(sweep);
+            let left = dt.sub(at.time);
+            going = less(bound.mul(left), separation).if_positive(zero, going);
+            if !going.any_positive() {
+                break;
+            }
+            // Half as if the fastest corner led, half as if the nearest point did.
+            let closing = self.closing(anchor, at.offset, at.normal).max(zero);
+            let speed = V::splat(0.5).mul(bound.add(closing));
+            let next = self.moments(shapes, at.time.add(separation.div(speed).min(left)), reach);
+            at = Moments::pick(going, &next, &at);
+            going = going.mul(at.some);
+            let (_, separation) = at.nearest();
+            let deep = less(separation, V::splat(DEEP)).mul(going);
+            let near = less(separation, V::splat(NEAR)).mul(going);
+            ending = ending.max(deep);
+            found = found.max(deep.if_positive(zero, near));
+            going = near.max(deep).if_positive(zero, going);
+        }
+        ending = ending.max(going);
+        let (anchor, separation) = at.nearest();
+        let closing = self.closing(anchor, at.offset, at.normal);
+        let closes = less(zero, closing).mul(ending);
+        let time = at.time.add(separation.div(closing));
+        let exact = less(dt, time).if_positive(zero, closes);
+        found = found.max(closes.if_positive(zero, ending));
+        if exact.any_positive() {
+            let then = self.moments(shapes, time.max(zero), reach);
+            at = Moments::pick(exact, &then, &at);
+            found = found.max(exact.mul(then.some));
+        }
+        (at, found)
+    }
+}

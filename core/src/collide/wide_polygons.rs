@@ -1,0 +1,280 @@
+//! The convex pieces of sixteen pairs: what `manifold/convex.rs` does for two, in the same words and with the same bits.
+//!
+//! Where it is two corners that are nearest, it says so, and leaves the pair to that.
+
+use super::manifold::box_box::PREFERENCE;
+use super::touch::Meeting;
+use super::wide_boxes::nearest;
+use super::wide_moments::{Moments, Points, Shapes, opposite};
+use super::wide_pairs::{Pairs, WidePairs};
+use crate::model::piece::Piece;
+use crate::model::shape::MOST_CORNERS;
+use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
+use crate::parallel::vectors::{Vectors, absolute, less};
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+
+/// Columns of an outline, four figures each (see `Convex::quads`).
+const QUADS: usize = MOST_CORNERS;
+
+/// A piece of each body of sixteen pairs: polygons and lines, solid from all sides, and what is within a radius of them.
+#[derive(Debug)]
+pub(super) struct WidePolygons {
+    pairs: WidePairs,
+    outlines: [[[Quad; WIDE]; QUADS]; 2],
+    corners: [WideRow; 2],
+    radii: [WideRow; 2],
+    /// Those of the pieces that have most.
+    most: [usize; 2],
+}
+
+impl Default for WidePolygons {
+    fn default() -> Self {
+        Self {
+            pairs: WidePairs::default(),
+            outlines: [[[[0.0; 4]; WIDE]; QUADS]; 2],
+            corners: [[0.0; WIDE]; 2],
+            radii: [[0.0; WIDE]; 2],
+            most: [0; 2],
+        }
+    }
+}
+
+impl WidePolygons {
+    /// Whether two pieces can be looked at so.
+    pub(super) fn hold(pieces: [&Piece; 2]) -> bool {
+        pieces.iter().all(|piece| piece.outline.count() > 1 && piece.side.is_none())
+    }
+
+    /// Forgets the lanes that there were.
+    #[inline(always)]
+    pub(super) fn clear(&mut self) {
+        self.most = [0; 2];
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, tile: &Tile, meeting: &Meeting<'_>, setup: &Setup) {
+        self.pairs.set(lane, tile, meeting.bodies, false, setup);
+        for (side, piece) in meeting.pieces.into_iter().enumerate() {
+            for (column, quad) in self.outlines[side].iter_mut().zip(piece.outline.quads()) {
+                column[lane] = quad;
+            }
+            self.corners[side][lane] = piece.outline.count() as f32;
+            self.radii[side][lane] = piece.radius;
+            self.most[side] = self.most[side].max(piece.outline.count());
+        }
+    }
+
+    /// What comes of the pairs.
+    #[inline(always)]
+    pub(super) fn look<V: Wide>(&self, points: &mut Points, setup: &Setup) {
+        let (pairs, fixed) = (self.pairs.load::<V>(setup), V::load(&self.pairs.fixed));
+        points.look(&pairs, &Polygons([self.polygon(0), self.polygon(1)]), [V::splat(1.0), fixed], setup);
+    }
+
+    #[inline(always)]
+    fn polygon<V: Wide>(&self, side: usize) -> Polygon<V> {
+        let mut columns = [[V::splat(0.0); MOST_CORNERS]; 4];
+        for (column, quads) in columns.iter_mut().zip(self.outlines[side].chunks(2)) {
+            column[..4].copy_from_slice(&V::load_quads(&quads[0]));
+            if self.most[0].max(self.most[1]) > 4 {
+                column[4..].copy_from_slice(&V::load_quads(&quads[1]));
+            }
+        }
+        let none = Vectors::new(V::splat(0.0), V::splat(0.0));
+        let (mut corners, mut normals) = ([none; MOST_CORNERS], [none; MOST_CORNERS]);
+        for i in 0..MOST_CORNERS {
+            corners[i] = Vectors::new(columns[0][i], columns[1][i]);
+            normals[i] = Vectors::new(columns[2][i], columns[3][i]);
+        }
+        let (count, radius) = (V::load(&self.corners[side]), V::load(&self.radii[side]));
+        Polygon { corners, normals, count, most: self.most[side], radius }
+    }
+}
+
+/// Sixteen polygons, as `Convex`.
+#[derive(Clone, Copy)]
+struct Polygon<V> {
+    corners: [Vectors<V>; MOST_CORNERS],
+    normals: [Vectors<V>; MOST_CORNERS],
+    count: V,
+    /// None of them has more corners.
+    most: usize,
+    /// Around the polygon, in m.
+    radius: V,
+}
+
+/// One face of each of sixteen polygons, of which a figure is greatest.
+#[derive(Clone, Copy)]
+struct Face<V> {
+    figure: V,
+    number: V,
+    /// From which corner to which.
+    ends: [Vectors<V>; 2],
+    normal: Vectors<V>,
+}
+
+impl<V: Wide> Face<V> {
+    /// Less than any.
+    #[inline(always)]
+    fn none() -> Self {
+        let (zero, none) = (V::splat(0.0), Vectors::new(V::splat(0.0), V::splat(0.0)));
+        Self { figure: V::splat(f32::NEG_INFINITY), number: zero, ends: [none; 2], normal: none }
+    }
+
+    /// `yes` where a number is positive, else `no`.
+    #[inline(always)]
+    fn pick(positive: V, yes: &Self, no: &Self) -> Self {
+        Self {
+            figure: positive.if_positive(yes.figure, no.figure),
+            number: positive.if_positive(yes.number, no.number),
+            ends: [
+                Vectors::pick(positive, yes.ends[0], no.ends[0]),
+                Vectors::pick(positive, yes.ends[1], no.ends[1]),
+            ],
+            normal: Vectors::pick(positive, yes.normal, no.normal),
+        }
+    }
+}
+
+impl<V: Wide> Polygon<V> {
+    /// The same, turned and then moved, as far as so many corners go.
+    #[inline(always)]
+    fn seen(&self, turn: Vectors<V>, offset: Vectors<V>, corners: usize) -> Self {
+        let mut seen = *self;
+        for i in 0..corners {
+            seen.corners[i] = offset.plus(turn.rotate(self.corners[i]));
+            seen.normals[i] = turn.rotate(self.normals[i]);
+        }
+        seen
+    }
+
+    /// A face, of which this is the figure.
+    #[inline(always)]
+    fn face(&self, number: usize, figure: V) -> Face<V> {
+        let first = self.corners[0];
+        let next = if number + 1 < MOST_CORNERS {
+            let goes_on = self.count.sub(V::splat((number + 1) as f32));
+            Vectors::pick(goes_on, self.corners[number + 1], first)
+        } else {
+            first
+        };
+        let (number, corner, normal) = (V::splat(number as f32), self.corners[number], self.normals[number]);
+        Face { figure, number, ends: [corner, next], normal }
+    }
+
+    /// The face along which another lies furthest out, and how far.
+    #[inline(always)]
+    fn separate(&self, other: &Self) -> Face<V> {
+        let mut most = Face::none();
+        for number in 0..self.most {
+            let (corner, normal) = (self.corners[number], self.normals[number]);
+            let mut least = V::splat(f32::INFINITY);
+            for &at in &other.corners[..other.most] {
+                least = at.minus(corner).dot(normal).min(least);
+            }
+            let further = least.sub(most.figure);
+            most = Face::pick(further, &self.face(number, least), &most);
+        }
+        most
+    }
+}
+
+/// Both pieces of sixteen pairs, in the frames of their bodies.
+struct Polygons<V>([Polygon<V>; 2]);
+
+impl<V: Wide> Shapes<V> for Polygons<V> {
+    #[inline(always)]
+    fn manifolds(
+        &self,
+        pairs: &Pairs<V>,
+        time: V,
+        offset: Vectors<V>,
+        turning: [Vectors<V>; 2],
+        reach: V,
+    ) -> Moments<V> {
+        let (one, zero, half) = (V::splat(1.0), V::splat(0.0), V::splat(0.5));
+        let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
+        let a = &self.0[0];
+        let most = a.most.max(self.0[1].most);
+        let b = &self.0[1].seen(rotation[0].to(rotation[1]), rotation[0].unrotate(offset), most);
+        let rounding = a.radius.add(b.radius);
+        let (face_a, face_b) = (a.separate(b), b.separate(a));
+        let beyond = less(reach, face_a.figure.sub(rounding)).max(less(reach, face_b.figure.sub(rounding)));
+        let from_b = less(face_a.figure.add(V::splat(PREFERENCE)), face_b.figure);
+        let reference = Face::pick(from_b, &face_b, &face_a);
+        let (height, n) = (reference.figure, reference.normal);
+        // The edge of the other that looks most against it.
+        let mut edge = Face::none();
+        for number in 0..most {
+            let normal = Vectors::pick(from_b, a.normals[number], b.normals[number]);
+            let against = zero.sub(normal.dot(n));
+            let [in_a, in_b] = [a.face(number, against), b.face(number, against)];
+            edge = Face::pick(against.sub(edge.figure), &Face::pick(from_b, &in_a, &in_b), &edge);
+        }
+        let features = from_b.if_positive(V::splat(128.0), zero);
+        let features = features.add(reference.number.mul(V::splat(16.0))).add(edge.number.mul(V::splat(2.0)));
+        let radius = from_b.if_positive(b.radius, a.radius);
+        let other_radius = from_b.if_positive(a.radius, b.radius);
+        // Clipped to the face.
+        let [from, to] = reference.ends;
+        let t = Vectors::new(zero.sub(n.y), n.x);
+        let width = to.minus(from).dot(t);
+        let from_face = [edge.ends[1].minus(from), edge.ends[0].minus(from)];
+        let place = [from_face[0].dot(t), from_face[1].dot(t)];
+        let heights = [from_face[0].dot(n), from_face[1].dot(n)];
+        let beside = less(place[1], zero).max(less(width, place[0]));
+        let (span, rise) = (place[1].sub(place[0]), heights[1].sub(heights[0]));
+        let slope = span.if_positive(rise.div(span), zero);
+        let spans = span.if_positive(one, zero);
+        let mut at = Moments {
+            time,
+            offset,
+            turning,
+            some: beyond.if_positive(zero, one),
+            two: spans,
+            unsure: zero,
+            normal: n,
+            anchor: [offset; 2],
+            separation: [zero; 2],
+            feature: [features, features.add(one)],
+        };
+        let mut none = width.if_positive(beside, one);
+        for end in 0..2 {
+            let clipped = place[end].max(zero).min(width);
+            let shift = clipped.sub(place[end]);
+            let height = span.if_positive(heights[end], heights[end].min(heights[1])).add(slope.mul(shift));
+            // Around a corner a slanted edge is nearer than straight up from the face.
+            let corner = from.plus(t.scaled(clipped));
+            let (gap, part) = nearest(corner, edge.ends);
+            let distance = gap.dot(gap).sqrt();
+            let around = absolute(shift).if_positive(height, zero);
+            // Round corners meet along the line between them.
+            let is_corner = less(zero, part).mul(less(part, one)).if_positive(zero, one);
+            let is_round = is_corner.mul(less(distance, height)).mul(rounding.if_positive(one, zero));
+            let there = if end == 0 { one } else { spans };
+            none = none.max(around.if_positive(is_round, zero).mul(there));
+            let separation = around.if_positive(distance.min(height), height).sub(radius).sub(other_radius);
+            at.separation[end] = separation;
+            at.anchor[end] = corner.plus(n.scaled(radius.add(half.mul(separation))));
+        }
+        // An end of a line has no width: those that overlap part there nevertheless.
+        let is_end = none.mul(height.if_positive(zero, one));
+        at.unsure = none.mul(height.if_positive(one, zero)).mul(at.some);
+        at.two = at.two.mul(none.if_positive(zero, one));
+        let slants = edge.ends[1].minus(edge.ends[0]).dot(n);
+        let deepest = Vectors::pick(zero.sub(slants), edge.ends[1], edge.ends[0]);
+        let apart = absolute(from.x.sub(to.x)).max(absolute(from.y.sub(to.y)));
+        let on_face = Vectors::pick(apart, deepest.minus(n.scaled(height)), from);
+        let separation = height.sub(radius).sub(other_radius);
+        let anchor = on_face.plus(n.scaled(radius.add(half.mul(separation))));
+        at.separation[0] = is_end.if_positive(separation, at.separation[0]);
+        at.anchor[0] = Vectors::pick(is_end, anchor, at.anchor[0]);
+        // Back to the frame of the world.
+        at.normal = rotation[0].rotate(Vectors::pick(from_b, opposite(n), n));
+        for anchor in &mut at.anchor {
+            *anchor = rotation[0].rotate(*anchor);
+        }
+        at
+    }
+}
