@@ -367,13 +367,11 @@ impl<'a> Meeting<'a> {
         self.outcome = Met::from(pair.touch(self.known, pair.far(setup.params.dt), setup));
     }
 
-    /// Takes what was seen of it in a lane, if that could be told.
+    /// Takes what was seen of it in a lane.
     #[inline(always)]
     pub(super) fn see(&mut self, lane: usize, points: &Points) {
-        if !points.is_unsure(lane) {
-            let found = points.meets(lane).then(|| points.contact(lane, self.features, self.known));
-            self.outcome = Met::from(found);
-        }
+        let found = points.meets(lane).then(|| points.contact(lane, self.features, self.known));
+        self.outcome = Met::from(found);
     }
 
     /// The contact, if there is one, and the separations of its points now.

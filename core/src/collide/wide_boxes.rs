@@ -2,7 +2,7 @@
 
 use super::cull::passes;
 use super::manifold::box_box::PREFERENCE;
-use super::wide_moments::{Moments, Points, Shapes, negated, opposite};
+use super::wide_moments::{Moments, Points, Search, Shapes, negated, opposite};
 use super::wide_pairs::{Outlook, Pairs, WidePairs};
 use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
@@ -15,16 +15,21 @@ pub(super) struct BoxOutlook(Points);
 
 impl Outlook for BoxOutlook {
     #[inline(always)]
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup) {
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, search: Search, setup: &Setup) {
         let (both, fixed) = (pairs.load::<V>(setup), V::load(&pairs.fixed));
         let passes = passes(both.offset, both.between, both.bound[0].add(both.bound[1]), setup);
         let asked = passes.if_positive(V::splat(0.0), V::splat(1.0));
-        self.0.look(&both, &Boxes, [asked, fixed], setup);
+        self.0.look(&both, &Boxes, [asked, fixed], search, setup);
     }
 
     #[inline(always)]
     fn is_unsure(&self, lane: usize) -> bool {
         self.0.is_unsure(lane)
+    }
+
+    #[inline(always)]
+    fn is_postponed(&self, lane: usize) -> bool {
+        self.0.is_postponed(lane)
     }
 
     #[inline(always)]

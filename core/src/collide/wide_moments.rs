@@ -46,11 +46,24 @@ pub(super) trait Shapes<V> {
     ) -> Moments<V>;
 }
 
+/// The moment of touch is looked for in so few lanes of sixteen only when there are no others.
+const FEW: usize = 6;
+
+/// When the moments of touch are looked for, which most pairs do not need.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Search {
+    /// At once, where it pays for all sixteen.
+    WhereManyNeedIt,
+    Always,
+}
+
 /// What comes of sixteen pairs.
 #[derive(Default, Debug)]
 pub(super) struct Points {
     /// Positive if that cannot be told here.
     unsure: WideRow,
+    /// Positive if the moment of touch was not looked for yet.
+    postponed: WideRow,
     /// Positive if a contact has this point.
     holds: [WideRow; 2],
     feature: [WideRow; 2],
@@ -113,6 +126,7 @@ impl Points {
         pairs: &Pairs<V>,
         shapes: &impl Shapes<V>,
         [asked, fixed]: [V; 2],
+        search: Search,
         setup: &Setup,
     ) {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
@@ -125,10 +139,14 @@ impl Points {
         let is_slow = less(far, speculative);
         let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
         let asked = asked.mul(now.some);
-        let later = is_now.if_positive(zero, asked);
+        let later = is_now.max(now.unsure).if_positive(zero, asked);
+        let later = pairs.come_near(&now).if_positive(later, zero);
+        later.store(&mut self.postponed);
+        let count = self.postponed.iter().fold(0, |count, &later| count + usize::from(later > 0.0));
         let mut at = now;
         let mut meets = is_now.max(less(separation, speculative));
-        if later.any_positive() {
+        if count > if search == Search::Always { 0 } else { FEW } {
+            self.postponed = [0.0; WIDE];
             let (then, found) = pairs.first_moments(shapes, &now, later, reach);
             at = Moments::pick(found, &then, &now);
             at.unsure = at.unsure.max(then.unsure);
@@ -159,6 +177,11 @@ impl Points {
     #[inline(always)]
     pub(super) fn is_unsure(&self, lane: usize) -> bool {
         self.unsure[lane] > 0.0
+    }
+
+    #[inline(always)]
+    pub(super) fn is_postponed(&self, lane: usize) -> bool {
+        self.postponed[lane] > 0.0
     }
 
     #[inline(always)]
@@ -207,18 +230,30 @@ impl<V: Wide> Pairs<V> {
         shapes.manifolds(self, time, offset, turning, reach)
     }
 
+    /// The greatest speed at which anything of B comes nearer to anything of A along a normal, in m/s.
+    #[inline(always)]
+    fn bound_along(&self, normal: Vectors<V>) -> V {
+        negated(self.between.dot(normal)).add(self.sweep(0).add(self.sweep(1)))
+    }
+
+    /// One for those that may touch within the rest of the step: what is apart along a direction stays so for as long as nothing moves
+    /// further along it.
+    #[inline(always)]
+    fn come_near(&self, at: &Moments<V>) -> V {
+        let (_, separation) = at.nearest();
+        let way = self.bound_along(at.normal).mul(self.dt.sub(at.time));
+        less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
+    }
+
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step.
     #[inline(always)]
     fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V) -> (Moments<V>, V) {
         let (zero, dt) = (V::splat(0.0), self.dt);
-        let sweep = self.sweep(0).add(self.sweep(1));
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
         for _ in 0..ROUNDS {
             let (anchor, separation) = at.nearest();
-            // What is apart along a direction stays so for as long as nothing moves further along it.
-            let bound = negated(self.between.dot(at.normal)).add(sweep);
-            let left = dt.sub(at.time);
-            going = less(bound.mul(left), separation).if_positive(zero, going);
+            let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
+            going = self.come_near(&at).if_positive(going, zero);
             if !going.any_positive() {
                 break;
             }

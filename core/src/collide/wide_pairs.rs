@@ -2,6 +2,7 @@
 //! touches within the step (`wide_touches.rs`).
 
 use crate::collide::broad_phase::Pair;
+use crate::collide::wide_moments::Search;
 use crate::collide::wide_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
@@ -37,10 +38,13 @@ pub(super) struct WidePairs {
 /// What can be said of sixteen pairs of some kind.
 pub(super) trait Outlook: Default {
     /// Tells of all lanes, also of those that were not set.
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup);
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, search: Search, setup: &Setup);
 
     /// Whether it cannot be told here if a pair makes a contact.
     fn is_unsure(&self, lane: usize) -> bool;
+
+    /// Whether it can be told only after a search that was put off.
+    fn is_postponed(&self, lane: usize) -> bool;
 
     /// Whether a pair makes a contact.
     fn meets(&self, lane: usize) -> bool;
@@ -185,7 +189,7 @@ impl<V: Wide> Pairs<V> {
 
 impl Outlook for RoundOutlook {
     #[inline(always)]
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, setup: &Setup) {
+    fn look<V: Wide>(&mut self, pairs: &WidePairs, _: Search, setup: &Setup) {
         let (both, zero) = (pairs.load::<V>(setup), V::splat(0.0));
         let is_slow = V::splat(setup.params.speculative_distance).sub(both.far());
         let known = is_slow.if_positive(V::load(&pairs.known), zero);
@@ -210,6 +214,11 @@ impl Outlook for RoundOutlook {
     #[inline(always)]
     fn is_unsure(&self, lane: usize) -> bool {
         self.unsure[lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn is_postponed(&self, _: usize) -> bool {
+        false
     }
 
     #[inline(always)]
@@ -274,7 +283,7 @@ mod tests {
 
     fn told<V: Wide, O: Outlook>(pairs: &WidePairs, setup: &Setup) -> Option<Option<(Contact, [f32; 2])>> {
         let mut outlook = O::default();
-        outlook.look::<V>(pairs, setup);
+        outlook.look::<V>(pairs, Search::Always, setup);
         (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, None)))
     }
 

@@ -5,7 +5,7 @@
 use super::manifold::box_box::PREFERENCE;
 use super::touch::Meeting;
 use super::wide_boxes::nearest;
-use super::wide_moments::{Moments, Points, Shapes, opposite};
+use super::wide_moments::{Moments, Points, Search, Shapes, opposite};
 use super::wide_pairs::{Pairs, WidePairs};
 use crate::model::piece::Piece;
 use crate::model::shape::MOST_CORNERS;
@@ -67,9 +67,9 @@ impl WidePolygons {
 
     /// What comes of the pairs.
     #[inline(always)]
-    pub(super) fn look<V: Wide>(&self, points: &mut Points, setup: &Setup) {
+    pub(super) fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
         let (pairs, fixed) = (self.pairs.load::<V>(setup), V::load(&self.pairs.fixed));
-        points.look(&pairs, &Polygons([self.polygon(0), self.polygon(1)]), [V::splat(1.0), fixed], setup);
+        points.look(&pairs, &Polygons([self.polygon(0), self.polygon(1)]), [V::splat(1.0), fixed], search, setup);
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 use super::names::Named;
 use super::{BLOCK, FindAmong};
 use crate::collide::touch::{Meeting, Met, meet};
-use crate::collide::wide_moments::Points;
+use crate::collide::wide_moments::{Points, Search};
 use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
@@ -73,25 +73,37 @@ impl Kernel for Look<'_, '_> {
     fn run<V: Lanes>(self) {
         let Self { meetings: Meetings { all, open, .. }, tile, setup } = self;
         let (mut wide, mut points) = (WidePolygons::default(), Points::default());
-        for open in open.chunks(WIDE) {
-            if open.len() > FEW {
+        for search in [Search::WhereManyNeedIt, Search::Always] {
+            let (mut count, mut postponed) = (open.len(), 0);
+            // Those that are too few for lanes.
+            let few = if count % WIDE > FEW { 0 } else { count % WIDE };
+            for &number in &open[count - few..] {
+                all[number as usize].1.touch(tile, setup);
+            }
+            count -= few;
+            for first in (0..count).step_by(WIDE) {
+                let lanes = WIDE.min(count - first);
+                // In lanes that are left over, the first of them again.
+                let mut numbers = [open[first]; WIDE];
+                numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
                 wide.clear();
-                for lane in 0..WIDE {
-                    // In lanes that are left over, the first of them again.
-                    let number = *open.get(lane).unwrap_or(&open[0]);
+                for (lane, &number) in numbers.iter().enumerate() {
                     wide.set(lane, tile, &all[number as usize].1, setup);
                 }
-                wide.look::<V::Wide>(&mut points, setup);
-                for (lane, &number) in open.iter().enumerate() {
-                    all[number as usize].1.see(lane, &points);
+                wide.look::<V::Wide>(&mut points, search, setup);
+                for (lane, &number) in numbers[..lanes].iter().enumerate() {
+                    let meeting = &mut all[number as usize].1;
+                    if points.is_postponed(lane) {
+                        open[postponed] = number;
+                        postponed += 1;
+                    } else if points.is_unsure(lane) {
+                        meeting.touch(tile, setup);
+                    } else {
+                        meeting.see(lane, &points);
+                    }
                 }
             }
-            for &number in open {
-                let meeting = &mut all[number as usize].1;
-                if matches!(meeting.outcome, Met::Open) {
-                    meeting.touch(tile, setup);
-                }
-            }
+            open.truncate(postponed);
         }
     }
 }

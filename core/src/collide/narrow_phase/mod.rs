@@ -12,6 +12,7 @@ use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::BoxOutlook;
+use crate::collide::wide_moments::Search;
 use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
 use crate::model::contact::{Contact, ContactCache, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
@@ -276,25 +277,36 @@ impl Block<'_> {
     #[inline(always)]
     fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {
         let (mut wide, mut outlook) = (WidePairs::default(), O::default());
-        for places in list.chunks(WIDE) {
-            for lane in 0..WIDE {
+        let (mut left, mut count) = ([0; BLOCK], list.len());
+        left[..count].copy_from_slice(list);
+        for search in [Search::WhereManyNeedIt, Search::Always] {
+            let mut postponed = 0;
+            for first in (0..count).step_by(WIDE) {
+                let lanes = WIDE.min(count - first);
                 // In lanes that are left over, the first of them again.
-                let place = *places.get(lane).unwrap_or(&places[0]);
-                let Named { bodies, known, .. } = self.named[usize::from(place)];
-                wide.set(lane, tile, bodies, known.is_some(), setup);
-            }
-            outlook.look::<V::Wide>(&wide, setup);
-            for (lane, &place) in places.iter().enumerate() {
-                let (place, Named { bodies, known, .. }) = (usize::from(place), self.named[usize::from(place)]);
-                // What there is no contact of is written down as well: a branch would be a coin toss.
-                let (mut meets, mut found) = (outlook.meets(lane), outlook.contact(lane, known));
-                if outlook.is_unsure(lane) {
-                    let touch = touch(tile, bodies, known, setup);
-                    (meets, found) = (touch.is_some(), touch.unwrap_or(found));
+                let mut places = [left[first]; WIDE];
+                places[..lanes].copy_from_slice(&left[first..][..lanes]);
+                for (lane, &place) in places.iter().enumerate() {
+                    let Named { bodies, known, .. } = self.named[usize::from(place)];
+                    wide.set(lane, tile, bodies, known.is_some(), setup);
                 }
-                self.outcome[place] = if meets { Outcome::Found } else { Outcome::Nothing };
-                (self.found[place], self.separation[place]) = found;
+                outlook.look::<V::Wide>(&wide, search, setup);
+                for (lane, &number) in places[..lanes].iter().enumerate() {
+                    let (place, Named { bodies, known, .. }) = (usize::from(number), self.named[usize::from(number)]);
+                    // What there is no contact of is written down as well: a branch would be a coin toss.
+                    let (mut meets, mut found) = (outlook.meets(lane), outlook.contact(lane, known));
+                    if outlook.is_unsure(lane) {
+                        let touch = touch(tile, bodies, known, setup);
+                        (meets, found) = (touch.is_some(), touch.unwrap_or(found));
+                    }
+                    self.outcome[place] = if meets { Outcome::Found } else { Outcome::Nothing };
+                    (self.found[place], self.separation[place]) = found;
+                    // Those that are looked at again are written over then.
+                    left[postponed] = number;
+                    postponed += usize::from(outlook.is_postponed(lane));
+                }
             }
+            count = postponed;
         }
     }
 
