@@ -9,9 +9,8 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
 use crate::collide::piece_boxes::PieceBoxes;
-use crate::collide::wide_moments::Points;
-use crate::collide::wide_pairs::{ROLLING, TOUCHING};
-use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_pairs::{Outlook, ROLLING, TOUCHING};
+use crate::collide::wide_polygons::PolygonOutlook;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, cross, dot, max, min, turn};
@@ -87,7 +86,7 @@ struct Approach<'a> {
     offset: Vec2,
     /// Velocity of B as seen from A, in m/s.
     between: Vec2,
-    /// Which pieces of them meet; none of circles and boxes.
+    /// Which pieces of them meet; none where both are circles or boxes.
     pieces: Option<[&'a Piece; 2]>,
     /// Their numbers, as features of contacts name them (see [`Contact::pieces`]).
     features: u32,
@@ -111,11 +110,14 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
     Approach::new(tile, pair, setup).far(setup.params.dt) < setup.params.speculative_distance
 }
 
-/// The contact of bodies A and B, if there is one, and the separation of its points. Not inlined: kernels ask for it seldom, and with
+/// The contact of bodies A and B, of one piece each, if there is one, and the separation of its points. Not inlined: kernels ask for it seldom, and with
 /// it the compiler would take many minutes over them.
 #[inline(never)]
 pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-    let pair = Approach::new(tile, pair, setup);
+    let mut pair = Approach::new(tile, pair, setup);
+    if !(pair.a.kind.form.is_simple() && pair.b.kind.form.is_simple()) {
+        pair.pieces = Some([&pair.a.kind.pieces[0], &pair.b.kind.pieces[0]]);
+    }
     if pair.pass_by(setup) { None } else { pair.touch(known, pair.far(setup.params.dt), setup) }
 }
 
@@ -369,8 +371,8 @@ impl<'a> Meeting<'a> {
 
     /// Takes what was seen of it in a lane.
     #[inline(always)]
-    pub(super) fn see(&mut self, lane: usize, points: &Points) {
-        let found = points.meets(lane).then(|| points.contact(lane, self.features, self.known));
+    pub(super) fn see(&mut self, lane: usize, outlook: &PolygonOutlook) {
+        let found = outlook.meets(lane).then(|| outlook.contact_of(lane, self.features, self.known));
         self.outcome = Met::from(found);
     }
 
@@ -391,7 +393,7 @@ impl From<Option<(Contact, [f32; 2])>> for Met {
     }
 }
 
-/// Tells which pieces of two bodies may touch, of which one body is neither a circle nor a box: in their order, and what comes of
+/// Tells which pieces of two bodies may touch: in their order, and what comes of
 /// those that had a contact that still serves, or of which one is a disc or a segment of a chain. `known` are the contacts of the
 /// last step.
 pub(super) fn meet<'a>(
@@ -422,7 +424,7 @@ pub(super) fn meet<'a>(
         let outcome = match (kept, rolled) {
             (Some(separation), _) => Met::Known(separation),
             (None, Some((contact, separation))) => Met::Found(contact, separation),
-            _ if WidePolygons::hold(pieces) => Met::Open,
+            _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
             _ => Met::from(pair.touch(known, far, setup)),
         };
         met(Meeting { bodies, pieces, features, known, outcome });

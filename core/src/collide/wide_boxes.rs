@@ -1,6 +1,6 @@
 //! The boxes of sixteen pairs: what `manifold/box_box.rs` does for two, in the same words and with the same bits.
 
-use super::cull::passes;
+use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
 use super::wide_moments::{Moments, Points, Search, Shapes, negated, opposite};
 use super::wide_pairs::{Outlook, Pairs, WidePairs};
@@ -8,38 +8,44 @@ use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
 
 /// What comes of sixteen pairs of boxes.
 #[derive(Default, Debug)]
-pub(super) struct BoxOutlook(Points);
+pub(super) struct BoxOutlook {
+    pairs: WidePairs,
+    points: Points,
+}
 
 impl Outlook for BoxOutlook {
     #[inline(always)]
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, search: Search, setup: &Setup) {
-        let (both, fixed) = (pairs.load::<V>(setup), V::load(&pairs.fixed));
-        let passes = passes(both.offset, both.between, both.bound[0].add(both.bound[1]), setup);
-        let asked = passes.if_positive(V::splat(0.0), V::splat(1.0));
-        self.0.look(&both, &Boxes, [asked, fixed], search, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, is_known, setup);
+    }
+
+    #[inline(always)]
+    fn look<V: Wide>(&mut self, search: Search, setup: &Setup) {
+        self.points.look(&self.pairs.load::<V>(setup), &Boxes, search, setup);
     }
 
     #[inline(always)]
     fn is_unsure(&self, lane: usize) -> bool {
-        self.0.is_unsure(lane)
+        self.points.is_unsure(lane)
     }
 
     #[inline(always)]
     fn is_postponed(&self, lane: usize) -> bool {
-        self.0.is_postponed(lane)
+        self.points.is_postponed(lane)
     }
 
     #[inline(always)]
     fn meets(&self, lane: usize) -> bool {
-        self.0.meets(lane)
+        self.points.meets(lane)
     }
 
     #[inline(always)]
     fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
-        self.0.contact(lane, 0, known)
+        self.points.contact(lane, 0, known)
     }
 }
 

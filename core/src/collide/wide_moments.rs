@@ -3,6 +3,7 @@
 //!
 //! Where speeds overflow, or shapes say so, it cannot tell, and leaves the pair to that.
 
+use super::cull::passes;
 use super::touch::{DEEP, NEAR, ROUNDS};
 use super::wide_pairs::{Pairs, TOUCHING};
 use super::wide_touches::both;
@@ -119,13 +120,12 @@ impl<V: Wide> Moments<V> {
 }
 
 impl Points {
-    /// Looks at pairs of whom it is asked: `asked` is one, or else zero; `fixed` where one of them is a static.
+    /// Looks at pairs of such shapes.
     #[inline(always)]
     pub(super) fn look<V: Wide>(
         &mut self,
         pairs: &Pairs<V>,
         shapes: &impl Shapes<V>,
-        [asked, fixed]: [V; 2],
         search: Search,
         setup: &Setup,
     ) {
@@ -138,7 +138,8 @@ impl Points {
         let (_, separation) = now.nearest();
         let is_slow = less(far, speculative);
         let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
-        let asked = asked.mul(now.some);
+        let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
+        let asked = passes.if_positive(zero, now.some);
         let later = is_now.max(now.unsure).if_positive(zero, asked);
         let later = pairs.come_near(&now).if_positive(later, zero);
         later.store(&mut self.postponed);
@@ -157,7 +158,7 @@ impl Points {
         for point in 0..2 {
             let (anchor, separation) = (at.anchor[point], at.separation[point]);
             let closing = pairs.closing(anchor, at.offset, at.normal).max(zero);
-            let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
+            let ahead = pairs.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
             let on_a = pairs.swing(0, at.turning[0], anchor, at.normal);

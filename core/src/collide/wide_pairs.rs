@@ -24,7 +24,7 @@ pub(super) struct WidePairs {
     /// One where they had a contact in the last step, else zero.
     known: WideRow,
     /// One where one of them is a static, else zero.
-    pub(super) fixed: WideRow,
+    fixed: WideRow,
     /// Velocity and rotation.
     a: [Quad; WIDE],
     b: [Quad; WIDE],
@@ -37,8 +37,11 @@ pub(super) struct WidePairs {
 
 /// What can be said of sixteen pairs of some kind.
 pub(super) trait Outlook: Default {
+    /// Puts a pair into a lane.
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup);
+
     /// Tells of all lanes, also of those that were not set.
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, search: Search, setup: &Setup);
+    fn look<V: Wide>(&mut self, search: Search, setup: &Setup);
 
     /// Whether it cannot be told here if a pair makes a contact.
     fn is_unsure(&self, lane: usize) -> bool;
@@ -56,6 +59,7 @@ pub(super) trait Outlook: Default {
 /// What can be said of pairs with a round body.
 #[derive(Default, Debug)]
 pub(super) struct RoundOutlook {
+    pairs: WidePairs,
     /// Positive if they make a contact, of which the others tell.
     meets: WideRow,
     /// Positive if that cannot be told here.
@@ -97,6 +101,7 @@ impl WidePairs {
             bound: [bound_a, bound_b],
             rotation: [Vectors::new(c_a, s_a), Vectors::new(c_b, s_b)],
             spin: [w_a, w_b],
+            fixed: V::load(&self.fixed),
             dt: V::splat(setup.params.dt),
         }
     }
@@ -111,6 +116,8 @@ pub(super) struct Pairs<V> {
     pub(super) bound: [V; 2],
     pub(super) rotation: [Vectors<V>; 2],
     pub(super) spin: [V; 2],
+    /// One where one of them is a static, else zero.
+    pub(super) fixed: V,
     pub(super) dt: V,
 }
 
@@ -189,7 +196,13 @@ impl<V: Wide> Pairs<V> {
 
 impl Outlook for RoundOutlook {
     #[inline(always)]
-    fn look<V: Wide>(&mut self, pairs: &WidePairs, _: Search, setup: &Setup) {
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, is_known, setup);
+    }
+
+    #[inline(always)]
+    fn look<V: Wide>(&mut self, _: Search, setup: &Setup) {
+        let pairs = &self.pairs;
         let (both, zero) = (pairs.load::<V>(setup), V::splat(0.0));
         let is_slow = V::splat(setup.params.speculative_distance).sub(both.far());
         let known = is_slow.if_positive(V::load(&pairs.known), zero);
@@ -201,7 +214,7 @@ impl Outlook for RoundOutlook {
             others = known.if_positive(touches.meets, zero).if_positive(zero, one);
         }
         if others.any_positive() {
-            touches = Touches::pick(others, &both.touch(V::load(&pairs.fixed), setup), &touches);
+            touches = Touches::pick(others, &both.touch(setup), &touches);
         }
         touches.meets.store(&mut self.meets);
         touches.unsure.store(&mut self.unsure);

@@ -2,11 +2,13 @@
 //!
 //! Where it is two corners that are nearest, it says so, and leaves the pair to that.
 
+use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
-use super::touch::Meeting;
 use super::wide_boxes::nearest;
 use super::wide_moments::{Moments, Points, Search, Shapes, opposite};
-use super::wide_pairs::{Pairs, WidePairs};
+use super::wide_pairs::{Outlook, Pairs, WidePairs};
+use crate::model::contact::Contact;
+use crate::model::math::max;
 use crate::model::piece::Piece;
 use crate::model::shape::MOST_CORNERS;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
@@ -17,67 +19,97 @@ use crate::tiling::tile::Tile;
 /// Columns of an outline, four figures each (see `Convex::quads`).
 const QUADS: usize = MOST_CORNERS;
 
-/// A piece of each body of sixteen pairs: polygons and lines, solid from all sides, and what is within a radius of them.
+/// What comes of a piece of each body of sixteen pairs, all of which have faces.
 #[derive(Debug)]
-pub(super) struct WidePolygons {
+pub(super) struct PolygonOutlook {
     pairs: WidePairs,
     outlines: [[[Quad; WIDE]; QUADS]; 2],
     corners: [WideRow; 2],
     radii: [WideRow; 2],
-    /// Those of the pieces that have most.
-    most: [usize; 2],
+    points: Points,
 }
 
-impl Default for WidePolygons {
+impl Default for PolygonOutlook {
     fn default() -> Self {
         Self {
             pairs: WidePairs::default(),
             outlines: [[[[0.0; 4]; WIDE]; QUADS]; 2],
             corners: [[0.0; WIDE]; 2],
             radii: [[0.0; WIDE]; 2],
-            most: [0; 2],
+            points: Points::default(),
         }
     }
 }
 
-impl WidePolygons {
-    /// Whether two pieces can be looked at so.
-    pub(super) fn hold(pieces: [&Piece; 2]) -> bool {
-        pieces.iter().all(|piece| piece.outline.count() > 1 && piece.side.is_none())
-    }
-
-    /// Forgets the lanes that there were.
+impl Outlook for PolygonOutlook {
     #[inline(always)]
-    pub(super) fn clear(&mut self) {
-        self.most = [0; 2];
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, _: bool, setup: &Setup) {
+        let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
+        self.set_pieces(lane, tile, bodies, [&kinds[0].pieces[0], &kinds[1].pieces[0]], setup);
     }
 
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, tile: &Tile, meeting: &Meeting<'_>, setup: &Setup) {
-        self.pairs.set(lane, tile, meeting.bodies, false, setup);
-        for (side, piece) in meeting.pieces.into_iter().enumerate() {
+    fn look<V: Wide>(&mut self, search: Search, setup: &Setup) {
+        let mut pairs = self.pairs.load::<V>(setup);
+        pairs.radius = [V::load(&self.radii[0]), V::load(&self.radii[1])];
+        let most = [self.most_corners(0), self.most_corners(1)];
+        let polygons = Polygons([self.polygon(0, most), self.polygon(1, most)]);
+        self.points.look(&pairs, &polygons, search, setup);
+    }
+
+    #[inline(always)]
+    fn is_unsure(&self, lane: usize) -> bool {
+        self.points.is_unsure(lane)
+    }
+
+    #[inline(always)]
+    fn is_postponed(&self, lane: usize) -> bool {
+        self.points.is_postponed(lane)
+    }
+
+    #[inline(always)]
+    fn meets(&self, lane: usize) -> bool {
+        self.points.meets(lane)
+    }
+
+    #[inline(always)]
+    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        self.contact_of(lane, 0, known)
+    }
+}
+
+impl PolygonOutlook {
+    /// Puts two pieces of a pair's bodies into a lane.
+    #[inline(always)]
+    pub(super) fn set_pieces(&mut self, lane: usize, tile: &Tile, bodies: Pair, pieces: [&Piece; 2], setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, false, setup);
+        for (side, piece) in pieces.into_iter().enumerate() {
             for (column, quad) in self.outlines[side].iter_mut().zip(piece.outline.quads()) {
                 column[lane] = quad;
             }
             self.corners[side][lane] = piece.outline.count() as f32;
             self.radii[side][lane] = piece.radius;
-            self.most[side] = self.most[side].max(piece.outline.count());
         }
     }
 
-    /// What comes of the pairs.
+    /// As [`contact`](Outlook::contact), of pieces that these bits of features name.
     #[inline(always)]
-    pub(super) fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
-        let (pairs, fixed) = (self.pairs.load::<V>(setup), V::load(&self.pairs.fixed));
-        points.look(&pairs, &Polygons([self.polygon(0), self.polygon(1)]), [V::splat(1.0), fixed], search, setup);
+    pub(super) fn contact_of(&self, lane: usize, pieces: u32, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        self.points.contact(lane, pieces, known)
+    }
+
+    /// Those of the polygons that have most.
+    #[inline(always)]
+    fn most_corners(&self, side: usize) -> usize {
+        self.corners[side].iter().fold(0.0, |most, &count| max(most, count)) as usize
     }
 
     #[inline(always)]
-    fn polygon<V: Wide>(&self, side: usize) -> Polygon<V> {
+    fn polygon<V: Wide>(&self, side: usize, most: [usize; 2]) -> Polygon<V> {
         let mut columns = [[V::splat(0.0); MOST_CORNERS]; 4];
         for (column, quads) in columns.iter_mut().zip(self.outlines[side].chunks(2)) {
             column[..4].copy_from_slice(&V::load_quads(&quads[0]));
-            if self.most[0].max(self.most[1]) > 4 {
+            if most[0].max(most[1]) > 4 {
                 column[4..].copy_from_slice(&V::load_quads(&quads[1]));
             }
         }
@@ -87,8 +119,7 @@ impl WidePolygons {
             corners[i] = Vectors::new(columns[0][i], columns[1][i]);
             normals[i] = Vectors::new(columns[2][i], columns[3][i]);
         }
-        let (count, radius) = (V::load(&self.corners[side]), V::load(&self.radii[side]));
-        Polygon { corners, normals, count, most: self.most[side], radius }
+        Polygon { corners, normals, count: V::load(&self.corners[side]), most: most[side] }
     }
 }
 
@@ -100,8 +131,6 @@ struct Polygon<V> {
     count: V,
     /// None of them has more corners.
     most: usize,
-    /// Around the polygon, in m.
-    radius: V,
 }
 
 /// One face of each of sixteen polygons, of which a figure is greatest.
@@ -198,7 +227,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let a = &self.0[0];
         let most = a.most.max(self.0[1].most);
         let b = &self.0[1].seen(rotation[0].to(rotation[1]), rotation[0].unrotate(offset), most);
-        let rounding = a.radius.add(b.radius);
+        let rounding = pairs.radius[0].add(pairs.radius[1]);
         let (face_a, face_b) = (a.separate(b), b.separate(a));
         let beyond = less(reach, face_a.figure.sub(rounding)).max(less(reach, face_b.figure.sub(rounding)));
         let from_b = less(face_a.figure.add(V::splat(PREFERENCE)), face_b.figure);
@@ -214,8 +243,8 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         }
         let features = from_b.if_positive(V::splat(128.0), zero);
         let features = features.add(reference.number.mul(V::splat(16.0))).add(edge.number.mul(V::splat(2.0)));
-        let radius = from_b.if_positive(b.radius, a.radius);
-        let other_radius = from_b.if_positive(a.radius, b.radius);
+        let radius = from_b.if_positive(pairs.radius[1], pairs.radius[0]);
+        let other_radius = from_b.if_positive(pairs.radius[0], pairs.radius[1]);
         // Clipped to the face.
         let [from, to] = reference.ends;
         let t = Vectors::new(zero.sub(n.y), n.x);

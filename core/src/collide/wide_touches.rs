@@ -193,9 +193,9 @@ impl<V: Wide> Pairs<V> {
         self.not_round(side).mul(way)
     }
 
-    /// The contacts of all pairs; `fixed` is positive where one of the bodies is a static.
+    /// The contacts of all pairs.
     #[inline(always)]
-    pub(super) fn touch(&self, fixed: V, setup: &Setup) -> Touches<V> {
+    pub(super) fn touch(&self, setup: &Setup) -> Touches<V> {
         let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.dt);
         let speculative = V::splat(setup.params.speculative_distance);
         let now = self.now();
@@ -217,7 +217,7 @@ impl<V: Wide> Pairs<V> {
             at.distance = at.distance.min(then.distance);
         }
         let closing = self.closing(at.anchor, at.offset, at.normal).max(zero);
-        let ahead = fixed.if_positive(dt.sub(at.time).mul(closing), zero);
+        let ahead = self.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
         let holds = less(at.separation, speculative.add(ahead));
         let moved = self.between.dot(at.normal).mul(at.time);
         let on_a = self.swing(0, at.turning[0], at.anchor, at.normal);

@@ -138,8 +138,17 @@ impl Kind {
 pub(crate) enum Form {
     Round = 0,
     Box = 1,
-    /// As those of the convex pieces that it is made of. With any other it makes more than two boxes do.
+    /// As those of the one convex piece that it is, which has faces and is solid from all sides.
+    Polygon = 2,
+    /// As those of the convex pieces that it is made of.
     Pieces = 3,
+}
+
+impl Form {
+    /// Whether contacts with others of these are found without looking at pieces.
+    pub(crate) fn is_simple(self) -> bool {
+        matches!(self, Self::Round | Self::Box)
+    }
 }
 
 /// A kind with everything the step derives from it.
@@ -242,7 +251,10 @@ impl KindRow {
         let (form, extent, radius) = match &kind.shape {
             Shape::Circle { radius } => (Form::Round, Vec2::ZERO, *radius),
             Shape::Box { half } => (Form::Box, *half, 0.0),
-            _ => (Form::Pieces, extent(&pieces, bounding_radius), 0.0),
+            _ => {
+                let form = if matches!(&pieces[..], [only] if only.has_faces()) { Form::Polygon } else { Form::Pieces };
+                (form, extent(&pieces, bounding_radius), 0.0)
+            }
         };
         Some(Self {
             shape: kind.shape.clone(),

@@ -76,6 +76,11 @@ impl Piece {
         piece
     }
 
+    /// Whether it is neither a disc nor a segment that is solid from one side.
+    pub(crate) fn has_faces(&self) -> bool {
+        self.outline.count() > 1 && self.side.is_none()
+    }
+
     /// Half extents of an upright rectangle around the center of the body that holds it.
     pub(crate) fn half_extents(&self) -> Vec2 {
         self.outline.corners().fold(Vec2::ZERO, |most, corner| most.max(corner.abs())) + self.radius

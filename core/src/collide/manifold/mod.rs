@@ -95,7 +95,7 @@ pub(crate) fn collide(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: 
 
 /// The manifold of two bodies of any shapes where they are nearest.
 pub(crate) fn nearest(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
-    if a.form != Form::Pieces && b.form != Form::Pieces {
+    if a.form.is_simple() && b.form.is_simple() {
         return collide(a, rot_a, b, rot_b, offset, reach);
     }
     let pairs = a.pieces.iter().flat_map(|a| b.pieces.iter().map(move |b| [a, b]));

@@ -32,7 +32,7 @@ impl Two {
 
     fn within(&self, reach: f32) -> Manifold {
         let (a, b) = (row(&self.a), row(&self.b));
-        if a.form == Form::Pieces || b.form == Form::Pieces {
+        if !(a.form.is_simple() && b.form.is_simple()) {
             convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, reach)
         } else {
             collide(&a, self.rot_a, &b, self.rot_b, self.offset, reach)

@@ -3,8 +3,9 @@
 use super::names::Named;
 use super::{BLOCK, FindAmong};
 use crate::collide::touch::{Meeting, Met, meet};
-use crate::collide::wide_moments::{Points, Search};
-use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_moments::Search;
+use crate::collide::wide_pairs::Outlook;
+use crate::collide::wide_polygons::PolygonOutlook;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::tiling::blueprint::Setup;
@@ -72,7 +73,7 @@ impl Kernel for Look<'_, '_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Self { meetings: Meetings { all, open, .. }, tile, setup } = self;
-        let (mut wide, mut points) = (WidePolygons::default(), Points::default());
+        let mut outlook = PolygonOutlook::default();
         for search in [Search::WhereManyNeedIt, Search::Always] {
             let (mut count, mut postponed) = (open.len(), 0);
             // Those that are too few for lanes.
@@ -86,20 +87,20 @@ impl Kernel for Look<'_, '_> {
                 // In lanes that are left over, the first of them again.
                 let mut numbers = [open[first]; WIDE];
                 numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
-                wide.clear();
                 for (lane, &number) in numbers.iter().enumerate() {
-                    wide.set(lane, tile, &all[number as usize].1, setup);
+                    let Meeting { bodies, pieces, .. } = all[number as usize].1;
+                    outlook.set_pieces(lane, tile, bodies, pieces, setup);
                 }
-                wide.look::<V::Wide>(&mut points, search, setup);
+                outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in numbers[..lanes].iter().enumerate() {
                     let meeting = &mut all[number as usize].1;
-                    if points.is_postponed(lane) {
+                    if outlook.is_postponed(lane) {
                         open[postponed] = number;
                         postponed += 1;
-                    } else if points.is_unsure(lane) {
+                    } else if outlook.is_unsure(lane) {
                         meeting.touch(tile, setup);
                     } else {
-                        meeting.see(lane, &points);
+                        meeting.see(lane, &outlook);
                     }
                 }
             }

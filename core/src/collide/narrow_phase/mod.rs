@@ -13,7 +13,8 @@ use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::BoxOutlook;
 use crate::collide::wide_moments::Search;
-use crate::collide::wide_pairs::{Outlook, RoundOutlook, WidePairs};
+use crate::collide::wide_pairs::{Outlook, RoundOutlook};
+use crate::collide::wide_polygons::PolygonOutlook;
 use crate::model::contact::{Contact, ContactCache, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
@@ -100,23 +101,35 @@ struct FindAmong<'a> {
 /// So many pairs are sorted by kinds at a time.
 const BLOCK: usize = 256;
 
-/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes. Of each kind there are two lists: first those that had
-/// no contact in the last step, most of whom do not touch yet, then those that had one, most of whom do. And a last one of pairs with
-/// other shapes.
+/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another. Of each kind there are
+/// two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
+/// do. And a last one of pairs with other shapes.
 struct Lists {
     /// Places in the block.
     places: [[u8; BLOCK]; LISTS],
     count: [usize; LISTS],
 }
 
-const LISTS: usize = 7;
+const LISTS: usize = 9;
 
 /// Of boxes.
 const NEW_BOXES: usize = 4;
 const KNOWN_BOXES: usize = 5;
 
-/// Of bodies one of which is made of pieces.
-const OF_PIECES: usize = 6;
+/// Of polygons.
+const NEW_POLYGONS: usize = 6;
+const KNOWN_POLYGONS: usize = 7;
+
+/// Of bodies one of which is made of pieces, or is round and meets a polygon.
+const OF_PIECES: usize = 8;
+
+/// The first list of two [`Form`](crate::model::kind::Form)s.
+const LIST_OF: [[usize; 4]; 4] = [
+    [0, 2, OF_PIECES, OF_PIECES],
+    [2, NEW_BOXES, NEW_POLYGONS, OF_PIECES],
+    [OF_PIECES, NEW_POLYGONS, NEW_POLYGONS, OF_PIECES],
+    [OF_PIECES; 4],
+];
 
 impl Lists {
     #[inline(always)]
@@ -124,7 +137,7 @@ impl Lists {
         let mut lists = Self { places: [[0; BLOCK]; LISTS], count: [0; LISTS] };
         for (place, (&pair, named)) in pairs.iter().zip(named).enumerate() {
             let [a, b] = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).form as usize);
-            let list = 2 * (a + b) + usize::from(named.known.is_some());
+            let list = LIST_OF[a][b] + usize::from(named.known.is_some());
             lists.push(list.min(OF_PIECES), place as u8);
         }
         lists
@@ -184,8 +197,12 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             for list in 0..NEW_BOXES {
                 setup.lanes.run(Find::<RoundOutlook>::new(&mut block, lists.get(list), tile, setup));
             }
-            block.keep_known(&mut lists, tile, setup);
+            block.keep_known(&mut lists, [KNOWN_BOXES, NEW_BOXES], tile, setup);
+            block.keep_known(&mut lists, [KNOWN_POLYGONS, NEW_POLYGONS], tile, setup);
             setup.lanes.run(Find::<BoxOutlook>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
+            if !lists.get(NEW_POLYGONS).is_empty() {
+                setup.lanes.run(Find::<PolygonOutlook>::new(&mut block, lists.get(NEW_POLYGONS), tile, setup));
+            }
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), found);
             } else {
@@ -276,7 +293,7 @@ impl Block<'_> {
     /// Finds the contacts of pairs of one kind.
     #[inline(always)]
     fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {
-        let (mut wide, mut outlook) = (WidePairs::default(), O::default());
+        let mut outlook = O::default();
         let (mut left, mut count) = ([0; BLOCK], list.len());
         left[..count].copy_from_slice(list);
         for search in [Search::WhereManyNeedIt, Search::Always] {
@@ -288,9 +305,9 @@ impl Block<'_> {
                 places[..lanes].copy_from_slice(&left[first..][..lanes]);
                 for (lane, &place) in places.iter().enumerate() {
                     let Named { bodies, known, .. } = self.named[usize::from(place)];
-                    wide.set(lane, tile, bodies, known.is_some(), setup);
+                    outlook.set(lane, tile, bodies, known.is_some(), setup);
                 }
-                outlook.look::<V::Wide>(&wide, search, setup);
+                outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in places[..lanes].iter().enumerate() {
                     let (place, Named { bodies, known, .. }) = (usize::from(number), self.named[usize::from(number)]);
                     // What there is no contact of is written down as well: a branch would be a coin toss.
@@ -310,11 +327,11 @@ impl Block<'_> {
         }
     }
 
-    /// Keeps the contacts of boxes whose manifold of before still serves, and leaves the others to be found anew.
+    /// Keeps those known contacts of a list whose manifold of before still serves, and leaves the others to be found anew.
     #[inline(always)]
-    fn keep_known(&mut self, lists: &mut Lists, tile: &Tile, setup: &Setup) {
-        for i in 0..lists.count[KNOWN_BOXES] {
-            let place = lists.places[KNOWN_BOXES][i];
+    fn keep_known(&mut self, lists: &mut Lists, [known, new]: [usize; 2], tile: &Tile, setup: &Setup) {
+        for i in 0..lists.count[known] {
+            let place = lists.places[known][i];
             let Named { bodies, known, .. } = self.named[usize::from(place)];
             if let Some(known) = known
                 && is_slow(tile, bodies, setup)
@@ -322,7 +339,7 @@ impl Block<'_> {
             {
                 (self.outcome[usize::from(place)], self.separation[usize::from(place)]) = (Outcome::Known, separation);
             } else {
-                lists.push(NEW_BOXES, place);
+                lists.push(new, place);
             }
         }
     }

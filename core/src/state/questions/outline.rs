@@ -34,7 +34,7 @@ impl Outline {
         let figure = match kind.form {
             Form::Round => Figure::Circle { radius: kind.radius },
             Form::Box => Figure::Box { half: kind.extent },
-            Form::Pieces => Figure::Pieces(kind.pieces.clone()),
+            Form::Polygon | Form::Pieces => Figure::Pieces(kind.pieces.clone()),
         };
         Self { id: body.id, center: body.position, rotation: body.rotation, figure }
     }
