@@ -42,6 +42,8 @@ impl Default for PolygonOutlook {
 }
 
 impl Outlook for PolygonOutlook {
+    const NEEDS_REGISTERS: bool = true;
+
     #[inline(always)]
     fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, _: bool, setup: &Setup) {
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
@@ -84,8 +86,9 @@ impl PolygonOutlook {
     pub(super) fn set_pieces(&mut self, lane: usize, tile: &Tile, bodies: Pair, pieces: [&Piece; 2], setup: &Setup) {
         self.pairs.set(lane, tile, bodies, false, setup);
         for (side, piece) in pieces.into_iter().enumerate() {
-            for (column, quad) in self.outlines[side].iter_mut().zip(piece.outline.quads()) {
-                column[lane] = quad;
+            let quads = piece.outline.quads();
+            for i in 0..QUADS {
+                self.outlines[side][i][lane] = quads[i];
             }
             self.corners[side][lane] = piece.outline.count() as f32;
             self.radii[side][lane] = piece.radius;

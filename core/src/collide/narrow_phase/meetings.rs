@@ -78,10 +78,11 @@ impl Kernel for Look<'_, '_> {
             let (mut count, mut postponed) = (open.len(), 0);
             // Those that are too few for lanes.
             let few = if count % WIDE > FEW { 0 } else { count % WIDE };
-            for &number in &open[count - few..] {
+            let single = if V::HAS_REGISTERS { few } else { count };
+            for &number in &open[count - single..] {
                 all[number as usize].1.touch(tile, setup);
             }
-            count -= few;
+            count -= single;
             for first in (0..count).step_by(WIDE) {
                 let lanes = WIDE.min(count - first);
                 // In lanes that are left over, the first of them again.

@@ -303,16 +303,19 @@ impl Block<'_> {
                 // In lanes that are left over, the first of them again.
                 let mut places = [left[first]; WIDE];
                 places[..lanes].copy_from_slice(&left[first..][..lanes]);
-                for (lane, &place) in places.iter().enumerate() {
-                    let Named { bodies, known, .. } = self.named[usize::from(place)];
-                    outlook.set(lane, tile, bodies, known.is_some(), setup);
+                let in_lanes = V::HAS_REGISTERS || !O::NEEDS_REGISTERS;
+                if in_lanes {
+                    for (lane, &place) in places.iter().enumerate() {
+                        let Named { bodies, known, .. } = self.named[usize::from(place)];
+                        outlook.set(lane, tile, bodies, known.is_some(), setup);
+                    }
+                    outlook.look::<V::Wide>(search, setup);
                 }
-                outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in places[..lanes].iter().enumerate() {
                     let (place, Named { bodies, known, .. }) = (usize::from(number), self.named[usize::from(number)]);
                     // What there is no contact of is written down as well: a branch would be a coin toss.
                     let (mut meets, mut found) = (outlook.meets(lane), outlook.contact(lane, known));
-                    if outlook.is_unsure(lane) {
+                    if outlook.is_unsure(lane) || !in_lanes {
                         let touch = touch(tile, bodies, known, setup);
                         (meets, found) = (touch.is_some(), touch.unwrap_or(found));
                     }

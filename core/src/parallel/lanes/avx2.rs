@@ -131,6 +131,7 @@ impl<S: Registers> Arithmetic for Eight<S> {
 }
 
 impl<S: Registers> Lanes for Eight<S> {
+    const HAS_REGISTERS: bool = true;
     type Wide = S::Wide;
     #[inline(always)]
     fn load(from: &Row) -> Self {

@@ -56,6 +56,8 @@ pub(crate) trait Arithmetic: Copy {
 
 /// Arithmetic on eight lanes.
 pub(crate) trait Lanes: Arithmetic {
+    /// Whether the processor is known to have registers that hold them.
+    const HAS_REGISTERS: bool;
     /// Sixteen lanes, of the same instructions.
     type Wide: Wide;
     fn load(from: &Row) -> Self;
@@ -135,6 +137,7 @@ impl Arithmetic for Portable {
 }
 
 impl Lanes for Portable {
+    const HAS_REGISTERS: bool = false;
     type Wide = Twice<Self>;
     #[inline(always)]
     fn load(from: &Row) -> Self {
