@@ -122,13 +122,7 @@ impl<V: Wide> Moments<V> {
 impl Points {
     /// Looks at pairs of such shapes.
     #[inline(always)]
-    pub(super) fn look<V: Wide>(
-        &mut self,
-        pairs: &Pairs<V>,
-        shapes: &impl Shapes<V>,
-        search: Search,
-        setup: &Setup,
-    ) {
+    pub(super) fn look<V: Wide>(&mut self, pairs: &Pairs<V>, shapes: &impl Shapes<V>, search: Search, setup: &Setup) {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
         let (dt, speculative) = (pairs.dt, V::splat(setup.params.speculative_distance));
         let far = pairs.far();

@@ -87,8 +87,8 @@ impl PolygonOutlook {
         self.pairs.set(lane, tile, bodies, false, setup);
         for (side, piece) in pieces.into_iter().enumerate() {
             let quads = piece.outline.quads();
-            for i in 0..QUADS {
-                self.outlines[side][i][lane] = quads[i];
+            for (column, quad) in self.outlines[side].iter_mut().zip(&quads) {
+                column[lane] = *quad;
             }
             self.corners[side][lane] = piece.outline.count() as f32;
             self.radii[side][lane] = piece.radius;
@@ -160,10 +160,7 @@ impl<V: Wide> Face<V> {
         Self {
             figure: positive.if_positive(yes.figure, no.figure),
             number: positive.if_positive(yes.number, no.number),
-            ends: [
-                Vectors::pick(positive, yes.ends[0], no.ends[0]),
-                Vectors::pick(positive, yes.ends[1], no.ends[1]),
-            ],
+            ends: [Vectors::pick(positive, yes.ends[0], no.ends[0]), Vectors::pick(positive, yes.ends[1], no.ends[1])],
             normal: Vectors::pick(positive, yes.normal, no.normal),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{Manifold, collide, convex};
 use crate::model::id::KindId;
-use crate::model::kind::{Form, Kind, KindRow, Material};
+use crate::model::kind::{Kind, KindRow, Material};
 use crate::model::math::Rot;
 use crate::model::shape::Shape;
 use crate::testing::{any_convex, any_rotation, cases, circle, distance, outline, rectangle};
