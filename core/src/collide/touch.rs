@@ -9,8 +9,9 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
 use crate::collide::piece_boxes::PieceBoxes;
+use crate::collide::wide_moments::PointOutlook;
 use crate::collide::wide_pairs::{Outlook, ROLLING, TOUCHING};
-use crate::collide::wide_polygons::PolygonOutlook;
+use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, cross, dot, max, min, turn};
@@ -371,8 +372,8 @@ impl<'a> Meeting<'a> {
 
     /// Takes what was seen of it in a lane.
     #[inline(always)]
-    pub(super) fn see(&mut self, lane: usize, outlook: &PolygonOutlook) {
-        let found = outlook.meets(lane).then(|| outlook.contact_of(lane, self.features, self.known));
+    pub(super) fn see(&mut self, lane: usize, outlook: &PointOutlook<WidePolygons>) {
+        let found = outlook.meets(lane).then(|| outlook.points.contact(lane, self.features, self.known));
         self.outcome = Met::from(found);
     }
 

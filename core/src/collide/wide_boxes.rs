@@ -2,50 +2,26 @@
 
 use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
-use super::wide_moments::{Moments, Points, Search, Shapes, negated, opposite};
-use super::wide_pairs::{Outlook, Pairs, WidePairs};
-use crate::model::contact::Contact;
+use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, negated, opposite};
+use super::wide_pairs::{Pairs, WidePairs};
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
-/// What comes of sixteen pairs of boxes.
+/// Sixteen pairs of boxes.
 #[derive(Default, Debug)]
-pub(super) struct BoxOutlook {
-    pairs: WidePairs,
-    points: Points,
-}
+pub(super) struct WideBoxes(WidePairs);
 
-impl Outlook for BoxOutlook {
+impl Shaped for WideBoxes {
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, is_known, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup) {
+        self.0.set(lane, tile, bodies, false, setup);
     }
 
     #[inline(always)]
-    fn look<V: Wide>(&mut self, search: Search, setup: &Setup) {
-        self.points.look(&self.pairs.load::<V>(setup), &Boxes, search, setup);
-    }
-
-    #[inline(always)]
-    fn is_unsure(&self, lane: usize) -> bool {
-        self.points.is_unsure(lane)
-    }
-
-    #[inline(always)]
-    fn is_postponed(&self, lane: usize) -> bool {
-        self.points.is_postponed(lane)
-    }
-
-    #[inline(always)]
-    fn meets(&self, lane: usize) -> bool {
-        self.points.meets(lane)
-    }
-
-    #[inline(always)]
-    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
-        self.points.contact(lane, 0, known)
+    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
+        points.look(&self.0.load::<V>(setup), &Boxes, search, setup);
     }
 }
 

@@ -3,15 +3,17 @@
 //!
 //! Where speeds overflow, or shapes say so, it cannot tell, and leaves the pair to that.
 
+use super::broad_phase::Pair;
 use super::cull::passes;
 use super::touch::{DEEP, NEAR, ROUNDS};
-use super::wide_pairs::{Pairs, TOUCHING};
+use super::wide_pairs::{Outlook, Pairs, TOUCHING};
 use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
 use crate::parallel::vectors::{Vectors, less};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
 use glam::Vec2;
 
 /// Manifolds of up to two points, and the moments in which they are those. What is asked of them is one, or else zero.
@@ -56,6 +58,59 @@ pub(super) enum Search {
     /// At once, where it pays for all sixteen.
     WhereManyNeedIt,
     Always,
+}
+
+/// Sixteen pairs, and the shapes of their bodies.
+pub(super) trait Shaped: Default {
+    /// As [`Outlook::NEEDS_REGISTERS`].
+    const NEED_REGISTERS: bool = false;
+
+    /// Puts a pair into a lane.
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup);
+
+    /// Looks at all lanes.
+    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
+}
+
+/// What can be said of pairs whose contacts have up to two points.
+#[derive(Default, Debug)]
+pub(super) struct PointOutlook<S> {
+    pub(super) pairs: S,
+    pub(super) points: Points,
+}
+
+impl<S: Shaped> Outlook for PointOutlook<S> {
+    const NEEDS_REGISTERS: bool = S::NEED_REGISTERS;
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, _: bool, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, setup);
+    }
+
+    #[inline(always)]
+    fn look<V: Wide>(&mut self, search: Search, setup: &Setup) {
+        self.pairs.look::<V>(&mut self.points, search, setup);
+    }
+
+    #[inline(always)]
+    fn is_unsure(&self, lane: usize) -> bool {
+        self.points.unsure[lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn is_postponed(&self, lane: usize) -> bool {
+        self.points.postponed[lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn meets(&self, lane: usize) -> bool {
+        self.points.holds[0][lane] + self.points.holds[1][lane] > 0.0
+    }
+
+    #[inline(always)]
+    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+        self.points.contact(lane, 0, known)
+    }
 }
 
 /// What comes of sixteen pairs.
@@ -167,21 +222,6 @@ impl Points {
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
         V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
-    }
-
-    #[inline(always)]
-    pub(super) fn is_unsure(&self, lane: usize) -> bool {
-        self.unsure[lane] > 0.0
-    }
-
-    #[inline(always)]
-    pub(super) fn is_postponed(&self, lane: usize) -> bool {
-        self.postponed[lane] > 0.0
-    }
-
-    #[inline(always)]
-    pub(super) fn meets(&self, lane: usize) -> bool {
-        self.holds[0][lane] + self.holds[1][lane] > 0.0
     }
 
     /// The contact of a pair, if it makes one, of these pieces, with the impulses of the last one, and the separation of its points now.

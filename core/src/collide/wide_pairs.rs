@@ -267,8 +267,9 @@ impl Outlook for RoundOutlook {
 mod tests {
     use super::*;
     use crate::collide::touch::touch;
-    use crate::collide::wide_boxes::BoxOutlook;
-    use crate::collide::wide_polygons::PolygonOutlook;
+    use crate::collide::wide_boxes::WideBoxes;
+    use crate::collide::wide_moments::PointOutlook;
+    use crate::collide::wide_polygons::WidePolygons;
     use crate::model::body::Body;
     use crate::model::id::{GlobalId, KindId, TileId};
     use crate::model::kind::Form;
@@ -294,8 +295,8 @@ mod tests {
             forms.sort_by_key(|&form| form as usize);
             match forms {
                 [Form::Round, Form::Round | Form::Box] => told::<V::Wide, RoundOutlook>(tile, setup),
-                [Form::Box, Form::Box] => told::<V::Wide, BoxOutlook>(tile, setup),
-                [Form::Box | Form::Polygon, Form::Polygon] => told::<V::Wide, PolygonOutlook>(tile, setup),
+                [Form::Box, Form::Box] => told::<V::Wide, PointOutlook<WideBoxes>>(tile, setup),
+                [Form::Box | Form::Polygon, Form::Polygon] => told::<V::Wide, PointOutlook<WidePolygons>>(tile, setup),
                 _ => None,
             }
         }

@@ -5,9 +5,8 @@
 use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
 use super::wide_boxes::nearest;
-use super::wide_moments::{Moments, Points, Search, Shapes, opposite};
-use super::wide_pairs::{Outlook, Pairs, WidePairs};
-use crate::model::contact::Contact;
+use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, opposite};
+use super::wide_pairs::{Pairs, WidePairs};
 use crate::model::math::max;
 use crate::model::piece::Piece;
 use crate::model::shape::MOST_CORNERS;
@@ -19,68 +18,46 @@ use crate::tiling::tile::Tile;
 /// Columns of an outline, four figures each (see `Convex::quads`).
 const QUADS: usize = MOST_CORNERS;
 
-/// What comes of a piece of each body of sixteen pairs, all of which have faces.
+/// A piece of each body of sixteen pairs, all of which have faces.
 #[derive(Debug)]
-pub(super) struct PolygonOutlook {
+pub(super) struct WidePolygons {
     pairs: WidePairs,
     outlines: [[[Quad; WIDE]; QUADS]; 2],
     corners: [WideRow; 2],
     radii: [WideRow; 2],
-    points: Points,
 }
 
-impl Default for PolygonOutlook {
+impl Default for WidePolygons {
     fn default() -> Self {
         Self {
             pairs: WidePairs::default(),
             outlines: [[[[0.0; 4]; WIDE]; QUADS]; 2],
             corners: [[0.0; WIDE]; 2],
             radii: [[0.0; WIDE]; 2],
-            points: Points::default(),
         }
     }
 }
 
-impl Outlook for PolygonOutlook {
-    const NEEDS_REGISTERS: bool = true;
+impl Shaped for WidePolygons {
+    const NEED_REGISTERS: bool = true;
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, _: bool, setup: &Setup) {
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup) {
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
         self.set_pieces(lane, tile, bodies, [&kinds[0].pieces[0], &kinds[1].pieces[0]], setup);
     }
 
     #[inline(always)]
-    fn look<V: Wide>(&mut self, search: Search, setup: &Setup) {
+    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
         let mut pairs = self.pairs.load::<V>(setup);
         pairs.radius = [V::load(&self.radii[0]), V::load(&self.radii[1])];
         let most = [self.most_corners(0), self.most_corners(1)];
         let polygons = Polygons([self.polygon(0, most), self.polygon(1, most)]);
-        self.points.look(&pairs, &polygons, search, setup);
-    }
-
-    #[inline(always)]
-    fn is_unsure(&self, lane: usize) -> bool {
-        self.points.is_unsure(lane)
-    }
-
-    #[inline(always)]
-    fn is_postponed(&self, lane: usize) -> bool {
-        self.points.is_postponed(lane)
-    }
-
-    #[inline(always)]
-    fn meets(&self, lane: usize) -> bool {
-        self.points.meets(lane)
-    }
-
-    #[inline(always)]
-    fn contact(&self, lane: usize, known: Option<&Contact>) -> (Contact, [f32; 2]) {
-        self.contact_of(lane, 0, known)
+        points.look(&pairs, &polygons, search, setup);
     }
 }
 
-impl PolygonOutlook {
+impl WidePolygons {
     /// Puts two pieces of a pair's bodies into a lane.
     #[inline(always)]
     pub(super) fn set_pieces(&mut self, lane: usize, tile: &Tile, bodies: Pair, pieces: [&Piece; 2], setup: &Setup) {
@@ -93,12 +70,6 @@ impl PolygonOutlook {
             self.corners[side][lane] = piece.outline.count() as f32;
             self.radii[side][lane] = piece.radius;
         }
-    }
-
-    /// As [`contact`](Outlook::contact), of pieces that these bits of features name.
-    #[inline(always)]
-    pub(super) fn contact_of(&self, lane: usize, pieces: u32, known: Option<&Contact>) -> (Contact, [f32; 2]) {
-        self.points.contact(lane, pieces, known)
     }
 
     /// Those of the polygons that have most.

@@ -3,9 +3,9 @@
 use super::names::Named;
 use super::{BLOCK, FindAmong};
 use crate::collide::touch::{Meeting, Met, meet};
-use crate::collide::wide_moments::Search;
+use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::Outlook;
-use crate::collide::wide_polygons::PolygonOutlook;
+use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::tiling::blueprint::Setup;
@@ -73,7 +73,7 @@ impl Kernel for Look<'_, '_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Self { meetings: Meetings { all, open, .. }, tile, setup } = self;
-        let mut outlook = PolygonOutlook::default();
+        let mut outlook = PointOutlook::<WidePolygons>::default();
         for search in [Search::WhereManyNeedIt, Search::Always] {
             let (mut count, mut postponed) = (open.len(), 0);
             // Those that are too few for lanes.
@@ -90,7 +90,7 @@ impl Kernel for Look<'_, '_> {
                 numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
                 for (lane, &number) in numbers.iter().enumerate() {
                     let Meeting { bodies, pieces, .. } = all[number as usize].1;
-                    outlook.set_pieces(lane, tile, bodies, pieces, setup);
+                    outlook.pairs.set_pieces(lane, tile, bodies, pieces, setup);
                 }
                 outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in numbers[..lanes].iter().enumerate() {

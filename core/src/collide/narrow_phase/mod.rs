@@ -11,10 +11,10 @@ use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
-use crate::collide::wide_boxes::BoxOutlook;
-use crate::collide::wide_moments::Search;
+use crate::collide::wide_boxes::WideBoxes;
+use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
-use crate::collide::wide_polygons::PolygonOutlook;
+use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::{Contact, ContactCache, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
@@ -199,9 +199,14 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             }
             block.keep_known(&mut lists, [KNOWN_BOXES, NEW_BOXES], tile, setup);
             block.keep_known(&mut lists, [KNOWN_POLYGONS, NEW_POLYGONS], tile, setup);
-            setup.lanes.run(Find::<BoxOutlook>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
+            setup.lanes.run(Find::<PointOutlook<WideBoxes>>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
             if !lists.get(NEW_POLYGONS).is_empty() {
-                setup.lanes.run(Find::<PolygonOutlook>::new(&mut block, lists.get(NEW_POLYGONS), tile, setup));
+                setup.lanes.run(Find::<PointOutlook<WidePolygons>>::new(
+                    &mut block,
+                    lists.get(NEW_POLYGONS),
+                    tile,
+                    setup,
+                ));
             }
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), found);
