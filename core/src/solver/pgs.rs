@@ -13,7 +13,7 @@
 //! fault. Contacts still apart may close their gap within the step, no more.
 
 use super::constraint::group::Group;
-use super::constraint::kernels::{Normals, Pass, Table, WarmStart, pressing};
+use super::constraint::kernels::{Normals, Pass, Press, Table, WarmStart};
 use super::job::Job;
 use super::motion::Motion;
 use crate::parallel::crew::Member;
@@ -75,17 +75,16 @@ impl Pass for Iterate {
             &mut a,
             &mut b,
             #[inline(always)]
-            |rows, speed| {
-                let separation = V::load(&rows.separation);
+            |rows| {
+                let (separation, mass) = (V::load(&rows.separation), V::load(&rows.normal_mass));
                 let deep = separation.add(V::splat(self.slop)).min(zero);
                 let push = deep.mul(V::splat(self.rate)).max(V::splat(-self.push_out_speed));
                 let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
-                let wanted = V::load(&rows.normal_mass).mul(speed.add(bias));
-                pressing(V::load(&rows.normal_impulse).sub(wanted))
+                Press { at_rest: V::load(&rows.normal_impulse).sub(mass.mul(bias)), mass }
             },
         );
         if self.ends_bouncy {
-            group.add_to_pressed::<V>();
+            group.add_to_totals::<V>();
         }
         V::scatter(a, bodies.velocity, &group.sides.a);
         V::scatter(b, bodies.velocity, &group.sides.b);

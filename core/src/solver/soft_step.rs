@@ -5,7 +5,7 @@
 //! the push ("relax"), so that the push adds no energy.
 
 use super::constraint::group::Group;
-use super::constraint::kernels::{Normals, Pass, Table, WarmStart, pressing};
+use super::constraint::kernels::{Normals, Pass, Press, Table, WarmStart};
 use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;
@@ -70,7 +70,7 @@ impl Pass for Solve {
             &mut a,
             &mut b,
             #[inline(always)]
-            |rows, speed| {
+            |rows| {
                 let separation = V::load(&rows.separation);
                 let old = V::load(&rows.normal_impulse);
                 // Apart: may close the gap within the substep, no more. Overlapping: pushed out softly.
@@ -78,8 +78,9 @@ impl Pass for Solve {
                 let bias = separation.if_positive(separation.mul(V::splat(self.inv_h)), push);
                 let mass_scale = separation.if_positive(one, mass_scale);
                 let impulse_scale = separation.if_positive(zero, impulse_scale);
-                let wanted = V::load(&rows.normal_mass).mul(mass_scale.mul(speed).add(bias));
-                pressing(old.sub(wanted).sub(impulse_scale.mul(old)))
+                let mass = V::load(&rows.normal_mass);
+                let at_rest = old.sub(impulse_scale.mul(old)).sub(mass.mul(bias));
+                Press { at_rest, mass: mass.mul(mass_scale) }
             },
         );
         V::scatter(a, bodies.velocity, &group.sides.a);
@@ -88,19 +89,19 @@ impl Pass for Solve {
 }
 
 /// Friction and normal impulses without the push, at the poses after the substep. Keeps the separations, which hold
-/// until bodies move again: in the next substep's solve. With `PRESSED`, sums normal impulses over the step.
+/// until bodies move again: in the next substep's solve. With `BOUNCY`, sums impulses over the step.
 #[derive(Clone, Copy)]
-struct Relax<const PRESSED: bool> {
+struct Relax<const BOUNCY: bool> {
     inv_h: f32,
 }
 
-impl<const PRESSED: bool> Relax<PRESSED> {
+impl<const BOUNCY: bool> Relax<BOUNCY> {
     fn new(setup: &Setup) -> Self {
         Self { inv_h: 1.0 / setup.h }
     }
 }
 
-impl<const PRESSED: bool> Pass for Relax<PRESSED> {
+impl<const BOUNCY: bool> Pass for Relax<BOUNCY> {
     #[inline(always)]
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
@@ -117,14 +118,14 @@ impl<const PRESSED: bool> Pass for Relax<PRESSED> {
             &mut a,
             &mut b,
             #[inline(always)]
-            |rows, speed| {
+            |rows| {
+                let mass = V::load(&rows.normal_mass);
                 let bias = V::load(&rows.separation).max(zero).mul(V::splat(self.inv_h));
-                let wanted = V::load(&rows.normal_mass).mul(speed.add(bias));
-                pressing(V::load(&rows.normal_impulse).sub(wanted))
+                Press { at_rest: V::load(&rows.normal_impulse).sub(mass.mul(bias)), mass }
             },
         );
-        if PRESSED {
-            group.add_to_pressed::<V>();
+        if BOUNCY {
+            group.add_to_totals::<V>();
         }
         V::scatter(a, bodies.velocity, &group.sides.a);
         V::scatter(b, bodies.velocity, &group.sides.b);

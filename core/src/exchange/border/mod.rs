@@ -239,7 +239,7 @@ impl Border {
         for (border, totals) in both.filter(|(border, _)| solver.groups.may_bounce(border.contact)) {
             let count = tile.contacts.contacts[border.contact as usize].point_count();
             for (k, total) in totals[..count].iter_mut().enumerate() {
-                total[0] = solver.groups.pressed(border.contact, k);
+                *total = solver.groups.totals(border.contact, k);
             }
         }
     }

@@ -4,11 +4,11 @@
 //! So a new kind of constraint is one more field of each struct here, and a line where these are listed; what its rows are
 //! and what a pass does to them is told in `group.rs`, `rows.rs` and `kernels.rs`, as for contacts.
 
-use super::group::{Group, PointRows, Sides};
+use super::group::{Group, PointRows, Sides, Totals};
 use super::kernels::{Pass, Table};
 use crate::model::contact::Contact;
 use crate::parallel::ahead::fetch_whole;
-use crate::parallel::lanes::{WIDE, Wide, WideRow};
+use crate::parallel::lanes::{WIDE, Wide};
 use crate::parallel::shared::Shared;
 use std::ops::Range;
 
@@ -68,10 +68,10 @@ impl Columns {
         }
     }
 
-    /// The rows of a group, and how its points have pressed in the step.
-    pub(crate) fn pressed_mut(&mut self, column: usize, group: usize) -> (&Sides, &[PointRows], &mut [WideRow]) {
-        fn all<const N: usize>(group: &mut Group<N>) -> (&Sides, &[PointRows], &mut [WideRow]) {
-            (&group.sides, &group.points, &mut group.pressed)
+    /// The rows of a group, and its impulses of the step, to change these.
+    pub(crate) fn totals_mut(&mut self, column: usize, group: usize) -> (&Sides, &[PointRows], &mut [Totals]) {
+        fn all<const N: usize>(group: &mut Group<N>) -> (&Sides, &[PointRows], &mut [Totals]) {
+            (&group.sides, &group.points, &mut group.totals)
         }
         match column {
             0 => all(&mut self.single[group]),
@@ -79,11 +79,11 @@ impl Columns {
         }
     }
 
-    /// How a point of a group has pressed in the step.
-    pub(crate) fn pressed(&self, column: usize, group: usize, point: usize) -> &WideRow {
+    /// The impulses of a point of a group in the step.
+    pub(crate) fn totals(&self, column: usize, group: usize, point: usize) -> &Totals {
         match column {
-            0 => &self.single[group].pressed[point],
-            _ => &self.double[group].pressed[point],
+            0 => &self.single[group].totals[point],
+            _ => &self.double[group].totals[point],
         }
     }
 

@@ -1,7 +1,7 @@
 //! Groups: sixteen contacts side by side, one in each lane.
 
 use super::groups::Answer;
-use crate::model::math::max;
+use crate::model::math::{clamp, max};
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
 /// Sixteen contacts of `N` points each that share no moving body. All rows are mass-weighted.
@@ -10,8 +10,8 @@ use crate::parallel::lanes::{Quad, WIDE, WideRow};
 pub(crate) struct Group<const N: usize> {
     pub(crate) sides: Sides,
     pub(crate) points: [PointRows; N],
-    /// The sum of each point's normal impulses over the step's substeps, kept only where something bounces.
-    pub(crate) pressed: [WideRow; N],
+    /// Of each point, kept only where something bounces.
+    pub(crate) totals: [Totals; N],
 }
 
 /// What the points of a contact have in common, of sixteen contacts.
@@ -54,7 +54,24 @@ pub(crate) struct PointRows {
     pub(crate) tangent_impulse: WideRow,
 }
 
+/// The impulses of a point over all substeps of the step, and of its bounce.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Totals {
+    pub(crate) normal: WideRow,
+    pub(crate) tangent: WideRow,
+}
+
 const ZERO: WideRow = [0.0; WIDE];
+
+impl Totals {
+    pub(crate) const NONE: Self = Self { normal: ZERO, tangent: ZERO };
+
+    /// Of one lane, along the normal and the tangent.
+    pub(crate) fn of(&self, lane: usize) -> [f32; 2] {
+        [self.normal[lane], self.tangent[lane]]
+    }
+}
 
 impl PointRows {
     const EMPTY: Self = Self {
@@ -74,7 +91,7 @@ impl PointRows {
 }
 
 impl<const N: usize> Group<N> {
-    pub(crate) const EMPTY: Self = Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], pressed: [ZERO; N] };
+    pub(crate) const EMPTY: Self = Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], totals: [Totals::NONE; N] };
 }
 
 /// The speed of a body along a row.
@@ -108,29 +125,54 @@ impl Sides {
         along(row_b, velocity[self.b[lane] as usize]) - along(row_a, velocity[self.a[lane] as usize])
     }
 
-    /// Gives the points of a contact that pressed what they are to have. Two that part do so at once: one after the other, the first
-    /// would turn a box that falls flat, and the second not turn it back.
+    /// How bodies A and B move along the tangent at a point.
+    fn tangent_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
+        let row_a = [self.normal_ay[lane], -self.normal_ax[lane], point.tangent_a[lane]];
+        let row_b = [self.normal_by[lane], -self.normal_bx[lane], point.tangent_b[lane]];
+        [row_a, row_b]
+    }
+
+    /// Gives the points of a contact that pressed what they are to have, and friction what it may have of that.
     pub(crate) fn bounce(
         &self,
         points: &[PointRows],
-        pressed: &mut [WideRow],
+        totals: &mut [Totals],
         lane: usize,
         answers: [Answer; 2],
         velocity: &mut [Quad],
     ) {
-        if let ([one, two], [pressed_one, pressed_two], [Answer::Part(first), Answer::Part(second)]) =
-            (points, &mut *pressed, answers)
+        let pressed = [0, 1].map(|k| totals.get(k).is_some_and(|totals| totals.normal[lane] > 0.0));
+        self.bounce_along_normals(points, totals, lane, answers, velocity);
+        for (k, (point, totals)) in points.iter().zip(totals).enumerate() {
+            if pressed[k] && answers[k] != Answer::Rest {
+                self.rub(point, totals, lane, velocity);
+            }
+        }
+    }
+
+    /// Two points that part do so at once: one after the other, the first would turn a box that falls flat, and the second not turn
+    /// it back.
+    fn bounce_along_normals(
+        &self,
+        points: &[PointRows],
+        totals: &mut [Totals],
+        lane: usize,
+        answers: [Answer; 2],
+        velocity: &mut [Quad],
+    ) {
+        if let ([one, two], [total_one, total_two], [Answer::Part(first), Answer::Part(second)]) =
+            (points, &mut *totals, answers)
         {
-            let pressed = [&mut pressed_one[lane], &mut pressed_two[lane]];
-            if *pressed[0] > 0.0
-                && *pressed[1] > 0.0
-                && self.bounce_together([one, two], pressed, lane, [first, second], velocity)
+            let totals = [&mut total_one.normal[lane], &mut total_two.normal[lane]];
+            if *totals[0] > 0.0
+                && *totals[1] > 0.0
+                && self.bounce_together([one, two], totals, lane, [first, second], velocity)
             {
                 return;
             }
         }
-        for ((point, pressed), answer) in points.iter().zip(pressed).zip(answers) {
-            let pressed = &mut pressed[lane];
+        for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
+            let pressed = &mut totals.normal[lane];
             let wanted = match answer {
                 Answer::Part(speed) if *pressed > 0.0 => {
                     point.normal_mass[lane] * (speed - self.normal_speed(point, lane, velocity))
@@ -138,8 +180,18 @@ impl Sides {
                 Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
             };
-            self.add_normal_impulse(point, pressed, lane, max(wanted, -*pressed), velocity);
+            self.add_impulse(self.normal_rows(point, lane), pressed, lane, max(wanted, -*pressed), velocity);
         }
+    }
+
+    /// Lets friction of the whole step be what the point's normal impulses of the whole step allow, as far as it slides yet.
+    fn rub(&self, point: &PointRows, totals: &mut Totals, lane: usize, velocity: &mut [Quad]) {
+        let rows = self.tangent_rows(point, lane);
+        let slip = along(rows[1], velocity[self.b[lane] as usize]) - along(rows[0], velocity[self.a[lane] as usize]);
+        let most = self.friction[lane] * totals.normal[lane];
+        let rubbed = &mut totals.tangent[lane];
+        let wanted = clamp(*rubbed - point.tangent_mass[lane] * slip, -most, most);
+        self.add_impulse(rows, rubbed, lane, wanted - *rubbed, velocity);
     }
 
     /// Two points at once, if that takes no pull from either.
@@ -151,8 +203,8 @@ impl Sides {
         speeds: [f32; 2],
         velocity: &mut [Quad],
     ) -> bool {
-        let [one, two] = points;
-        let ([one_a, one_b], [two_a, two_b]) = (self.normal_rows(one, lane), self.normal_rows(two, lane));
+        let rows = points.map(|point| self.normal_rows(point, lane));
+        let [[one_a, one_b], [two_a, two_b]] = rows;
         let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
         // How much speed an impulse at one of them gives each.
         let own = [product(one_a, one_a) + product(one_b, one_b), product(two_a, two_a) + product(two_b, two_b)];
@@ -169,23 +221,16 @@ impl Sides {
         if !is_regular || pulls(0) || pulls(1) {
             return false;
         }
-        for ((point, pressed), impulse) in points.into_iter().zip(pressed).zip(impulses) {
-            self.add_normal_impulse(point, pressed, lane, impulse, velocity);
+        for ((rows, pressed), impulse) in rows.into_iter().zip(pressed).zip(impulses) {
+            self.add_impulse(rows, pressed, lane, impulse, velocity);
         }
         true
     }
 
-    /// Gives both bodies some more impulse along the normal of a point.
-    fn add_normal_impulse(
-        &self,
-        point: &PointRows,
-        pressed: &mut f32,
-        lane: usize,
-        impulse: f32,
-        velocity: &mut [Quad],
-    ) {
-        *pressed += impulse;
-        let ([row_a, row_b], a, b) = (self.normal_rows(point, lane), self.a[lane] as usize, self.b[lane] as usize);
+    /// Gives both bodies some more impulse along rows, and adds it to the sum.
+    fn add_impulse(&self, rows: [[f32; 3]; 2], sum: &mut f32, lane: usize, impulse: f32, velocity: &mut [Quad]) {
+        *sum += impulse;
+        let ([row_a, row_b], a, b) = (rows, self.a[lane] as usize, self.b[lane] as usize);
         for k in 0..3 {
             velocity[a][k] -= row_a[k] * impulse;
             velocity[b][k] += row_b[k] * impulse;

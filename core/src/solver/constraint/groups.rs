@@ -1,10 +1,10 @@
 //! All constraints of a tile, and how to find that of a contact.
 
 use super::columns::{Color, Columns, Each, Members, Slices, lengths};
-use super::group::{PointRows, Sides};
+use super::group::{PointRows, Sides, Totals};
 use crate::model::contact::Contact;
 use crate::model::math::max;
-use crate::parallel::lanes::{Quad, WideRow};
+use crate::parallel::lanes::Quad;
 use crate::parallel::team::Team;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
@@ -87,9 +87,9 @@ impl Lane {
         (sides, points, self.lane.into())
     }
 
-    pub(super) fn pressed_mut(self, columns: &mut Columns) -> (&Sides, &[PointRows], &mut [WideRow], usize) {
-        let (sides, points, pressed) = columns.pressed_mut(self.column.into(), self.group as usize);
-        (sides, points, pressed, self.lane.into())
+    pub(super) fn totals_mut(self, columns: &mut Columns) -> (&Sides, &[PointRows], &mut [Totals], usize) {
+        let (sides, points, totals) = columns.totals_mut(self.column.into(), self.group as usize);
+        (sides, points, totals, self.lane.into())
     }
 
     pub(super) fn rows_mut(self, columns: &mut Columns) -> (&Sides, &mut [PointRows], usize) {
@@ -155,10 +155,10 @@ impl Groups {
         [points[point].normal_impulse[lane], points[point].tangent_impulse[lane]]
     }
 
-    /// What one point of a contact that may bounce has pressed in the step, its bounce included.
-    pub(crate) fn pressed(&self, contact: u32, point: usize) -> f32 {
+    /// The impulses of one point of a contact that may bounce, over the step and its bounce, along the normal and the tangent.
+    pub(crate) fn totals(&self, contact: u32, point: usize) -> [f32; 2] {
         let Lane { column, lane, group, .. } = self.lanes[contact as usize];
-        self.kept.pressed(column.into(), group as usize, point)[usize::from(lane)]
+        self.kept.totals(column.into(), group as usize, point).of(lane.into())
     }
 
     /// Overwrites the accumulated impulses of one point.

@@ -101,8 +101,7 @@ impl<V: Wide> Normals<V> {
     }
 
     /// Sets the relative velocities right: along the normals, and then along the tangents, within the cones that the normal
-    /// impulses of this moment allow. `pressed` tells the normal impulse that a point comes to, given the speed at which its
-    /// surfaces part.
+    /// impulses of this moment allow. `press` tells what the normal impulse at a point is to be.
     ///
     /// In solve and in relax: with friction in relax alone, piles over a tile border jitter a hundred times more.
     #[inline(always)]
@@ -112,14 +111,15 @@ impl<V: Wide> Normals<V> {
         friction: V,
         a: &mut [V; 4],
         b: &mut [V; 4],
-        pressed: impl Fn(&PointRows, V) -> V,
+        press: impl Fn(&PointRows) -> Press<V>,
     ) {
         if let [rows] = &mut points[..] {
-            return self.push_at_once(rows, friction, a, b, pressed);
+            let press = press(rows);
+            return self.push_at_once(rows, friction, a, b, press);
         }
         for rows in &mut *points {
             let axis = self.normal(rows);
-            let (old, new) = (V::load(&rows.normal_impulse), pressed(rows, axis.speed(a, b)));
+            let (old, new) = (V::load(&rows.normal_impulse), press(rows).impulse(axis.speed(a, b)));
             axis.apply_impulse(accumulate(&mut rows.normal_impulse, old, new), a, b);
         }
         for rows in points {
@@ -132,46 +132,54 @@ impl<V: Wide> Normals<V> {
     }
 
     /// As [`push`](Self::push), where there is one point. Where a push along the normal moves the surfaces along the tangent, as at
-    /// the corner of a box, one after the other would take many passes; so friction is what it must be after the normal has pushed,
-    /// and the normal what it must be after friction has pulled, which is exact while the point sticks.
+    /// the corner of a box, one after the other would take many passes; so both are what they must be together: while the point
+    /// sticks, and where it slides, with friction at its most.
     #[inline(always)]
-    fn push_at_once(
-        &self,
-        rows: &mut PointRows,
-        friction: V,
-        a: &mut [V; 4],
-        b: &mut [V; 4],
-        pressed: impl Fn(&PointRows, V) -> V,
-    ) {
+    fn push_at_once(&self, rows: &mut PointRows, friction: V, a: &mut [V; 4], b: &mut [V; 4], press: Press<V>) {
+        /// Where friction presses nearly as much as it is pressed by, a point may jam and not slide.
+        const LEAST: f32 = 0.25;
         let (normal, tangent) = (self.normal(rows), self.tangent(rows));
         let (old_normal, old_tangent) = (V::load(&rows.normal_impulse), V::load(&rows.tangent_impulse));
         let (apart, along) = (normal.speed(a, b), tangent.speed(a, b));
         let coupling = normal.aw.mul(tangent.aw).add(normal.bw.mul(tangent.bw));
-        let alone = pressed(rows, apart);
-        let along = along.add(coupling.mul(alone.sub(old_normal)));
-        let wanted = V::load(&rows.tangent_mass).mul(along);
-        let new_tangent = within(old_tangent.sub(wanted), friction.mul(alone));
-        let new_normal = pressed(rows, apart.add(coupling.mul(new_tangent.sub(old_tangent))));
-        let new_tangent = within(new_tangent, friction.mul(new_normal));
+        let along = along.add(coupling.mul(press.impulse(apart).sub(old_normal)));
+        let sticking = old_tangent.sub(V::load(&rows.tangent_mass).mul(along));
+        let pull = sticking.if_positive(friction, V::splat(0.0).sub(friction));
+        let without = press.impulse(apart.sub(coupling.mul(old_tangent)));
+        let least = V::splat(1.0).add(coupling.mul(press.mass).mul(pull)).max(V::splat(LEAST));
+        let tangent_impulse = within(sticking, friction.mul(without.div(least)));
+        let new_normal = press.impulse(apart.add(coupling.mul(tangent_impulse.sub(old_tangent))));
+        let new_tangent = within(tangent_impulse, friction.mul(new_normal));
         normal.apply_impulse(accumulate(&mut rows.normal_impulse, old_normal, new_normal), a, b);
         tangent.apply_impulse(accumulate(&mut rows.tangent_impulse, old_tangent, new_tangent), a, b);
     }
 }
 
-impl<const N: usize> Group<N> {
-    /// Adds the normal impulses of a substep to those of the step.
+/// What the normal impulse at a point is to be: so much where its surfaces keep their distance, and less the faster they part; but it
+/// never pulls.
+pub(crate) struct Press<V> {
+    pub(crate) at_rest: V,
+    pub(crate) mass: V,
+}
+
+impl<V: Wide> Press<V> {
+    /// The impulse, given the speed at which the surfaces part. One that cannot be computed, as speeds overflow, stays so: the step
+    /// then fails.
     #[inline(always)]
-    pub(crate) fn add_to_pressed<V: Wide>(&mut self) {
-        for (rows, pressed) in self.points.iter().zip(&mut self.pressed) {
-            V::load(pressed).add(V::load(&rows.normal_impulse)).store(pressed);
-        }
+    fn impulse(&self, speed: V) -> V {
+        V::splat(0.0).max(self.at_rest.sub(self.mass.mul(speed)))
     }
 }
 
-/// An impulse if it presses, else none. One that cannot be computed, as speeds overflow, stays so: the step then fails.
-#[inline(always)]
-pub(crate) fn pressing<V: Wide>(impulse: V) -> V {
-    V::splat(0.0).max(impulse)
+impl<const N: usize> Group<N> {
+    /// Adds the impulses of a substep to those of the step.
+    #[inline(always)]
+    pub(crate) fn add_to_totals<V: Wide>(&mut self) {
+        for (rows, totals) in self.points.iter().zip(&mut self.totals) {
+            V::load(&totals.normal).add(V::load(&rows.normal_impulse)).store(&mut totals.normal);
+            V::load(&totals.tangent).add(V::load(&rows.tangent_impulse)).store(&mut totals.tangent);
+        }
+    }
 }
 
 /// An impulse, but no more than this either way.

@@ -71,8 +71,8 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mu
     for _ in 0..PASSES {
         for bounce in bounces {
             let at = lanes[bounce.contact as usize];
-            let (sides, points, pressed, lane) = at.pressed_mut(columns);
-            sides.bounce(points, pressed, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
+            let (sides, points, totals, lane) = at.totals_mut(columns);
+            sides.bounce(points, totals, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The rows of a contact: how an impulse moves its bodies, and how their motion shows in it.
 
 use super::columns::{Color, Each, Members, NO_CONTACT, Slices, Visitor, lengths};
-use super::group::Group;
+use super::group::{Group, Totals};
 use super::groups::Groups;
 use crate::collide::narrow_phase::Contacts;
 use crate::model::contact::{Contact, ContactPoint};
@@ -65,7 +65,7 @@ impl<V: Wide> Visitor for WriteRows<'_, V> {
         self.inputs.collect(members, self.source, self.local);
         write::<V, N>(group, &self.inputs);
         if self.source.setup.bouncy {
-            group.pressed = [[0.0; WIDE]; N];
+            group.totals = [Totals::NONE; N];
         }
     }
 }
