@@ -243,17 +243,17 @@ impl<'a> Approach<'a> {
     fn contact(&self, at: &Moment, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         let Moment { time, manifold, offset, turning_a, turning_b } = at;
         let normal = manifold.normal;
-        // A second point may come down upon a static within the step; between moving bodies the next step is soon enough.
+        // A second point may come down upon a static within the step, by itself or as the blow at the first turns the body: by as much
+        // as that one is stopped. Between moving bodies the next step is soon enough.
         let is_fixed = self.a.kind.inv_mass * self.b.kind.inv_mass == 0.0;
-        let holds = |anchor: Vec2, separation: f32| {
-            let closing = max(self.closing(at, anchor), 0.0);
+        let closing = manifold.points.map(|point| self.closing(at, point.anchor));
+        let mut kept = Manifold { normal, ..Manifold::EMPTY };
+        for (k, point) in manifold.points().iter().enumerate() {
+            let blow = if manifold.count == 2 { 0.5 * max(closing[1 - k], 0.0) } else { 0.0 };
+            let closing = max(closing[k] + blow, 0.0);
             // A speed that overflows is not one that can wait for the next step.
             let ahead = if is_fixed || closing.is_infinite() { (setup.params.dt - time) * closing } else { 0.0 };
-            separation < setup.params.speculative_distance + ahead
-        };
-        let mut kept = Manifold { normal, ..Manifold::EMPTY };
-        for point in manifold.points() {
-            if holds(point.anchor, point.separation) {
+            if point.separation < setup.params.speculative_distance + ahead {
                 kept.push(*point);
             }
         }

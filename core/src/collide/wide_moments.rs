@@ -204,9 +204,11 @@ impl Points {
         }
         meets = meets.mul(asked).mul(at.some);
         let moved = pairs.between.dot(at.normal).mul(at.time);
+        let closing = [0, 1].map(|point| pairs.closing(at.anchor[point], at.offset, at.normal));
         for point in 0..2 {
             let (anchor, separation) = (at.anchor[point], at.separation[point]);
-            let closing = pairs.closing(anchor, at.offset, at.normal).max(zero);
+            let blow = at.two.if_positive(V::splat(0.5).mul(closing[1 - point].max(zero)), zero);
+            let closing = closing[point].add(blow).max(zero);
             let ahead = pairs.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
