@@ -150,11 +150,9 @@ fn a_box_that_lands_on_a_corner_turns_about_it_or_slides() {
         let (impulse, spin) = blow_at(arm, half.length_squared() / 3.0, velocity);
         assert_eq!(impulse.x.abs() > 0.99 * FRICTION * impulse.y, slides, "{degrees} {impulse}");
         let [rectangle, polygon] = boxes(width, height);
-        for (shape, solver, within) in [
-            (&rectangle, Solver::SoftStep, 2e-2),
-            (&polygon, Solver::SoftStep, 2e-2),
-            (&polygon, Solver::Pgs, 3e-2),
-        ] {
+        for (shape, solver, within) in
+            [(&rectangle, Solver::SoftStep, 2e-2), (&polygon, Solver::SoftStep, 2e-2), (&polygon, Solver::Pgs, 3e-2)]
+        {
             let mut mean = 0.0;
             for phase in 0..PHASES {
                 let mut scene = Scene::new(MIDDLE, 0.0);

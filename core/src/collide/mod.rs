@@ -4,6 +4,7 @@ pub(crate) mod broad_phase;
 mod cull;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
+pub(crate) mod passage;
 mod piece_boxes;
 pub(crate) mod proxies;
 mod touch;

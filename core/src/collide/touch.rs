@@ -229,12 +229,18 @@ impl<'a> Approach<'a> {
                 return Some(at);
             }
         }
-        let nearest = *at.manifold.nearest()?;
-        let closing = self.closing(&at, nearest.anchor);
-        if closing <= 0.0 {
-            return Some(at);
+        // Of two points the further one may be the first to touch.
+        let mut soonest = f32::INFINITY;
+        for point in at.manifold.points() {
+            let closing = self.closing(&at, point.anchor);
+            if closing > 0.0 {
+                soonest = min(soonest, point.separation / closing);
+            }
         }
-        let time = at.time + nearest.separation / closing;
+        if soonest == f32::INFINITY {
+            return (at.manifold.count > 0).then_some(at);
+        }
+        let time = at.time + soonest;
         (time <= dt).then(|| self.at(max(time, 0.0), reach))
     }
 

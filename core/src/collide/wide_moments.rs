@@ -308,10 +308,15 @@ impl<V: Wide> Pairs<V> {
             going = near.max(deep).if_positive(zero, going);
         }
         ending = ending.max(going);
-        let (anchor, separation) = at.nearest();
-        let closing = self.closing(anchor, at.offset, at.normal);
-        let closes = less(zero, closing).mul(ending);
-        let time = at.time.add(separation.div(closing));
+        // Of two points the further one may be the first to touch.
+        let never = V::splat(f32::INFINITY);
+        let [first, second] = [0, 1].map(|point| {
+            let closing = self.closing(at.anchor[point], at.offset, at.normal);
+            less(zero, closing).if_positive(at.separation[point].div(closing), never)
+        });
+        let soonest = at.two.if_positive(first.min(second), first);
+        let closes = less(soonest, never).mul(ending);
+        let time = at.time.add(soonest);
         let exact = less(dt, time).if_positive(zero, closes);
         found = found.max(closes.if_positive(zero, ending));
         if exact.any_positive() {

@@ -312,12 +312,15 @@ impl SolverBodies {
         ([x, y, w], self.pose[place])
     }
 
-    /// How far a body of the tile has gone in the step, in m, if it is solved.
-    pub(crate) fn displacement(&self, body: usize) -> Option<Vec2> {
+    /// How far a body of the tile has gone in the step, in m, and how far its turning took what is one meter from its center, if it is
+    /// solved.
+    pub(crate) fn moved(&self, body: usize) -> Option<(Vec2, f32)> {
         let place = self.index[body];
         let moved = |place: SolverIndex| {
-            let ([x, y, ..], [.., root_inv_mass]) = (self.pose[place.get()], self.weight[place.get()]);
-            Vec2::new(x, y) * root_inv_mass
+            let [x, y, c, s] = self.pose[place.get()];
+            let [.., root_inv_inertia, root_inv_mass] = self.weight[place.get()];
+            let s = s * root_inv_inertia;
+            (Vec2::new(x, y) * root_inv_mass, (c * c + s * s).sqrt())
         };
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
     }

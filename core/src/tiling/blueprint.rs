@@ -71,6 +71,16 @@ fn is_choosy(kind: &KindRow) -> bool {
     kind.sensor || kind.filter != Filter::default()
 }
 
+/// The least inner radius of some kinds that touch anything, in meters.
+fn thinnest(kinds: &[KindRow]) -> f32 {
+    kinds.iter().filter(|kind| !kind.sensor).map(|kind| kind.inner_radius).fold(f32::INFINITY, math::min)
+}
+
+/// How far from its center anything lies of a body that is not round, at most, in meters.
+fn longest_arm(kinds: &[KindRow]) -> f32 {
+    kinds.iter().map(|kind| kind.not_round * kind.bounding_radius).fold(0.0, math::max)
+}
+
 /// How the bodies of each kind move by themselves; empty if all do alike.
 fn factors(kinds: &[KindRow], params: &Params) -> Vec<[f32; 4]> {
     let all_alike = kinds.iter().all(|kind| kind.dynamics == Dynamics::default());
@@ -108,6 +118,12 @@ pub(crate) struct Setup {
     pub(crate) static_softness: Softness,
     /// Whether anything bounces.
     pub(crate) bouncy: bool,
+    /// The least inner radius of a static, in meters.
+    pub(crate) thinnest: f32,
+    /// The least sum of the inner radii of a dynamic body and of a static, in meters.
+    pub(crate) least_passage: f32,
+    /// How far from its center anything lies of a dynamic body that is not round, at most, in meters.
+    pub(crate) longest_arm: f32,
     /// Whether there are bodies that do not touch all others.
     pub(crate) filters: bool,
     /// Whether there are shapes of several pieces.
@@ -168,6 +184,8 @@ impl Setup {
         let filters = kinds.iter().any(is_choosy);
         let compounds = kinds.iter().any(KindRow::is_compound);
         let factors = factors(&kinds[..dynamic_kinds], &params);
+        let (own, fixed) = kinds.split_at(dynamic_kinds);
+        let thinnest = thinnest(fixed);
         Ok(Self {
             partition: blueprint.partition.clone(),
             halo_width,
@@ -179,6 +197,9 @@ impl Setup {
             softness: Softness::contact(&params),
             static_softness: Softness::static_contact(&params),
             bouncy,
+            thinnest,
+            least_passage: self::thinnest(own) + thinnest,
+            longest_arm: longest_arm(own),
             filters,
             compounds,
             factors,
@@ -213,6 +234,8 @@ impl Setup {
         setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
         setup.bouncy |= kind.material.restitution > 0.0;
         setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
+        let own = &setup.kinds[..setup.dynamic_kinds];
+        (setup.least_passage, setup.longest_arm) = (thinnest(own) + setup.thinnest, longest_arm(own));
         setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
         setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
         Ok(setup)

@@ -62,7 +62,9 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         // Both are ways out, or one of them is how far it is.
         (Some(over), Some((distance, at_end))) => {
             let is_over = lowest <= 0.0 && distance <= lowest;
-            if is_over || distance - radius > FAR { over } else { at_end }
+            // Along the segment's normal what reaches beyond it may be nearer than what is over it.
+            let is_apart = over.nearest().is_none_or(|nearest| nearest.separation > 0.0);
+            if is_over || distance - radius > FAR && !is_apart { over } else { at_end }
         }
         (Some(over), None) => over,
         (None, Some((_, at_end))) => at_end,

@@ -1,9 +1,7 @@
-//! Who has gone far is held back, after the step, where it met a static.
+//! Who was thrown elsewhere within a step than where it went by itself is held back, after it, where that leads into a static.
 
-use super::any;
 use super::bounds::StaticsByPlace;
-use crate::collide::manifold::nearest;
-use crate::model::kind::KindRow;
+use crate::collide::passage::Passage;
 use crate::model::math::{Rot, dot, min};
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
@@ -11,83 +9,72 @@ use crate::tiling::terrain::ascend;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
 
-/// A body that may go far, and where it begins.
+/// A body that may come to the other side of something in this step, and how it begins it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
     row: usize,
     start: DVec2,
+    rotation: Rot,
 }
 
-/// Before the bodies that a tile owns are moved: those that may go far, by themselves or as they were hit.
+/// Before the bodies that a tile owns are moved: those of whom contacts have made something else than their free way, and that goes or
+/// turns so far that what is thin could be passed.
 pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way> {
     let bodies = &tile.bodies;
-    if !any(&bodies.velocity[..tile.owned + tile.ghosts()], setup) {
+    if setup.statics.is_empty() || !are_swift(tile, setup) {
         return Vec::new();
     }
-    if setup.statics.is_empty() {
-        return Vec::new();
-    }
-    // Of others there are contacts. Who was hit may go as far as who hits.
     let may = |&row: &usize| {
-        let much = 0.5 * setup.kind(bodies.kind[row]).inner_radius;
-        let moved = |moved: Vec2| moved.abs().max_element() > much;
-        setup.goes_far(bodies.velocity[row]) || solved.displacement(row).is_some_and(moved)
+        let kind = setup.kind(bodies.kind[row]);
+        let passes = |(moved, turned): (Vec2, f32)| {
+            let swept = kind.not_round * kind.bounding_radius * turned;
+            dot(moved, moved).sqrt() + swept > 0.5 * (kind.inner_radius + setup.thinnest)
+        };
+        setup.goes_far(bodies.velocity[row]) || solved.moved(row).is_some_and(passes)
     };
-    (0..tile.owned).filter(may).map(|row| Way { row, start: bodies.position[row] }).collect()
+    let way = |row| Way { row, start: bodies.position[row], rotation: bodies.rotation[row] };
+    (0..tile.owned).filter(may).map(way).collect()
 }
 
-/// Takes bodies back to where they met a static: who is hit on the way turns to where no contact was made. Velocities stay: the
-/// next step has the contact, and goes on from there.
+/// Whether any body is so fast that what is thin could be passed by it, or by whom it throws: by one much lighter at twice its speed.
+/// Without a branch, as mostly none is.
+fn are_swift(tile: &Tile, setup: &Setup) -> bool {
+    let (bodies, dynamic) = (&tile.bodies, tile.owned + tile.ghosts());
+    let (least, sweep) = (0.25 * setup.least_passage / setup.params.dt, setup.longest_arm);
+    let both = bodies.velocity[..dynamic].iter().zip(&bodies.angular_velocity[..dynamic]);
+    both.fold(false, |any, (v, w)| any | (v.x.abs() + v.y.abs() + sweep * w.abs() > least))
+}
+
+/// Takes bodies back to where they come to lie too deep in a static: of what they are thrown against they had no contact. Velocities
+/// stay: the next step has the contact, and goes on from there.
 ///
 /// Source: continuous collision against statics after the solver, as in Box2D v3 (E. Catto), which a body pays for with time.
 pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
     if ways.is_empty() {
         return;
     }
-    tile.rim.is_known = false;
     let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
-    for &Way { row, start } in ways {
-        let whole = tile.bodies.position[row] - start;
+    for &Way { row, start, rotation } in ways {
         let body = tile.bodies.get(row);
-        let (kind, way) = (setup.kind(body.kind), whole.as_vec2());
-        let (half, middle) = (kind.half_extents(body.rotation).as_dvec2() + 0.5 * whole.abs(), start + 0.5 * whole);
+        let (kind, whole) = (setup.kind(body.kind), body.position - start);
+        let passage = Passage::new(kind, [rotation, body.rotation], whole.as_vec2());
+        let (half, middle) = (DVec2::splat(kind.bounding_radius.into()) + 0.5 * whole.abs(), start + 0.5 * whole);
         let mut part = 1.0_f32;
         statics.meeting(middle - half, middle + half, &mut met);
         ascend(&mut met);
         for fixed in met.drain(..) {
-            let fixed = setup.static_at(fixed, step);
-            let (other, offset) = (setup.kind(fixed.kind), (fixed.position - start).as_vec2());
+            let [now, then] = [step, step + 1].map(|step| setup.static_at(fixed, step));
+            let other = setup.kind(now.kind);
             if kind.touches(other) {
-                part = min(part, free_part((kind, body.rotation), (other, fixed.rotation), offset, way));
+                let way = (then.position - now.position).as_vec2();
+                let other = Passage::new(other, [now.rotation, then.rotation], way);
+                part = min(part, passage.free_part(&other, (now.position - start).as_vec2()));
             }
         }
-        tile.bodies.position[row] = start + whole * f64::from(part);
-    }
-}
-
-/// The part of its way that a body can go before it is some way within another that rests. By conservative advancement.
-fn free_part(
-    (kind, rotation): (&KindRow, Rot),
-    (other, other_rotation): (&KindRow, Rot),
-    offset: Vec2,
-    way: Vec2,
-) -> f32 {
-    const MOST_ROUNDS: usize = 32;
-    let reach = dot(way, way).sqrt() + dot(offset, offset).sqrt();
-    let depth = 0.25 * kind.inner_radius;
-    let mut part = 0.0;
-    for round in 0..MOST_ROUNDS {
-        let manifold = nearest(kind, rotation, other, other_rotation, offset - way * part, reach);
-        let Some(nearest) = manifold.nearest() else { return 1.0 };
-        let (apart, closing) = (nearest.separation + depth, dot(way, manifold.normal));
-        if apart <= 1e-3 * depth {
-            // Who begins there has a contact that pushes it out, and is only kept from going much deeper.
-            return if round == 0 && closing < depth { 1.0 } else { part };
+        if part < 1.0 {
+            tile.rim.is_known = false;
+            tile.bodies.position[row] = start + whole * f64::from(part);
+            tile.bodies.rotation[row] = passage.rotation_at(part);
         }
-        if closing * (1.0 - part) <= apart {
-            return 1.0;
-        }
-        part += apart / closing;
     }
-    part
 }

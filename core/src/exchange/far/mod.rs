@@ -10,7 +10,7 @@
 //! bodies and their tiles know by a halo that is as wide as the largest needs it.
 //!
 //! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands
-//! there; so whoever has gone far is held back, after the step, where it met a static.
+//! there; so whoever has gone so far, or turned so, that it could, is held back, after the step, where it met a static.
 //!
 //! Not seen: two that go far, from tiles apart, that meet over a tile where nobody is; and it may be that one of their tiles knows
 //! of it alone.

@@ -121,7 +121,7 @@ impl Shape {
         }
     }
 
-    /// Radius of the largest circle around the center within the shape, in meters; zero if there is none.
+    /// Radius of the largest circle around the center within the shape, in meters; of several parts, within the thinnest.
     pub(crate) fn inner_radius(&self) -> f32 {
         match self {
             Self::Circle { radius } => *radius,
@@ -134,8 +134,7 @@ impl Shape {
             }
             Self::Segment(_) => 0.0,
             Self::Compound(compound) => {
-                let inner = |part: &Part| (part.shape.inner_radius() - part.position.length()).max(0.0);
-                compound.parts().iter().map(inner).fold(0.0, f32::max)
+                compound.parts().iter().map(|part| part.shape.inner_radius()).fold(f32::INFINITY, f32::min)
             }
         }
     }

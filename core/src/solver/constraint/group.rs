@@ -91,7 +91,8 @@ impl PointRows {
 }
 
 impl<const N: usize> Group<N> {
-    pub(crate) const EMPTY: Self = Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], totals: [Totals::NONE; N] };
+    pub(crate) const EMPTY: Self =
+        Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], totals: [Totals::NONE; N] };
 }
 
 /// The speed of a body along a row.
