@@ -241,16 +241,17 @@ impl Load<'_> {
         let [width, height, rounding, bound] = V::load_quads(&kinds);
         let velocity = Vectors::new(vx, vy);
         let (dt, grows, not_round) = (V::splat(params.dt), V::load(&grows), width.if_positive(one, zero));
-        // As `KindRow::half_extents` and `Setup::margin`.
+        // As `Setup::grown_half_extents`.
         let (c, s) = (absolute(c), absolute(s));
         let speed = velocity.dot(velocity).sqrt();
         let any_way = speed.mul(dt).max(V::splat(params.margin_floor)).min(V::splat(params.margin_cap));
         let margin_x = absolute(vx).mul(dt).max(any_way).mul(grows);
         let margin_y = absolute(vy).mul(dt).max(any_way).mul(grows);
-        let half_x = c.mul(width).add(s.mul(height)).add(rounding).min(bound).add(margin_x);
-        let half_y = s.mul(width).add(c.mul(height)).add(rounding).min(bound).add(margin_y);
         // Turning brings no point of a round body nearer.
         let sweep = not_round.mul(bound.mul(absolute(V::load(&spin)))).mul(dt);
+        let swept = rounding.add(sweep.mul(grows));
+        let half_x = c.mul(width).add(s.mul(height)).add(swept).min(bound).add(margin_x);
+        let half_y = s.mul(width).add(c.mul(height)).add(swept).min(bound).add(margin_y);
         let reach = bound.add(sweep).add(V::splat(0.5 * params.speculative_distance));
         let slack = V::splat(SLACK).mul(absolute(local_x).max(absolute(local_y)));
         let way = velocity.minus(Vectors::new(V::splat(self.mean.x), V::splat(self.mean.y)));

@@ -30,6 +30,10 @@ pub(super) const DEEP: f32 = -0.01;
 /// Steps of the search, at most. A last one mends what they leave.
 pub(super) const ROUNDS: usize = 3;
 
+/// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m.
+const MORE_ROUNDS: usize = 12;
+const LEAST_WAY: f32 = 0.002;
+
 /// One body of a pair.
 struct Side<'a> {
     kind: &'a KindRow,
@@ -137,7 +141,8 @@ impl<'a> Approach<'a> {
         let reach = setup.params.speculative_distance + far;
         let now = self.at(0.0, reach);
         let nearest = now.manifold.nearest()?.separation;
-        let is_now = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
+        let is_near = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
+        let is_now = is_near && !now.manifold.is_distance();
         // Speeds that overflow tell of no other moment.
         if is_now || far.is_infinite() {
             return self.contact(&now, known, setup);
@@ -210,7 +215,9 @@ impl<'a> Approach<'a> {
         }
         let sweep = self.a.sweep() + self.b.sweep();
         let mut at = *now;
-        for _ in 0..ROUNDS {
+        // Who goes beyond a segment is let through, and so must not come there by a step of the search.
+        let is_let_through = self.pieces.is_some_and(|pieces| pieces.iter().any(|piece| piece.side.is_some()));
+        for _ in 0..if is_let_through { MORE_ROUNDS } else { ROUNDS } {
             let nearest = *at.manifold.nearest()?;
             // What is apart along a direction stays so for as long as nothing moves further along it.
             let bound = -dot(self.between, at.manifold.normal) + sweep;
@@ -219,8 +226,13 @@ impl<'a> Approach<'a> {
                 return None;
             }
             // Half as if the fastest corner led, half as if the nearest point did.
-            let speed = 0.5 * (bound + max(self.closing(&at, nearest.anchor), 0.0));
-            at = self.at(at.time + min(nearest.separation / speed, left), reach);
+            let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };
+            let speed = 0.5 * (bound + closing);
+            let way = if at.manifold.is_distance() { max(nearest.separation, LEAST_WAY) } else { nearest.separation };
+            at = self.at(at.time + min(way / speed, left), reach);
+            if at.manifold.is_distance() {
+                continue;
+            }
             let nearest = at.manifold.nearest()?.separation;
             if nearest < DEEP {
                 break;
@@ -228,6 +240,9 @@ impl<'a> Approach<'a> {
             if nearest < NEAR {
                 return Some(at);
             }
+        }
+        if at.manifold.is_distance() {
+            return None;
         }
         // Of two points the further one may be the first to touch.
         let mut soonest = f32::INFINITY;
@@ -259,7 +274,7 @@ impl<'a> Approach<'a> {
             let closing = max(closing[k] + blow, 0.0);
             // A speed that overflows is not one that can wait for the next step.
             let ahead = if is_fixed || closing.is_infinite() { (setup.params.dt - time) * closing } else { 0.0 };
-            if point.separation < setup.params.speculative_distance + ahead {
+            if point.separation < setup.params.speculative_distance + ahead && !manifold.is_distance() {
                 kept.push(*point);
             }
         }
@@ -331,7 +346,7 @@ impl<'a> Approach<'a> {
         let on_b = self.b.swing(then.turning_b, point.anchor - then.offset, normal);
         let nearer = dot(self.between, normal) * then.time + (on_b - on_a);
         let now = point.separation - nearer;
-        if nearer.abs() >= ROLLING || now >= TOUCHING {
+        if nearer.abs() >= ROLLING || now >= TOUCHING || then.manifold.is_distance() {
             return None;
         }
         // As if they had come so near at once, along the normal.

@@ -46,9 +46,9 @@ impl Outline {
     /// Of an owned body, or of a ghost as it was last heard of.
     #[inline]
     pub(crate) fn of(tile: &Tile, body: usize, setup: &Setup) -> Self {
-        let bodies = &tile.bodies;
-        let half = setup.grown_half_extents(bodies.kind[body], bodies.rotation[body], bodies.velocity[body]);
-        Self { place: bodies.position[body], half, halo: setup.halo_of(bodies.kind[body], bodies.velocity[body]) }
+        let body = tile.bodies.get(body);
+        let half = setup.grown_half_extents(&body);
+        Self { place: body.position, half, halo: setup.halo_of(body.kind, body.velocity) }
     }
 
     /// Of an owned body near the border.

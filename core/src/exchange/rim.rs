@@ -29,7 +29,7 @@ impl RimBody {
     /// The body, if its grown AABB comes within the halo of a border of the tile whose region this is, or it has left that.
     #[inline]
     pub(crate) fn of(body: Body, index: u32, region: &Region, setup: &Setup) -> Option<Self> {
-        let half = setup.grown_half_extents(body.kind, body.rotation, body.velocity);
+        let half = setup.grown_half_extents(&body);
         let reach = half.as_dvec2() + DVec2::splat(setup.halo_of(body.kind, body.velocity));
         let is_within = region.contains(body.position - reach) & region.contains(body.position + reach);
         (!is_within).then_some(Self { body, half, index })

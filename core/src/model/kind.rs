@@ -2,7 +2,7 @@
 
 use crate::model::error::SetupError;
 use crate::model::id::KindId;
-use crate::model::math::min;
+use crate::model::math::{Rot, min};
 use crate::model::params::Params;
 use crate::model::piece::{Piece, pieces};
 use crate::model::shape::Shape;
@@ -287,11 +287,18 @@ impl KindRow {
     /// Half width and half height of an AABB at a rotation, in meters. Never more than the bounding radius, of which halos are made: a
     /// rectangle around a polygon reaches further at its corners than the polygon.
     #[inline(always)]
-    pub(crate) fn half_extents(&self, rotation: crate::model::math::Rot) -> Vec2 {
+    pub(crate) fn half_extents(&self, rotation: Rot) -> Vec2 {
+        self.swept_half_extents(rotation, 0.0)
+    }
+
+    /// The same where turning may bring its surface so much further out.
+    #[inline(always)]
+    pub(crate) fn swept_half_extents(&self, rotation: Rot, sweep: f32) -> Vec2 {
         let (c, s) = (rotation.c.abs(), rotation.s.abs());
+        let swept = self.radius + sweep;
         Vec2::new(
-            min(c * self.extent.x + s * self.extent.y + self.radius, self.bounding_radius),
-            min(s * self.extent.x + c * self.extent.y + self.radius, self.bounding_radius),
+            min(c * self.extent.x + s * self.extent.y + swept, self.bounding_radius),
+            min(s * self.extent.x + c * self.extent.y + swept, self.bounding_radius),
         )
     }
 }

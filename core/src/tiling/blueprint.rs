@@ -5,7 +5,7 @@ use crate::model::body::{Body, StaticBody};
 use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::kind::{Dynamics, Filter, Kind, KindRow};
-use crate::model::math::{self, Rot};
+use crate::model::math;
 use crate::model::params::Params;
 use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
@@ -310,10 +310,12 @@ impl Setup {
         (velocity.x.abs() * self.params.dt > most) | (velocity.y.abs() * self.params.dt > most)
     }
 
-    /// Half extents of a dynamic body's AABB, grown by its margin. In meters.
+    /// Half extents of a dynamic body's AABB, grown by how its turning may change it within a step and by its margin. In meters.
     #[inline(always)]
-    pub(crate) fn grown_half_extents(&self, kind: KindId, rotation: Rot, velocity: Vec2) -> Vec2 {
-        self.kind(kind).half_extents(rotation) + self.margin(velocity)
+    pub(crate) fn grown_half_extents(&self, body: &Body) -> Vec2 {
+        let kind = self.kind(body.kind);
+        let sweep = kind.not_round * (kind.bounding_radius * body.angular_velocity.abs()) * self.params.dt;
+        kind.swept_half_extents(body.rotation, sweep) + self.margin(body.velocity)
     }
 
     /// The statics that a tile may have to know: those that reach its region grown by the halo of the largest; where it solves contacts of

@@ -5,6 +5,7 @@
 
 use super::Manifold;
 use super::convex::clip;
+use crate::model::contact::ContactPoint;
 use crate::model::convex::Convex;
 use crate::model::math::dot;
 use crate::model::piece::{Joint, Side};
@@ -20,7 +21,7 @@ const FAR: f32 = 0.05;
 const BEYOND: f32 = 1e-5;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
-/// the piece. What is far may have any normal: it only tells how far it is.
+/// the piece. What has no contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
 pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2) -> Manifold {
     let [to, from] = own.edge(0);
     let along = to - from;
@@ -38,7 +39,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     {
         return over;
     }
-    let mut best: Option<(f32, Manifold)> = None;
+    let (mut touched, mut nearest): (Option<(f32, Manifold)>, Option<(f32, Manifold)>) = (None, None);
     for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
         let (outward, distance, _) = other.nearest(end);
         let normal = -outward;
@@ -49,26 +50,33 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
             }
             Joint::Closed => false,
         };
+        let separation = distance - radius;
+        let at_end = |feature| Manifold::single(normal, end + normal * (0.5 * separation), separation, feature);
+        let is_least = |known: &Option<(f32, Manifold)>| known.is_none_or(|(least, _)| distance < least);
+        if may && is_least(&touched) {
+            touched = Some((distance, at_end(if other.count() == 1 { 0 } else { 1 << 8 | number })));
+        }
         // Whoever is on the solid side, but for a joint, is let through.
-        let is_far = distance - radius > FAR && is_before;
-        if (may || is_far) && best.is_none_or(|(least, _)| distance < least) {
-            let separation = distance - radius;
-            let anchor = end + normal * (0.5 * separation);
-            let feature = if other.count() == 1 { 0 } else { 1 << 8 | number };
-            best = Some((distance, Manifold::single(normal, anchor, separation, feature)));
+        if is_before && is_least(&nearest) {
+            nearest = Some((distance, at_end(ContactPoint::ABSENT)));
         }
     }
-    match (over, best) {
-        // Both are ways out, or one of them is how far it is.
-        (Some(over), Some((distance, at_end))) => {
-            let is_over = lowest <= 0.0 && distance <= lowest;
-            // Along the segment's normal what reaches beyond it may be nearer than what is over it.
-            let is_apart = over.nearest().is_none_or(|nearest| nearest.separation > 0.0);
-            if is_over || distance - radius > FAR && !is_apart { over } else { at_end }
+    let is_far = |manifold: &Manifold| manifold.nearest().is_some_and(|nearest| nearest.separation > FAR);
+    match (over, touched.filter(|(_, at_end)| !is_far(at_end)), nearest) {
+        // Both are ways out.
+        (Some(over), Some((distance, at_end)), _) => {
+            if lowest <= 0.0 && distance <= lowest {
+                over
+            } else {
+                at_end
+            }
         }
-        (Some(over), None) => over,
-        (None, Some((_, at_end))) => at_end,
-        (None, None) => Manifold::EMPTY,
+        // Along the segment's normal what reaches beyond it may be nearer than what is over it.
+        (Some(over), None, Some((_, nearest))) if is_far(&over) && is_far(&nearest) => nearest,
+        (Some(over), None, _) => over,
+        (None, Some((_, at_end)), _) => at_end,
+        (None, None, Some((_, nearest))) => nearest,
+        (None, None, None) => Manifold::EMPTY,
     }
 }
 

@@ -63,6 +63,11 @@ impl Manifold {
         self
     }
 
+    /// Whether its point only tells how far the two are from each other, and is none that they touch at: they do so elsewhere, or later.
+    pub(crate) fn is_distance(&self) -> bool {
+        self.count == 1 && self.points[0].feature == ContactPoint::ABSENT
+    }
+
     pub(crate) fn push(&mut self, point: ManifoldPoint) {
         self.points[self.count] = point;
         self.count += 1;

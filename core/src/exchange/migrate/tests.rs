@@ -112,14 +112,17 @@ fn bytes(body: &Body) -> &[u8] {
     bytemuck::bytes_of(body)
 }
 
-/// Half extents of a body's AABB grown by its margin: by as far as it may come in a step, within limits, or by as far as it does
-/// along that axis.
+/// Half extents of a body's AABB grown by how it may turn, and by its margin: by as far as it may come in a step, within limits, or by
+/// as far as it does along that axis.
 fn grown(world: &World, body: &Body) -> DVec2 {
     let (setup, params) = (&world.setup, &world.setup.params);
     let speed = (body.velocity.x * body.velocity.x + body.velocity.y * body.velocity.y).sqrt();
     let any_way = (speed * params.dt).clamp(params.margin_floor, params.margin_cap);
     let margin = (body.velocity.abs() * params.dt).max(Vec2::splat(any_way));
-    (setup.kind(body.kind).half_extents(body.rotation) + margin).as_dvec2()
+    let kind = setup.kind(body.kind);
+    let turns = if kind.not_round > 0.0 { kind.bounding_radius * body.angular_velocity.abs() * params.dt } else { 0.0 };
+    let half = (kind.half_extents(body.rotation) + Vec2::splat(turns)).min(Vec2::splat(kind.bounding_radius));
+    (half + margin).as_dvec2()
 }
 
 /// Whether that box meets the region of a tile grown by so much, with tiles half-open.
