@@ -87,6 +87,7 @@ impl Part {
                 };
                 Self::Touching(world.touching(*id).into_iter().map(contact).collect())
             }
+            Question::Body(id) => Self::Bodies(vec![world.get(*id).as_ref().map(State::new)]),
             Question::Bodies(ids) => {
                 Self::Bodies(ids.iter().map(|id| world.get(*id).as_ref().map(State::new)).collect())
             }
@@ -177,7 +178,7 @@ fn key(question: &Question) -> &'static str {
         Question::Point(_) => "point",
         Question::Touching(_) => "touching",
         Question::Inside(_) => "inside",
-        Question::Bodies(_) => "body",
+        Question::Body(_) | Question::Bodies(_) => "body",
     }
 }
 
@@ -186,8 +187,8 @@ fn value(question: &Question, part: &Part) -> String {
         Part::Ray(hit) => json(hit),
         Part::Names(ids) => json(ids),
         Part::Touching(contacts) => json(contacts),
-        // Who asked for one is given one.
-        Part::Bodies(bodies) if matches!(question, Question::Bodies(ids) if ids.len() == 1) => json(&bodies[0]),
+        // Who asked for one is given one, and who asked by a list a list.
+        Part::Bodies(bodies) if matches!(question, Question::Body(_)) => json(&bodies[0]),
         Part::Bodies(bodies) => json(bodies),
     }
 }
@@ -210,7 +211,8 @@ mod tests {
         let question = Question::Ray { from: DVec2::ZERO, to: DVec2::ONE };
         let expected = "{\"step\":7,\"name\":\"up\",\"ray\":{\"id\":3,\"fraction\":0.5,\"point\":[0.5,1.0],\"normal\":[0.0,1.0]}}\n";
         assert_eq!(Answer::To(&question, &parts[2]).to_line(7, Some("up")), expected);
-        let nobody = Answer::To(&Question::Bodies(vec![GlobalId(3)]), &Part::Bodies(vec![None])).to_line(0, None);
-        assert_eq!(nobody, "{\"step\":0,\"body\":null}\n");
+        let nobody = |question| Answer::To(&question, &Part::Bodies(vec![None])).to_line(0, None);
+        assert_eq!(nobody(Question::Body(GlobalId(3))), "{\"step\":0,\"body\":null}\n");
+        assert_eq!(nobody(Question::Bodies(vec![GlobalId(3)])), "{\"step\":0,\"body\":[null]}\n");
     }
 }

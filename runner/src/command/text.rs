@@ -67,6 +67,7 @@ pub(crate) enum Question {
     Touching(GlobalId),
     /// Who is inside a sensor.
     Inside(GlobalId),
+    Body(GlobalId),
     Bodies(Vec<GlobalId>),
 }
 
@@ -107,14 +108,19 @@ struct Raw {
 }
 
 /// One, or a list of some.
-struct Several<T>(Vec<T>);
+struct Several<T> {
+    all: Vec<T>,
+    is_list: bool,
+}
 
 impl<'de, T: DeserializeOwned> Deserialize<'de> for Several<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let read = |value| serde_json::from_value(value).map_err(D::Error::custom);
         match Value::deserialize(deserializer)? {
-            Value::Array(all) => all.into_iter().map(read).collect::<Result<_, _>>().map(Self),
-            one => Ok(Self(vec![read(one)?])),
+            Value::Array(all) => {
+                Ok(Self { all: all.into_iter().map(read).collect::<Result<_, _>>()?, is_list: true })
+            }
+            one => Ok(Self { all: vec![read(one)?], is_list: false }),
         }
     }
 }
@@ -232,14 +238,14 @@ fn read(text: &str) -> Result<Raw, String> {
 
 fn action(raw: Raw) -> Result<Action, String> {
     let mut actions = Vec::new();
-    if let Some(Several(bodies)) = raw.add {
+    if let Some(Several { all: bodies, .. }) = raw.add {
         actions.push(Action::Add(bodies.iter().map(new_body).collect::<Result<_, _>>()?));
     }
     let mut each = |commands: Vec<Command>| actions.push(Action::Do(commands));
-    if let Some(Several(ids)) = raw.remove {
+    if let Some(Several { all: ids, .. }) = raw.remove {
         each(ids.into_iter().map(|id| Command::Remove(GlobalId(id))).collect());
     }
-    if let Some(Several(all)) = raw.velocity {
+    if let Some(Several { all, .. }) = raw.velocity {
         let set = |VelocityText { id, vx, vy, omega }| Command::SetVelocity {
             id: GlobalId(id),
             velocity: Vec2::new(vx, vy),
@@ -247,14 +253,14 @@ fn action(raw: Raw) -> Result<Action, String> {
         };
         each(all.into_iter().map(set).collect());
     }
-    if let Some(Several(all)) = raw.impulse {
+    if let Some(Several { all, .. }) = raw.impulse {
         let strike = |ImpulseText { id, x, y, at, angular }| {
             let (impulse, at) = (Vec2::new(x, y), at.map(DVec2::from));
             Command::Impulse { id: GlobalId(id), impulse, at, angular }
         };
         each(all.into_iter().map(strike).collect());
     }
-    if let Some(Several(all)) = raw.force {
+    if let Some(Several { all, .. }) = raw.force {
         if all.iter().any(|force| force.steps == 0) {
             return Err("a force must push for one step at least".to_owned());
         }
@@ -266,7 +272,7 @@ fn action(raw: Raw) -> Result<Action, String> {
         };
         each(all.into_iter().map(push).collect());
     }
-    if let Some(Several(all)) = raw.kind {
+    if let Some(Several { all, .. }) = raw.kind {
         let set = |KindOfText { id, kind }| Command::SetKind { id: GlobalId(id), kind: KindId(kind) };
         each(all.into_iter().map(set).collect());
     }
@@ -276,7 +282,7 @@ fn action(raw: Raw) -> Result<Action, String> {
     if let Some(gravity) = raw.gravity {
         each(vec![Command::SetGravity(gravity.into())]);
     }
-    if let Some(Several(ids)) = raw.wake {
+    if let Some(Several { all: ids, .. }) = raw.wake {
         each(ids.into_iter().map(|id| Command::Wake(GlobalId(id))).collect());
     }
     if let Some(RayText { from, to }) = raw.ray {
@@ -295,8 +301,12 @@ fn action(raw: Raw) -> Result<Action, String> {
     if let Some(id) = raw.touching {
         actions.push(Action::Ask(Question::Touching(GlobalId(id))));
     }
-    if let Some(Several(ids)) = raw.body {
-        actions.push(Action::Ask(Question::Bodies(ids.into_iter().map(GlobalId).collect())));
+    if let Some(Several { all: ids, is_list }) = raw.body {
+        let ids: Vec<GlobalId> = ids.into_iter().map(GlobalId).collect();
+        actions.push(Action::Ask(match ids[..] {
+            [id] if !is_list => Question::Body(id),
+            _ => Question::Bodies(ids),
+        }));
     }
     actions.extend(raw.inside.map(|id| Action::Ask(Question::Inside(GlobalId(id)))));
     actions.extend(raw.contacts.map(|is_told| Action::Tell(Event::Contacts, is_told)));

@@ -33,6 +33,12 @@ fn every_action_is_read() {
     let question = Question::Ray { from: DVec2::new(0.0, 1.0), to: DVec2::new(2.0, 3.0) };
     assert_eq!((line.step, line.number, line.name.as_deref()), (4, 9, Some("up")));
     assert_eq!(line.action, Action::Ask(question));
+    let asked = |text: &str| parse(1, text).unwrap().action;
+    assert_eq!(asked(r#"{"step": 1, "body": 7}"#), Action::Ask(Question::Body(id)));
+    for ids in [vec![], vec![7], vec![7, 8]] {
+        let question = Question::Bodies(ids.iter().copied().map(GlobalId).collect());
+        assert_eq!(asked(&format!("{{\"step\": 1, \"body\": {ids:?}}}")), Action::Ask(question));
+    }
 }
 
 #[test]
