@@ -10,7 +10,10 @@ pub(crate) enum Part {
     Ray(Option<Hit>),
     /// Names, ascending.
     Names(Vec<u64>),
-    Touching(Vec<Touching>),
+    /// Of somebody who is there.
+    Touching(Option<Vec<Touching>>),
+    /// Names, ascending, where the sensor is there.
+    Inside(Option<Vec<u64>>),
     Bodies(Vec<Option<State>>),
 }
 
@@ -60,6 +63,22 @@ impl State {
     }
 }
 
+/// Both together, or the one that there is.
+fn either<T>(a: Option<T>, b: Option<T>, both: impl FnOnce(T, T) -> T) -> Option<T> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(both(a, b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// Names of two ranks, of which both know the statics.
+fn joined(mut a: Vec<u64>, b: Vec<u64>) -> Vec<u64> {
+    a.extend(b);
+    a.sort_unstable();
+    a.dedup();
+    a
+}
+
 fn names(ids: Vec<GlobalId>) -> Vec<u64> {
     ids.into_iter().map(|id| id.0).collect()
 }
@@ -72,8 +91,11 @@ impl Part {
             Question::Rectangle { low, high } => Self::Names(names(world.in_rectangle(*low, *high))),
             Question::Point(point) => Self::Names(names(world.at_point(*point))),
             Question::Inside(sensor) => {
+                let is_there = world.is_static(*sensor) || world.get(*sensor).is_some();
                 let pairs = world.inside_sensors(sensors).into_iter();
-                Self::Names(pairs.filter(|(other, _)| other == sensor).map(|(_, body)| body.0).collect())
+                let inside: Vec<u64> = pairs.filter(|(other, _)| other == sensor).map(|(_, body)| body.0).collect();
+                // A rank that does not hold the sensor may hold who is inside.
+                Self::Inside((is_there || !inside.is_empty()).then_some(inside))
             }
             Question::Touching(id) => {
                 let contact = |contact: atoll_core::ContactView| {
@@ -85,7 +107,8 @@ impl Part {
                         impulse: contact.normal_impulse,
                     }
                 };
-                Self::Touching(world.touching(*id).into_iter().map(contact).collect())
+                let is_there = world.is_static(*id) || world.get(*id).is_some();
+                Self::Touching(is_there.then(|| world.touching(*id).into_iter().map(contact).collect()))
             }
             Question::Body(id) => Self::Bodies(vec![world.get(*id).as_ref().map(State::new)]),
             Question::Bodies(ids) => {
@@ -100,22 +123,17 @@ impl Part {
         match (self, other) {
             (Self::Ray(a), Self::Ray(b)) => {
                 let nearer = |a: Hit, b: Hit| if (b.fraction, b.id) < (a.fraction, a.id) { b } else { a };
-                Self::Ray(match (a, b) {
-                    (Some(a), Some(b)) => Some(nearer(a, b)),
-                    (a, b) => a.or(b),
-                })
+                Self::Ray(either(a, b, nearer))
             }
-            (Self::Names(mut a), Self::Names(b)) => {
-                // Statics are known to all.
-                a.extend(b);
-                a.sort_unstable();
-                a.dedup();
-                Self::Names(a)
-            }
-            (Self::Touching(mut a), Self::Touching(b)) => {
-                a.extend(b);
-                a.sort_by_key(|contact| contact.id);
-                Self::Touching(a)
+            (Self::Names(a), Self::Names(b)) => Self::Names(joined(a, b)),
+            (Self::Inside(a), Self::Inside(b)) => Self::Inside(either(a, b, joined)),
+            (Self::Touching(a), Self::Touching(b)) => {
+                let all = |mut a: Vec<Touching>, b: Vec<Touching>| {
+                    a.extend(b);
+                    a.sort_by_key(|contact| contact.id);
+                    a
+                };
+                Self::Touching(either(a, b, all))
             }
             (Self::Bodies(a), Self::Bodies(b)) => Self::Bodies(a.into_iter().zip(b).map(|(a, b)| a.or(b)).collect()),
             (a, _) => a,
@@ -186,6 +204,7 @@ fn value(question: &Question, part: &Part) -> String {
     match part {
         Part::Ray(hit) => json(hit),
         Part::Names(ids) => json(ids),
+        Part::Inside(ids) => json(ids),
         Part::Touching(contacts) => json(contacts),
         // Who asked for one is given one, and who asked by a list a list.
         Part::Bodies(bodies) if matches!(question, Question::Body(_)) => json(&bodies[0]),
@@ -208,6 +227,9 @@ mod tests {
         }
         let names = Part::Names(vec![0, 5, 9]).join(Part::Names(vec![0, 2]));
         assert_eq!(names, Part::Names(vec![0, 2, 5, 9]));
+        // Who holds a sensor need not hold who is inside.
+        let inside = Part::Inside(Some(vec![])).join(Part::Inside(None)).join(Part::Inside(Some(vec![4])));
+        assert_eq!(inside, Part::Inside(Some(vec![4])));
         let question = Question::Ray { from: DVec2::ZERO, to: DVec2::ONE };
         let expected = "{\"step\":7,\"name\":\"up\",\"ray\":{\"id\":3,\"fraction\":0.5,\"point\":[0.5,1.0],\"normal\":[0.0,1.0]}}\n";
         assert_eq!(Answer::To(&question, &parts[2]).to_line(7, Some("up")), expected);
