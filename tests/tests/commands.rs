@@ -252,6 +252,8 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         program::run(&mut command)
     };
     let fine = "{\"step\": 1, \"remove\": 40}\n";
+    let crowd = vec![json!({"x": 5, "y": 5}); 1001];
+    let crowd = format!("{}\n", json!({"step": 3, "add": crowd}));
     for (text, expected) in [
         ("{\"step\": 3, \"remove\": 40}\n", "line 2: step 3: there is no body 40; mend it, or leave out"),
         ("{\"step\": 3, \"remove\": [50, 50]}\n", "line 2: step 3: there is no body 50"),
@@ -263,6 +265,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         ),
         ("{\"step\": 3, \"add\": {\"kind\": 9, \"x\": 1, \"y\": 1}}\n", "its kind a row of the table"),
         ("{\"step\": 3, \"kind\": {\"id\": 60, \"kind\": 9}}\n", "line 2: step 3: body 60: there is no kind 9"),
+        (crowd.as_str(), "line 2: step 3: more than 1000 bodies would come to 5, 5 at once, where every two"),
         ("{\"step\": 3, \"gravity\": [0, 1e39]}\n", "line 2"),
         ("{\"step\": 3, \"velocity\": {\"id\": 60, \"vx\": 1e39, \"vy\": 0}}\n", "line 2: step 3: body 60: velocities"),
         ("{\"step\": 3, \"remve\": 40}\n", "c.jsonl: line 2: unknown field `remve`, expected one of"),

@@ -1,6 +1,6 @@
 //! A line of a file of commands, and what it may say.
 
-use crate::scene::kind_of_command;
+use crate::scene::{FARTHEST, kind_of_command};
 use atoll_core::{Body, Command, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
 use serde::de::{DeserializeOwned, Error as _};
@@ -117,9 +117,7 @@ impl<'de, T: DeserializeOwned> Deserialize<'de> for Several<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let read = |value| serde_json::from_value(value).map_err(D::Error::custom);
         match Value::deserialize(deserializer)? {
-            Value::Array(all) => {
-                Ok(Self { all: all.into_iter().map(read).collect::<Result<_, _>>()?, is_list: true })
-            }
+            Value::Array(all) => Ok(Self { all: all.into_iter().map(read).collect::<Result<_, _>>()?, is_list: true }),
             one => Ok(Self { all: vec![read(one)?], is_list: false }),
         }
     }
@@ -332,6 +330,10 @@ fn new_body(text: &BodyText) -> Result<NewBody, String> {
         (None, Some(c), Some(s)) => Rot { c, s },
         _ => return Err("a body is turned by an angle, or by cos and sin together".to_owned()),
     };
+    // As in the file of a scene.
+    if let Some((key, value)) = [("x", text.x), ("y", text.y)].into_iter().find(|(_, value)| value.abs() > FARTHEST) {
+        return Err(format!("add, {key} = {value:e}: must be within -1e9 to 1e9 m"));
+    }
     let body = Body {
         id: GlobalId(text.id.unwrap_or_default()),
         position: DVec2::new(text.x, text.y),

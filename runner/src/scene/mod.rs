@@ -36,9 +36,9 @@ pub use random::SplitMix64;
 
 use atoll_core::{Body, GlobalId, Kind, KindId, Material, Shape, StaticBody};
 use file::BodyIter;
-pub(crate) use file::kind_of_command;
 #[cfg(test)]
 pub(crate) use file::shape_tests;
+pub(crate) use file::{FARTHEST, MOST_AT_A_PLACE, kind_of_command, place_of};
 use glam::DVec2;
 use std::iter;
 use std::sync::Arc;
@@ -266,7 +266,7 @@ impl Scene {
 
     /// That far too many of some bodies are at one place, if files can be blamed for it.
     pub(crate) fn crowd(&self, bodies: &[Body]) -> Option<SceneError> {
-        self.file().and_then(|file| file.crowd(&mut bodies.iter().map(file::place_of).collect::<Vec<_>>()))
+        self.file().and_then(|file| file.crowd(&mut bodies.iter().map(place_of).collect::<Vec<_>>()))
     }
 
     /// That only so many bodies were found, if files can be blamed for it.

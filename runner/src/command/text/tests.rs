@@ -79,6 +79,7 @@ fn what_cannot_be_read_is_told_in_one_line() {
         (r#"{"step": 1, "add": {"x": 1}}"#, "missing field `y`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "z": 3}}"#, "unknown field `z`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "cos": 1}}"#, "a body is turned by an angle, or by cos and sin"),
+        (r#"{"step": 1, "add": [{"x": 1e9, "y": 0}, {"x": 0, "y": -1e12}]}"#, "add, y = -1e12: must be within -1e9 to"),
         (
             r#"{"step": 1, "add_kind": {"shape": "star", "radius": 1}}"#,
             "add_kind, shape = \"star\": must be \"box\" or \"circle\"; or give",

@@ -16,7 +16,7 @@ use crate::wording::OneLine;
 use atoll_core::{Command, GlobalId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use events::Followed;
-use presence::{check, find, next_name};
+use presence::{Crowds, check, find, next_name};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -46,6 +46,7 @@ pub(super) struct Commander {
     record: Option<File>,
     /// What there was after the last step of what is told.
     followed: Followed,
+    crowds: Crowds,
     failure: Option<RunError>,
     /// After how many steps it was last said that the run waits.
     waits_after: Option<u64>,
@@ -92,6 +93,7 @@ impl Commander {
             kept_in: plan.output.as_ref().map(|output| output.folder.commands()).filter(|_| rank == Rank(0)),
             record: None,
             followed: Followed::default(),
+            crowds: Crowds::default(),
             failure: None,
             waits_after: None,
             time: Duration::ZERO,
@@ -275,7 +277,7 @@ impl Commander {
             }
             self.answer(&std::mem::take(&mut asked), world, transport)?;
             let commands = match &line.action {
-                Action::Add(bodies) => self.name(bodies),
+                Action::Add(bodies) => self.crowds.check(bodies, step).and_then(|()| self.name(bodies)),
                 Action::Do(commands) => Ok(commands.clone()),
                 Action::Tell(event, is_told) => {
                     self.state.tell(*event, *is_told);
@@ -297,11 +299,12 @@ impl Commander {
                 self.state.note(command, step);
                 self.is_used = true;
             }
-            if let Action::Add(bodies) = &line.action
-                && (line.name.is_some() || bodies.iter().any(|new| !new.is_named))
-            {
-                let ids: Vec<u64> = commands.iter().filter_map(added).map(|id| id.0).collect();
-                self.tell(step, line.name.as_deref(), Answer::Added(&ids));
+            if let Action::Add(bodies) = &line.action {
+                self.crowds.note(bodies);
+                if line.name.is_some() || bodies.iter().any(|new| !new.is_named) {
+                    let ids: Vec<u64> = commands.iter().filter_map(added).map(|id| id.0).collect();
+                    self.tell(step, line.name.as_deref(), Answer::Added(&ids));
+                }
             }
         }
         self.answer(&asked, world, transport)

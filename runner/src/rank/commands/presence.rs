@@ -1,8 +1,9 @@
 //! Whether commands can be done: which of the bodies that they speak of there are, whoever holds them; and which names are free.
 
 use super::super::{RankError, records, unreadable};
-use crate::command::{Action, Line};
+use crate::command::{Action, Line, NewBody};
 use crate::plan::Plan;
+use crate::scene::{MOST_AT_A_PLACE, place_of};
 use atoll_core::{Command, GlobalId, World};
 use atoll_transport::{Collective, Rank, Transport};
 use std::collections::{BTreeMap, BTreeSet};
@@ -81,10 +82,67 @@ pub(super) fn check(commands: &[Command], present: &mut Present, world: &World) 
     Ok(())
 }
 
+/// How many bodies came to each place before the next step, by lines that were done.
+#[derive(Default)]
+pub(super) struct Crowds {
+    /// Steps made.
+    step: u64,
+    places: BTreeMap<[u64; 2], usize>,
+}
+
+impl Crowds {
+    /// Whether so many may come beside those that came: no more to one place than the file of a scene may have there. The error is
+    /// why not.
+    pub(super) fn check(&mut self, bodies: &[NewBody], step: u64) -> Result<(), String> {
+        if self.step != step {
+            *self = Self { step, ..Self::default() };
+        }
+        let mut more: BTreeMap<[u64; 2], usize> = BTreeMap::new();
+        for place in bodies.iter().map(|new| place_of(&new.body)) {
+            let count = more.entry(place).or_default();
+            *count += 1;
+            if *count + self.places.get(&place).copied().unwrap_or_default() > MOST_AT_A_PLACE {
+                let [x, y] = place.map(f64::from_bits);
+                return Err(format!(
+                    "more than {MOST_AT_A_PLACE} bodies would come to {x}, {y} at once, where every two of them would be a \
+                     contact; give each a place of its own"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// That they came.
+    pub(super) fn note(&mut self, bodies: &[NewBody]) {
+        bodies.iter().for_each(|new| *self.places.entry(place_of(&new.body)).or_default() += 1);
+    }
+}
+
 /// A name above all that there are.
 pub(super) fn next_name(plan: &Plan, world: &World, transport: &mut impl Transport) -> Result<u64, RankError> {
     let own = world.bodies().map(|body| body.id).chain(plan.blueprint.statics.iter().map(|fixed| fixed.id)).max();
     let own = own.map_or(0, |id| id.0.saturating_add(1));
     let told = transport.all_gather(&own.to_le_bytes()).map_err(RankError::Transport)?;
     Ok(records::<u64>(&told).map_err(RankError::Transport)?.into_iter().max().unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use atoll_core::{Body, KindId};
+    use glam::DVec2;
+
+    #[test]
+    fn lines_of_one_step_crowd_a_place_together() {
+        let at = |x: f64, count: usize| {
+            let body = Body::at_rest(GlobalId(0), KindId(0), DVec2::new(x, 0.5));
+            vec![NewBody { is_named: false, body }; count]
+        };
+        let mut crowds = Crowds::default();
+        assert_eq!(crowds.check(&at(1.0, 1000), 3), Ok(()));
+        crowds.note(&at(1.0, 1000));
+        assert_eq!(crowds.check(&at(2.0, 1000), 3), Ok(()));
+        assert!(crowds.check(&at(1.0, 1), 3).unwrap_err().starts_with("more than 1000 bodies would come to 1, 0.5 at"));
+        assert_eq!(crowds.check(&at(1.0, 1), 4), Ok(()));
+    }
 }

@@ -30,7 +30,8 @@ pub(crate) use description::is_scene;
 pub(crate) use digest::of_file as digest_of_file;
 pub(crate) use kinds::of_command as kind_of_command;
 pub(crate) use row::Column;
-pub(super) use row::{FARTHEST, is_turn};
+pub(crate) use row::FARTHEST;
+pub(super) use row::is_turn;
 pub(super) use statics::chain_of;
 
 use super::{Place, SceneError, large};
@@ -49,10 +50,10 @@ use table::TableFile;
 use toml::Table;
 
 /// More bodies than this at one and the same place are no scene that can be computed.
-const MOST_AT_A_PLACE: usize = 1000;
+pub(crate) const MOST_AT_A_PLACE: usize = 1000;
 
 /// Where a body is, as something to sort by.
-pub(super) fn place_of(body: &Body) -> [u64; 2] {
+pub(crate) fn place_of(body: &Body) -> [u64; 2] {
     body.position.to_array().map(f64::to_bits)
 }
 

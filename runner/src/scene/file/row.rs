@@ -7,7 +7,7 @@ use glam::{DVec2, Vec2};
 use std::path::Path;
 
 /// No center may be further from the origin along an axis, in meters: there, 64 bits tell 0.1 micrometers apart.
-pub(in crate::scene) const FARTHEST: f64 = 1e9;
+pub(crate) const FARTHEST: f64 = 1e9;
 
 /// The columns there are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
