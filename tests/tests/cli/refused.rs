@@ -174,6 +174,13 @@ fn configurations_that_cannot_be_read_are_named() {
     file_refused("[scene]\nkind = \"rooms\"\nbodies = nan\n", ": scene.bodies = nan: must be a whole number within ");
     file_refused("[scene]\nkind = \"rooms\"\nbodies = [\n1,\n2 ]\n", ": scene.bodies = [");
     file_refused("", ": scene.kind is missing");
+    // What only a scene has makes it one.
+    let scene = "domain = [[0, 0], [9, 9]]\n[[kinds]]\ncircle = 1\n";
+    file_refused(scene, ": format: is missing: must be \"atoll-scene/1\", which says that this is a scene");
+    file_refused(
+        &format!("format = \"atol-scene/1\"\n{scene}"),
+        ": format = \"atol-scene/1\": must be \"atoll-scene/1\"",
+    );
 }
 
 #[test]

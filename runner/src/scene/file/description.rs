@@ -16,6 +16,9 @@ pub(crate) const FORMAT: &str = "atoll-scene/1";
 /// How the format's name begins, whatever its version.
 const FORMATS: &str = "atoll-scene/";
 
+/// What every scene with bodies says, and no configuration.
+const OF_SCENES: [&str; 2] = ["domain", "kinds"];
+
 /// No domain is narrower, in meters.
 const NARROWEST: f64 = 1e-3;
 
@@ -40,13 +43,15 @@ pub(super) enum Bodies {
     File { path: String, xxh3: Option<String>, count: Option<u64> },
 }
 
-/// Whether a text is that of a scene, of any version.
+/// Whether a text is that of a scene, of any version, or of one that does not say so.
 pub(crate) fn is_scene(text: &str) -> bool {
     // Cheap, and never wrong about what is one: the rest is for whoever reads it.
-    text.contains(FORMATS)
-        && text.parse::<Table>().is_ok_and(|table| {
-            table.get("format").and_then(Value::as_str).is_some_and(|format| format.starts_with(FORMATS))
-        })
+    if !text.contains(FORMATS) && !OF_SCENES.iter().any(|key| text.contains(key)) {
+        return false;
+    }
+    let Ok(table) = text.parse::<Table>() else { return false };
+    let is_said = table.get("format").and_then(Value::as_str).is_some_and(|format| format.starts_with(FORMATS));
+    is_said || !table.contains_key("scene") && OF_SCENES.iter().any(|key| table.contains_key(*key))
 }
 
 impl Description {
