@@ -62,7 +62,7 @@ fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
     if let Some(key) = OF_STATICS.into_iter().find(|key| entries.has(key)) {
         return Err(entries.refuse(key, "is for [[statics]] alone; here, give a capsule or parts"));
     }
-    let shape = shape(entries)?;
+    let shape = shape(entries, &[])?;
     let kind = of_shape(entries, shape)?;
     if kind.material.surface_speed != 0.0 {
         return Err(entries.refuse("surface_speed", "is for [[statics]] alone; leave it out"));
@@ -70,11 +70,11 @@ fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
     Ok(kind)
 }
 
-/// The one shape of a kind, but none of those that only statics have.
+/// The one shape of a kind, but none of those that only statics have. `others` are keys that there may be beside those of kinds.
 ///
 /// # Errors
 /// If there is none, several, or one that cannot be.
-pub(super) fn shape(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
+pub(super) fn shape(entries: &mut Entries<'_>, others: &[&'static str]) -> Result<Shape, SceneError> {
     check_one(entries)?;
     if entries.has("parts") {
         return parts(entries);
@@ -86,7 +86,15 @@ pub(super) fn shape(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
         Some("box") => Ok(Shape::rectangle(size(entries, "width")?, size(entries, "height")?)),
         Some("circle") => Ok(Shape::circle(size(entries, "radius")?)),
         Some(_) => Err(entries.refuse("shape", format!("must be {SHAPES}"))),
-        None => Err(entries.missing("shape", SHAPES)),
+        None => {
+            // It may be there under a name that is none, which then is what is told.
+            for key in ["parts", "width", "height", "radius"].iter().chain(others) {
+                entries.value(key);
+            }
+            of_shape(entries, Shape::circle(1.0))?;
+            entries.finish()?;
+            Err(entries.missing("shape", SHAPES))
+        }
     }
 }
 

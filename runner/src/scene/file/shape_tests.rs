@@ -190,6 +190,9 @@ fn what_cannot_be_is_refused_in_one_line() {
     const AT: &str = "\nx = 0\ny = 0";
     let in_kind = [
         ("", "[[kinds]] 0, shape: is missing: must be \"box\" or \"circle\"; or give polygon, capsule or parts"),
+        ("name = \"crate\"\nbax = [1, 1]\ndensity = 2", "[[kinds]] 0, bax = [...]: unknown key; did you mean box?"),
+        ("prats = [{ circle = 1 }]", "[[kinds]] 0, prats = [...]: unknown key; did you mean parts?"),
+        ("width = 1\nheight = 1", "[[kinds]] 0, shape: is missing"),
         ("circle = 1\nbox = [1, 1]", "circle = 1: there is box already; leave one out"),
         ("circle = 0", "circle = 0: must be its radius, a positive number, in meters"),
         ("box = [1]", "box = [...]: must be [width, height], both positive"),
@@ -239,6 +242,8 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("segment = { from = [0, 0] }", "segment, to: is missing: must be [x, y] in meters"),
         ("segment = { from = [0, 0], to = [0, 0] }", "segment = {...}: two points of a chain"),
         ("segment = { from = [0, 0], to = [1, 0], next = [2, 0] }", "segment, next = [...]: unknown key"),
+        ("cirle = 1\nangle = 1", "[[statics]] 0, cirle = 1: unknown key; did you mean circle?"),
+        ("angle = 1", "[[statics]] 0, shape: is missing"),
         ("circle = 1\npath = 3", "path = 3: must be a table such as { line = [1.0, 0.0] }"),
         ("circle = 1\npath = { line = [1, 0], circle = 1 }", "path, circle = 1: there is line already"),
         ("circle = 1\npath = { line = [1, inf] }", "path, line = [...]: must be a velocity"),

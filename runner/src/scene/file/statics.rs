@@ -125,11 +125,14 @@ fn in_table(entries: &mut Entries<'_>, path: &Path) -> Result<(Vec<Placed>, Opti
     Ok((placed, table.has(Column::Id)?.then_some(ids)))
 }
 
+/// What a static may say beside what its kind is.
+const OTHERS: [&str; 10] = ["segment", "chain", "loop", "x", "y", "angle", "cos", "sin", "path", "places"];
+
 /// A shape, and where its center is, seen from what `x` and `y` say.
 fn form(entries: &mut Entries<'_>) -> Result<(Shape, Vec2), SceneError> {
     match entries.table("segment")? {
         Some(table) => segment(entries, table),
-        None => Ok((shape(entries)?, Vec2::ZERO)),
+        None => Ok((shape(entries, &OTHERS)?, Vec2::ZERO)),
     }
 }
 
