@@ -67,7 +67,23 @@ fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
     if kind.material.surface_speed != 0.0 {
         return Err(entries.refuse("surface_speed", "is for [[statics]] alone; leave it out"));
     }
+    // As the physics reckons them.
+    let (area, per_mass) = (kind.shape.area(), kind.shape.inertia_per_mass());
+    let has_mass = |density: f32| is_normal(density * area) && is_normal(density * area * per_mass);
+    if !has_mass(kind.material.density) {
+        let has = |key: &&str| entries.has(key);
+        let size = ["width", "circle", "box", "polygon", "capsule", "parts", "radius"].into_iter().find(has);
+        let key = if has_mass(1.0) { "density" } else { size.unwrap_or("shape") };
+        const WRONG: &str = "mass and moment of inertia would be out of the range of 32 bits, 1e-38 to 1e38; choose sizes and \
+                             a density nearer to 1";
+        return Err(entries.refuse(key, WRONG));
+    }
     Ok(kind)
+}
+
+/// Whether a number and its inverse can be reckoned with.
+fn is_normal(number: f32) -> bool {
+    number > 0.0 && number.is_finite() && number.recip() > 0.0 && number.recip().is_finite()
 }
 
 /// The one shape of a kind, but none of those that only statics have. `others` are keys that there may be beside those of kinds.
