@@ -28,6 +28,8 @@ struct Said {
     until: u64,
     /// Nothing more will be said at all.
     is_over: bool,
+    /// After how many steps the others last heard that there is nothing to do yet.
+    waited_after: Option<u64>,
 }
 
 impl Said {
@@ -111,9 +113,12 @@ impl Host for Driver {
 
     fn next(&self, steps: u64, patience: Duration) -> Next {
         let mut said = self.lock();
-        if !said.is_due(steps) && said.waits(steps) {
-            // At first the others hear that there is nothing to do.
-            let waiting = |said: &mut Said| !said.is_due(steps) && said.waits(steps);
+        let waiting = |said: &mut Said| !said.is_due(steps) && said.waits(steps);
+        if waiting(&mut said) {
+            // At first, and at once, it is said that there is nothing to do: whoever drives may wait for that.
+            if said.waited_after.replace(steps) != Some(steps) {
+                return Next::Wait;
+            }
             said = self.more.wait_timeout_while(said, patience, waiting).expect("nobody panics who holds it").0;
         }
         if said.is_due(steps) {
@@ -168,6 +173,8 @@ mod tests {
     fn a_run_waits_for_who_has_not_said_how_far_to_go() {
         let driver = Driver::default();
         assert!(driver.calls(0) && driver.lingers());
+        // Who drives step by step is kept waiting at none.
+        assert_eq!(driver.next(0, Duration::MAX), Next::Wait);
         assert_eq!(driver.next(0, Duration::from_millis(1)), Next::Wait);
         driver.lock().hear(1, "{\"until\": 7}".to_owned());
         assert!(!driver.calls(6) && driver.calls(7));
