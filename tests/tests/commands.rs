@@ -297,6 +297,38 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
 }
 
 #[test]
+fn who_is_asked_about_and_is_not_there_is_null() {
+    let folder = tempdir().unwrap();
+    let [file, answers] = ["c.jsonl", "answers.jsonl"].map(|name| folder.path().join(name));
+    let asked = [
+        (json!({"body": 99_999_999}), json!({"body": null})),
+        (json!({"body": [99_999_999]}), json!({"body": [null]})),
+        (json!({"body": []}), json!({"body": []})),
+        (json!({"touching": 99_999_999}), json!({"touching": null})),
+        (json!({"inside": 99_999_999}), json!({"inside": null})),
+        // Somebody is there, and touches nobody before the first step; nobody is inside what is no sensor.
+        (json!({"touching": 60}), json!({"touching": []})),
+        (json!({"inside": 60}), json!({"inside": []})),
+        (json!({"inside": 0}), json!({"inside": []})),
+    ];
+    let line = |mut said: Value| {
+        said["step"] = json!(0);
+        format!("{said}\n")
+    };
+    fs::write(&file, asked.clone().map(|(question, _)| line(question)).concat()).unwrap();
+    for ranks in [1, 3] {
+        let mut command = Way::Channel.command(ranks, CONFIG);
+        command.args(["--quiet", "--steps", "1", "--bodies", "500", "--tiles", "3x3", "--commands"]).arg(&file);
+        run(command.arg("--answers").arg(&answers));
+        let told = fs::read_to_string(&answers).unwrap();
+        let told: Vec<Value> = told.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let expected: Vec<Value> =
+            asked.iter().map(|(_, answer)| serde_json::from_str(&line(answer.clone())).unwrap()).collect();
+        assert_eq!(told, expected, "{ranks} ranks");
+    }
+}
+
+#[test]
 fn a_driver_is_waited_for_and_may_go_on_after_the_run_was_lost() {
     let folder = tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
