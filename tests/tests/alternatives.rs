@@ -8,11 +8,11 @@ use atoll_tests::program::{self, watched};
 type Small = (&'static str, &'static [(&'static str, &'static str)]);
 
 const SCENES: [Small; 8] = [
-    ("configs/normal.toml", &[("bodies", "2000"), ("steps", "100"), ("tiles", "3x2")]),
-    ("configs/skewed.toml", &[("bodies", "2000"), ("steps", "80"), ("tiles", "4x4")]),
-    ("configs/pile.toml", &[("bodies", "1500"), ("steps", "80"), ("tiles", "3x2")]),
-    ("configs/pyramids.toml", &[("bodies", "1100"), ("steps", "60"), ("tiles", "2x2")]),
-    ("configs/sparse.toml", &[("bodies", "4000"), ("steps", "60")]),
+    ("configs/normal.toml", &[("bodies", "2000"), ("steps", "60"), ("tiles", "3x2")]),
+    ("configs/skewed.toml", &[("bodies", "2000"), ("steps", "60"), ("tiles", "4x4")]),
+    ("configs/pile.toml", &[("bodies", "1500"), ("steps", "60"), ("tiles", "3x2")]),
+    ("configs/pyramids.toml", &[("bodies", "1100"), ("steps", "40"), ("tiles", "2x2")]),
+    ("configs/sparse.toml", &[("bodies", "4000"), ("steps", "40")]),
     ("configs/single_island.toml", &[("bodies", "2500"), ("steps", "40")]),
     ("configs/stack.toml", &[("steps", "100"), ("tiles", "2x2")]),
     ("configs/slope.toml", &[("bodies", "20"), ("steps", "100"), ("tiles", "2x2")]),

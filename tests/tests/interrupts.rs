@@ -14,12 +14,24 @@ fn under_way(options: &[&str]) -> (Running, TempDir) {
     start(program::command().args(ENDLESS), options)
 }
 
+/// The endless run on so many ranks each, all at the same time: until its first line each takes two seconds.
+fn all_under_way<'a>(ranks: impl IntoIterator<Item = &'a str>) -> Vec<(Running, TempDir)> {
+    let begin = |ranks| begin(program::command().args(ENDLESS), &["--bodies", "400", "--ranks", ranks]);
+    let mut all: Vec<_> = ranks.into_iter().map(begin).collect();
+    all.iter_mut().for_each(|(running, _)| running.wait_for_line("step "));
+    all
+}
+
 fn start(command: &mut Command, options: &[&str]) -> (Running, TempDir) {
-    let folder = tempdir().unwrap();
-    let mut running = Running::start(command.args(options).arg("--json").arg(folder.path().join("summary.json")));
+    let (mut running, folder) = begin(command, options);
     // The first line of progress: every rank is under way.
     running.wait_for_line("step ");
     (running, folder)
+}
+
+fn begin(command: &mut Command, options: &[&str]) -> (Running, TempDir) {
+    let folder = tempdir().unwrap();
+    (Running::start(command.args(options).arg("--json").arg(folder.path().join("summary.json"))), folder)
 }
 
 /// The summary of a run that ends by the signals it was sent.
@@ -38,23 +50,20 @@ fn interrupted(running: Running, folder: &TempDir) -> Value {
 /// Ctrl-C and a polite kill end all ranks after the same step, with the summary so far.
 #[test]
 fn an_interrupt_leaves_a_summary_and_exit_code_130() {
-    for signal in ["INT", "TERM", "HUP"] {
-        for ranks in ["1", "3"] {
-            let (running, folder) = under_way(&["--bodies", "400", "--ranks", ranks]);
-            running.signal(signal);
-            let summary = interrupted(running, &folder);
-            assert!((1..4_000_000_000).contains(&summary["steps"].as_u64().unwrap()), "{summary:#}");
-            assert_eq!((&summary["bodies_lost"], &summary["escaped"]), (&0.into(), &0.into()), "{summary:#}");
-            assert_eq!(folder.path().read_dir().unwrap().count(), 1, "something else is left");
-        }
+    let ways = ["INT", "TERM", "HUP"].into_iter().flat_map(|signal| [(signal, "1"), (signal, "3")]);
+    for ((signal, _), (running, folder)) in ways.clone().zip(all_under_way(ways.map(|(_, ranks)| ranks))) {
+        running.signal(signal);
+        let summary = interrupted(running, &folder);
+        assert!((1..4_000_000_000).contains(&summary["steps"].as_u64().unwrap()), "{summary:#}");
+        assert_eq!((&summary["bodies_lost"], &summary["escaped"]), (&0.into(), &0.into()), "{summary:#}");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1, "something else is left");
     }
 }
 
 /// `timeout` signals the process and then its group.
 #[test]
 fn two_signals_at_once_are_one() {
-    for ranks in ["1", "3"] {
-        let (running, folder) = under_way(&["--bodies", "400", "--ranks", ranks]);
+    for (running, folder) in all_under_way(["1", "3"]) {
         let twice = format!("kill -TERM {0}; kill -TERM {0}", running.id());
         assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
         interrupted(running, &folder);

@@ -19,9 +19,9 @@ struct Scene {
 }
 
 /// Bodies that fly, cross borders and collide.
-const QUICKSTART: Scene = Scene { config: "configs/quickstart.toml", bodies: 3000, steps: 60 };
+const QUICKSTART: Scene = Scene { config: "configs/quickstart.toml", bodies: 3000, steps: 40 };
 /// Bodies that fall onto each other, with borders through the heap and `exchange = "substep"`.
-const PILE: Scene = Scene { config: "configs/pile.toml", bodies: 1000, steps: 90 };
+const PILE: Scene = Scene { config: "configs/pile.toml", bodies: 1000, steps: 60 };
 
 const GRIDS: [&str; 3] = ["1x1", "3x2", "8x8"];
 /// The first of these on one rank of one thread is what all others are compared with. Seven ranks share three times two
@@ -195,7 +195,8 @@ fn the_environment_does_not_matter() {
 /// The hashes see what they should: another seed, another number of bodies or of steps, another setting.
 #[test]
 fn another_world_has_other_hashes() {
-    for scene in [QUICKSTART, PILE] {
+    // Of the heap so many steps that one body more, at its top, touches others.
+    for scene in [QUICKSTART, Scene { steps: 90, ..PILE }] {
         let on_tiles = |scene: Scene, key: &str, value: &str| hashes(&scene.run(&[("tiles", "3x2"), (key, value)]));
         let all = [
             on_tiles(scene, "seed", "1"),

@@ -34,7 +34,7 @@ const OPTIONS: [&str; 10] = [
 
 /// How often each kind of death is tried, and over how many steps: `ATOLL_KILLS=20x3000` for one.
 fn kills() -> (u64, String) {
-    let text = std::env::var("ATOLL_KILLS").unwrap_or("2x400".to_owned());
+    let text = std::env::var("ATOLL_KILLS").unwrap_or("2x240".to_owned());
     let (times, steps) = text.split_once('x').expect("ATOLL_KILLS is TIMESxSTEPS");
     (times.parse().expect("ATOLL_KILLS is TIMESxSTEPS"), steps.to_owned())
 }
@@ -62,6 +62,14 @@ fn assert_same_end(found: &Path, expected: &Path, what: &str) {
 fn assert_same_log(found: &Path, expected: &Path, what: &str) {
     let log = |folder: &Path| program::log(&folder.join("log.csv"));
     assert_eq!(log(found), log(expected), "{what}");
+}
+
+fn wait_until(what: &str, holds: impl Fn() -> bool) {
+    let deadline = Instant::now() + program::LIMIT;
+    while !holds() {
+        assert!(Instant::now() < deadline, "{what}");
+        sleep(Duration::from_millis(2));
+    }
 }
 
 /// Snapshots that are there, by step.
@@ -163,9 +171,9 @@ fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
         let run_folder = folder.path().join("run");
         let mut command = way.command(ranks, CONFIG);
         // So many steps that it does not come to its end by itself.
-        command.args(&OPTIONS[1..]).args(["--steps", "4000000000", "--out"]).arg(&run_folder);
-        let mut running = Running::start(&mut command);
-        running.wait_for_line("step ");
+        command.args(OPTIONS).args(["--steps", "4000000000", "--out"]).arg(&run_folder);
+        let running = Running::start(&mut command);
+        wait_until("no snapshot", || !snapshots(&run_folder).is_empty());
         if let Way::Mpi(_) = way {
             // What mpirun does about an interrupt of its own is its business.
             processes::ranks_of(&running, ranks)[1].signal("TERM");
@@ -233,24 +241,17 @@ fn a_lost_rank_is_made_good_by_restarts() {
 fn a_killed_rank_is_made_good_by_restarts() {
     let folder = tempdir().unwrap();
     let (whole, run_folder) = (folder.path().join("whole"), folder.path().join("run"));
-    run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "600", "--out"]).arg(&whole));
+    run(Way::Channel.command(2, CONFIG).args(OPTIONS).args(["--steps", "400", "--out"]).arg(&whole));
     let mut command = Way::Iceoryx2.command(3, CONFIG);
-    command.args(OPTIONS).args(["--steps", "600", "--restarts", "5", "--out"]).arg(&run_folder);
+    command.args(OPTIONS).args(["--steps", "400", "--restarts", "5", "--out"]).arg(&run_folder);
     let running = Running::start(&mut command);
-    let wait_until = |what: &str, holds: &dyn Fn() -> bool| {
-        let deadline = Instant::now() + program::LIMIT;
-        while !holds() {
-            assert!(Instant::now() < deadline, "{what}");
-            sleep(Duration::from_millis(2));
-        }
-    };
     for rank in [1, 0] {
         let newest = || snapshots(&run_folder).last().copied();
         let (ranks, before) = (processes::ranks_of(&running, 3), newest());
         // Each time with something new to go on from, and long before the end.
-        wait_until("no new snapshot", &|| newest() > before);
+        wait_until("no new snapshot", || newest() > before);
         ranks[rank].signal("KILL");
-        wait_until("ranks live on", &|| !ranks.iter().any(processes::RankProcess::lives));
+        wait_until("ranks live on", || !ranks.iter().any(processes::RankProcess::lives));
     }
     let ended = running.end();
     assert_eq!(ended.code, Some(0), "{ended}");

@@ -9,7 +9,7 @@ use std::time::Duration;
 use tempfile::tempdir;
 
 /// So many that a page is there before they are made.
-const STEPS: u32 = if cfg!(debug_assertions) { 120 } else { 2400 };
+const STEPS: u32 = if cfg!(debug_assertions) { 120 } else { 800 };
 
 /// A run of so many steps.
 fn small(steps: u32) -> Vec<String> {
