@@ -117,7 +117,7 @@ await_python() {
     wait "$python_job"
 }
 
-# Started while others run, many of whose tests mostly wait, and after all that these need: it takes what they leave.
+# Started once others are compiled: many of their tests mostly wait, and it takes what they leave.
 begin_aarch64() {
     # Under qemu it counts how well it is compiled.
     env -u CARGO_PROFILE_RELEASE_CODEGEN_UNITS nice tests/aarch64.sh >"$target/aarch64.log" 2>&1 &
@@ -178,8 +178,10 @@ if [[ -n ${python_job:-} ]]; then
 fi
 # As it is compiled for speed, everything, with every transport; of the runner what its program does, and of the core what worlds do,
 # as the next says: to compile its kernels once more, for its own tests, would take minutes.
-step cargo test --release --workspace --exclude atoll --exclude atoll-core --lib --bins --tests ${features[@]+"${features[@]}"}
+for_speed=(cargo test --release --workspace --exclude atoll --exclude atoll-core --lib --bins --tests ${features[@]+"${features[@]}"})
+step "${for_speed[@]}" --no-run
 begin_aarch64
+step "${for_speed[@]}"
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
 # that there is for that (golden). What programs do around that is the same in both profiles.
 calculates=(borders collisions configs driven fast golden hostile library physics reported scenes shapes sleep snapshots strategies)
