@@ -151,7 +151,7 @@ fn a_box_that_lands_on_a_corner_turns_about_it_or_slides() {
         assert_eq!(impulse.x.abs() > 0.99 * FRICTION * impulse.y, slides, "{degrees} {impulse}");
         let [rectangle, polygon] = boxes(width, height);
         for (shape, solver, within) in
-            [(&rectangle, Solver::SoftStep, 2e-2), (&polygon, Solver::SoftStep, 2e-2), (&polygon, Solver::Pgs, 3e-2)]
+            [(&rectangle, Solver::SoftStep, 2e-2), (&polygon, Solver::SoftStep, 2e-2), (&polygon, Solver::Pgs, 5e-2)]
         {
             let mut mean = 0.0;
             for phase in 0..PHASES {
@@ -168,7 +168,7 @@ fn a_box_that_lands_on_a_corner_turns_about_it_or_slides() {
                 assert_near(&format!("{degrees} degrees, {solver:?}"), phase, [is.into(), spin.into()], within);
                 mean += f64::from(is) / f64::from(PHASES);
             }
-            assert_near(&format!("{degrees} degrees, mean"), PHASES, [mean, spin.into()], 1e-2);
+            assert_near(&format!("{degrees} degrees, {solver:?}, mean"), PHASES, [mean, spin.into()], 0.5 * within);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Bodies that go further within a step than everything around them is wide pass through nothing, wherever tiles end.
 
-use atoll_core::{Exchange, Filter, Material, Path, Rot, Shape, Travel};
+use atoll_core::{Exchange, Filter, GlobalId, Kind, Material, Path, Rot, Segment, Shape, StaticBody, Travel};
 use atoll_tests::world::{Scene, noise};
 use glam::{DVec2, Vec2};
 
@@ -154,5 +154,65 @@ fn discs_at_500_m_s_stay_in_their_room() {
         let outside = |place: DVec2| (place - MIDDLE).abs().max_element() > 8.1;
         let escaped = sim.bodies().iter().filter(|body| outside(body.position)).count();
         assert_eq!(escaped, 0, "of 196 discs on {grid:?}, {exchange:?}");
+    }
+}
+
+/// Wide, and no more than a few centimeters thick.
+const LAND: f64 = 60.0;
+
+/// A chain that goes up and down, by the solid side of which nobody is to come.
+fn zigzag(scene: &mut Scene) {
+    let corner = |k: i32| Vec2::new(0.3 * k as f32 - 0.5 * LAND as f32, 0.15 * (1.7 * k as f32).sin());
+    for k in 0..(LAND / 0.3) as i32 {
+        let [before, from, to, after] = [k - 1, k, k + 1, k + 2].map(corner);
+        let (segment, middle) = Segment::new(Some(before), from, to, Some(after)).unwrap();
+        let kind = Kind::new(Shape::Segment(segment), Material::default());
+        scene.statics.push(StaticBody::new(GlobalId(k as u64), kind, MIDDLE + middle.as_dvec2()));
+    }
+}
+
+/// Who meets it with an end is spun, and comes down with the other; who slides down comes upon the next that rises.
+#[test]
+fn what_is_thin_never_swings_through_what_is_thin() {
+    let shapes = [
+        Shape::rectangle(1.0, 0.05),
+        Shape::rectangle(1.6, 0.03),
+        Shape::capsule(0.9, 0.04).unwrap(),
+        Shape::polygon(&[Vec2::new(-0.4, -0.03), Vec2::new(0.5, 0.0), Vec2::new(-0.4, 0.03)], 0.0).unwrap(),
+        Shape::circle(0.04),
+    ];
+    for (is_zigzag, grid, exchange) in [
+        (true, (1, 1), Exchange::Step),
+        (true, (5, 2), Exchange::Substep),
+        (false, (1, 1), Exchange::Substep),
+        (false, (5, 2), Exchange::Step),
+    ] {
+        let mut scene = Scene::new(MIDDLE, -10.0);
+        scene.half = DVec2::splat(LAND);
+        if is_zigzag {
+            zigzag(&mut scene);
+        } else {
+            scene.wall(MIDDLE, (LAND as f32, 0.02), 0.0, Material::default());
+        }
+        let kinds = shapes.clone().map(|shape| scene.kind(shape, Material::default()));
+        let bodies: Vec<_> = (0..300_u64)
+            .map(|k| {
+                let [x, angle, spin, speed] = [6, 7, 8, 9].map(|seed| noise(seed, k));
+                let place = DVec2::new(1.6 * (k % 30) as f64 - 24.0 + x, 1.5 + 2.0 * (k / 30) as f64);
+                let id = scene.body(kinds[k as usize % 5], MIDDLE + place, Vec2::new(0.0, -5.0 - 20.0 * speed as f32));
+                scene.last().rotation = Rot::from_angle((angle * std::f64::consts::TAU) as f32);
+                scene.last().angular_velocity = (40.0 * spin - 20.0) as f32;
+                id
+            })
+            .collect();
+        let mut sim = scene.start_on(grid, exchange);
+        sim.run(150);
+        // Some leave it by its ends.
+        let is_through = |id| {
+            let place = sim.body(id).position - MIDDLE;
+            place.y < -0.2 && place.x.abs() < 0.45 * LAND
+        };
+        let through: Vec<_> = bodies.into_iter().filter(|&id| is_through(id)).collect();
+        assert!(through.is_empty(), "zigzag {is_zigzag}, {grid:?}, {exchange:?}: {through:?} came through");
     }
 }
