@@ -91,8 +91,13 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                     make_substep(bench, substep);
                 });
             }
-            // After the last substep only a bounce still looks at a ghost's velocity.
+            // After the last substep only a bounce still looks at a ghost's velocity: that which both tiles agree on.
             if world.setup.bouncy {
+                world.exchange(halo)?;
+                world.each_tile_apart(|bench| {
+                    bench.stage(Phase::Border, |b| average(b, false));
+                    bench.stage(Phase::Border, send_refresh);
+                });
                 world.exchange(halo)?;
                 world.each_tile_apart(|bench| {
                     bench.stage(Phase::Border, refresh);
@@ -103,7 +108,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
             }
             world.exchange(halo)?;
             world.each_tile_apart(|bench| {
-                bench.stage(Phase::Border, average);
+                bench.stage(Phase::Border, |b| average(b, b.setup.bouncy));
                 finalize(bench);
             });
         }
@@ -217,13 +222,13 @@ fn solve(bench: &mut Bench<'_>, substeps: Range<u32>) {
     bench.stage(Phase::Substeps, |b| b.work.solver.solve(substeps, b.setup, b.team));
 }
 
-/// One substep, and what others must hear of it before they go on: the state of their ghosts, or at the end of the last one, where
-/// nothing bounces, what the contacts at the border did.
+/// One substep, and what others must hear of it before they go on: the state of their ghosts, or at the end of the last one what the
+/// contacts at the border did.
 fn make_substep(bench: &mut Bench<'_>, substep: u32) {
     solve(bench, substep..substep + 1);
     bench.stage(Phase::Border, |b| b.work.border.add_impulses(b.tile, &b.work.solver));
     let is_last = substep + 1 == bench.setup.params.integrations();
-    let tell = if is_last && !bench.setup.bouncy { send_impulses } else { send_refresh };
+    let tell = if is_last { send_impulses } else { send_refresh };
     bench.stage(Phase::Border, tell);
 }
 
@@ -277,9 +282,9 @@ fn send_impulses(bench: &mut Bench<'_>) {
     work.border.send_impulses(bench.tile, &work.solver, bench.outgoing);
 }
 
-fn average(bench: &mut Bench<'_>) {
+fn average(bench: &mut Bench<'_>, bounced: bool) {
     let work = &mut *bench.work;
-    work.border.average(bench.tile, &mut work.solver, bench.mail);
+    work.border.average(bench.tile, &mut work.solver, bench.mail, bounced);
 }
 
 /// Completes the report of a step, and the step.

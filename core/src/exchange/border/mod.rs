@@ -255,9 +255,9 @@ impl Border {
         }
     }
 
-    /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far. Points that only one side
-    /// has are left alone.
-    pub(crate) fn average(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>) {
+    /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far, and of those that `bounced`.
+    /// Points that only one side has are left alone.
+    pub(crate) fn average(&mut self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, bounced: bool) {
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
             // One for each two pieces of the pair that touch; features tell them apart.
@@ -266,9 +266,9 @@ impl Border {
             if of_pair.clone().next().is_none() {
                 tile.counts.fault = Some(Fault::Protocol);
             }
-            for (border, totals) in of_pair.zip(&self.totals[first..]) {
+            for (border, totals) in of_pair.zip(&mut self.totals[first..]) {
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                    solver.move_together(&tile.contacts, border, totals, theirs);
+                    solver.move_together(&tile.contacts, border, totals, theirs, bounced);
                 }
             }
         }
@@ -318,13 +318,15 @@ impl Solver {
         &mut self,
         contacts: &ContactCache,
         border: &BorderContact,
-        totals: &[[f32; 2]; 2],
+        totals: &mut [[f32; 2]; 2],
         theirs: &BorderPoint,
+        bounced: bool,
     ) {
         let BorderContact { contact, owns_a, far, .. } = *border;
         // Each owner may know others with whom its body bounces, or whom it meets first. The lesser impulse is the one that is sure:
         // it gives nobody more energy than there was.
-        let lesser = far || self.groups.may_bounce(contact);
+        let may_bounce = self.groups.may_bounce(contact);
+        let lesser = far || bounced && may_bounce;
         let points = contacts.contacts[contact as usize].points();
         if let Some(k) = points.iter().position(|point| point.feature == theirs.feature) {
             let ([normal, tangent], now) = (totals[k], self.groups.impulses(contact, k));
@@ -336,9 +338,12 @@ impl Solver {
                 (true, true) => theirs,
                 (true, false) => mine,
             };
-            let (more_normal, more_tangent) =
-                (common(normal, theirs.total_normal) - normal, common(tangent, theirs.total_tangent) - tangent);
-            self.apply_impulse(contact, k, owns_a, more_normal, more_tangent);
+            let total = [common(normal, theirs.total_normal), common(tangent, theirs.total_tangent)];
+            self.apply_impulse(contact, k, owns_a, total[0] - normal, total[1] - tangent);
+            totals[k] = total;
+            if may_bounce {
+                self.groups.set_totals(contact, k, total);
+            }
             self.groups.set_impulses(contact, k, [common(now[0], theirs.normal), common(now[1], theirs.tangent)]);
         }
     }

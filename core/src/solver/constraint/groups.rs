@@ -26,6 +26,8 @@ pub(crate) struct Groups {
     pub(super) lanes: Vec<Lane>,
     /// Contacts that may bounce, of batches that keep their rows.
     pub(super) bounces: Vec<Bounce>,
+    /// The order in which they do, if it is another.
+    pub(super) bounce_order: Vec<u32>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
 }
@@ -159,6 +161,13 @@ impl Groups {
     pub(crate) fn totals(&self, contact: u32, point: usize) -> [f32; 2] {
         let Lane { column, lane, group, .. } = self.lanes[contact as usize];
         self.kept.totals(column.into(), group as usize, point).of(lane.into())
+    }
+
+    /// Overwrites the same.
+    pub(crate) fn set_totals(&mut self, contact: u32, point: usize, [normal, tangent]: [f32; 2]) {
+        let at = self.lanes[contact as usize];
+        let (_, _, totals, lane) = at.totals_mut(&mut self.kept);
+        (totals[point].normal[lane], totals[point].tangent[lane]) = (normal, tangent);
     }
 
     /// Overwrites the accumulated impulses of one point.

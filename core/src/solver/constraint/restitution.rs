@@ -6,6 +6,7 @@ use super::rows::Source;
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
 use crate::model::math::{dot, max, turn};
+use crate::model::params::Exchange;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use glam::Vec2;
@@ -14,6 +15,7 @@ impl Groups {
     /// Finds the contacts that may bounce, in canonical order in each batch.
     pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
         self.bounces.clear();
+        self.bounce_order.clear();
         self.bounces_at_once.clear();
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let sides = source.contacts.bodies[i];
@@ -40,6 +42,13 @@ impl Groups {
         }
         let lanes = &self.lanes;
         self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+        if source.setup.params.exchange == Exchange::Substep {
+            // By names: then both tiles that solve a contact at their border come to the same, if they know the same.
+            let (tile, bounces) = (source.tile, &self.bounces);
+            self.bounce_order.extend(0..bounces.len() as u32);
+            self.bounce_order
+                .sort_by_cached_key(|&i| tile.pair_of(tile.contacts.keys[bounces[i as usize].contact as usize]));
+        }
     }
 
     /// Whether a contact whose batch keeps its rows is among those.
@@ -49,8 +58,12 @@ impl Groups {
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, lanes, kept, .. } = self;
-        bounce(bounces, lanes, kept, bodies);
+        let Self { bounces, bounce_order, lanes, kept, .. } = self;
+        if bounce_order.is_empty() {
+            bounce(&*bounces, lanes, kept, bodies);
+        } else {
+            bounce(bounce_order.iter().map(|&i| &bounces[i as usize]), lanes, kept, bodies);
+        }
     }
 
     /// Bounces of a batch that is solved at once.
@@ -66,10 +79,15 @@ impl Groups {
 /// Some passes over contacts that may bounce, in canonical order: who bounces off two others at once comes to the speeds that both want
 /// after several. An impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and
 /// after. So with restitution 1 nothing is lost or gained where each point parts as fast as it came.
-fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mut SolverBodies) {
+fn bounce<'a>(
+    bounces: impl IntoIterator<Item = &'a Bounce> + Clone,
+    lanes: &[Lane],
+    columns: &mut Columns,
+    bodies: &mut SolverBodies,
+) {
     const PASSES: usize = 8;
     for _ in 0..PASSES {
-        for bounce in bounces {
+        for bounce in bounces.clone() {
             let at = lanes[bounce.contact as usize];
             let (sides, points, totals, lane) = at.totals_mut(columns);
             sides.bounce(points, totals, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
