@@ -17,6 +17,9 @@ const SAME: f32 = 1e-5;
 /// What is further makes no contact yet, in m.
 const FAR: f32 = 0.05;
 
+/// The distance of a piece from an end of a segment, and their manifold.
+type AtEnd = Option<(f32, Manifold)>;
+
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
 const BEYOND: f32 = 1e-5;
 
@@ -39,7 +42,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     {
         return over;
     }
-    let (mut touched, mut nearest): (Option<(f32, Manifold)>, Option<(f32, Manifold)>) = (None, None);
+    let (mut touched, mut nearest): (AtEnd, AtEnd) = (None, None);
     for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
         let (outward, distance, _) = other.nearest(end);
         let normal = -outward;
@@ -52,7 +55,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         };
         let separation = distance - radius;
         let at_end = |feature| Manifold::single(normal, end + normal * (0.5 * separation), separation, feature);
-        let is_least = |known: &Option<(f32, Manifold)>| known.is_none_or(|(least, _)| distance < least);
+        let is_least = |known: &AtEnd| known.is_none_or(|(least, _)| distance < least);
         if may && is_least(&touched) {
             touched = Some((distance, at_end(if other.count() == 1 { 0 } else { 1 << 8 | number })));
         }
