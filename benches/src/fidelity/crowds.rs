@@ -1,20 +1,45 @@
 //! Many bodies that meet and part.
 
 use super::laws::{Law, world};
-use super::{Course, Start};
+use super::{Course, PHASES, Start};
 use crate::peers::case::{Case, SceneName, Wishes};
 use crate::peers::given::Given as _;
 use atoll_core::{Body, GlobalId, Kind, Material, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 
-/// Cases of crowds, each measured once.
+/// Cases of crowds.
 pub(super) fn laws() -> Vec<Law> {
-    let mut laws = vec![elastic(), haff(), spins(), fill_height(), opening()];
+    let mut laws = vec![planks(), elastic(), haff(), spins(), fill_height(), opening()];
     laws.extend([0.1, 0.0].map(cradle));
     laws
 }
 
 const RADIUS: f32 = 0.1;
+
+/// Planks that meet a floor as thin as they are with one end, and come down with the other.
+fn planks() -> Law {
+    let start = |hertz: f64, phase: f64| {
+        let floor = Kind::new(Shape::rectangle(60.0, 0.02), Material::default());
+        let plank = |k: u32| {
+            let turned = Rot::from_angle((2.399_963_2 * (f64::from(k) + phase) % std::f64::consts::TAU) as f32);
+            let place = DVec2::new(2.0 * f64::from(k) - 27.0, 1.5 + 0.03 * f64::from(k));
+            (Shape::rectangle(1.0, 0.05), Material::default(), place, turned, Vec2::new(0.0, -20.0), 0.0)
+        };
+        let bodies: Vec<_> = (0..28).map(plank).collect();
+        world(hertz, -10.0, vec![StaticBody::new(GlobalId(0), floor, DVec2::ZERO)], &bodies)
+    };
+    Law {
+        name: "28 planks of 1 m x 5 cm fall at 20 m/s on a floor of 2 cm: part that stays above".to_owned(),
+        theory: 1.0,
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| {
+            let bodies = course.after(0.5)?;
+            let above = bodies.iter().filter(|body| body.position.y > 0.0).count();
+            Ok(above as f64 / bodies.len() as f64)
+        },
+    }
+}
 
 /// Smooth discs in rows in a closed room without gravity, each as fast as all others in a direction of its own.
 fn gas(hertz: f64, side: u32, apart: f64, radius: f32, speed: f32, restitution: f32) -> Start {

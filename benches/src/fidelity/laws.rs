@@ -27,11 +27,13 @@ const RADIUS: f32 = 0.25;
 pub(super) fn laws() -> Vec<Law> {
     let mut laws = Vec::new();
     for (velocity, spin) in [((5.0, -3.0), 0.0), ((10.0, -3.0), 0.0), ((0.0, -3.0), 5.0)] {
-        laws.push(wall(Vec2::from(velocity), spin));
+        laws.push(wall(Vec2::from(velocity), spin, 0.0));
     }
+    laws.push(wall(Vec2::new(10.0, -3.0), 0.0, 0.5));
     laws.extend([0.1, 0.2, 0.3, 0.4].map(discs));
     laws.push(pair());
-    laws.extend([20.0, 35.0].map(corner));
+    laws.extend([20.0, 35.0].map(|degrees| corner((1.0, 1.0), degrees, Vec2::new(0.0, -3.0))));
+    laws.push(corner((1.0, 0.6), -34.0, Vec2::new(10.0, -3.0)));
     laws.push(incline("a box slides down", 30.0, 0.3, Shape::rectangle(1.0, 1.0)));
     laws.push(incline("a disc rolls down", 20.0, FRICTION, Shape::circle(0.5)));
     for (name, shape) in [("disc", Shape::circle(RADIUS)), ("flat box", Shape::rectangle(0.5, 0.5))] {
@@ -67,16 +69,18 @@ fn rough(friction: f32) -> Material {
     Material { friction, ..Material::default() }
 }
 
-fn wall(velocity: Vec2, spin: f32) -> Law {
+fn wall(velocity: Vec2, spin: f32, restitution: f32) -> Law {
     let slip = velocity.x + spin * RADIUS;
-    let pull = (slip / 3.0).min(-FRICTION * velocity.y);
+    let pull = (slip / 3.0).min(-FRICTION * (1.0 + restitution) * velocity.y);
+    let material = Material { restitution, ..rough(FRICTION) };
     let start = move |hertz: f64, phase: f64| {
         let high = f64::from(RADIUS) - f64::from(velocity.y) / hertz * (2.0 + phase);
-        let disc = (Shape::circle(RADIUS), rough(FRICTION), DVec2::new(0.0, high), Rot::IDENTITY, velocity, spin);
+        let disc = (Shape::circle(RADIUS), material, DVec2::new(0.0, high), Rot::IDENTITY, velocity, spin);
         world(hertz, 0.0, vec![floor(rough(FRICTION))], &[disc])
     };
+    let of = if restitution > 0.0 { format!(" of restitution {restitution}") } else { String::new() };
     Law {
-        name: format!("a disc meets a wall at {velocity} m/s, turning at {spin} rad/s: spin after"),
+        name: format!("a disc{of} meets a wall at {velocity} m/s, turning at {spin} rad/s: spin after"),
         theory: f64::from(spin - 2.0 * pull / RADIUS),
         phases: PHASES,
         start: Box::new(start),
@@ -128,22 +132,28 @@ fn pair() -> Law {
     }
 }
 
-fn corner(degrees: f32) -> Law {
+/// The lowest corner of a box is stopped: where friction can hold it altogether, else it slides on.
+fn corner((width, height): (f32, f32), degrees: f32, velocity: Vec2) -> Law {
     let rotation = Rot::from_angle(degrees.to_radians());
-    let arm = rotation.rotate(Vec2::new(-0.5, -0.5));
-    let arm = if degrees < 45.0 { arm } else { rotation.rotate(Vec2::new(0.5, -0.5)) };
-    // Of a box of 1 m, whose inertia is a sixth of its mass: the impulse that stops its lowest corner.
-    let (xx, xy, yy) = (1.0 + 6.0 * arm.y * arm.y, -6.0 * arm.x * arm.y, 1.0 + 6.0 * arm.x * arm.x);
-    let velocity = Vec2::new(0.0, -3.0);
-    let impulse = Vec2::new(xy, -xx) * velocity.y / (xx * yy - xy * xy);
+    let half = 0.5 * Vec2::new(width, height);
+    let corners = [-half, Vec2::new(half.x, -half.y)].map(|corner| rotation.rotate(corner));
+    let arm = if corners[0].y < corners[1].y { corners[0] } else { corners[1] };
+    // By the mass of the box.
+    let inertia = half.length_squared() / 3.0;
+    let (xx, xy, yy) = (1.0 + arm.y * arm.y / inertia, -arm.x * arm.y / inertia, 1.0 + arm.x * arm.x / inertia);
+    let held = Vec2::new(velocity.y * xy - velocity.x * yy, velocity.x * xy - velocity.y * xx) / (xx * yy - xy * xy);
+    let pull = FRICTION.copysign(held.x);
+    let slides = held.x.abs() > FRICTION * held.y;
+    let impulse = if slides { Vec2::new(pull, 1.0) * (-velocity.y / (yy + xy * pull)) } else { held };
     let start = move |hertz: f64, phase: f64| {
-        let high = 3.0 / hertz * (2.0 + phase) - f64::from(arm.y);
-        let square = (Shape::rectangle(1.0, 1.0), rough(FRICTION), DVec2::new(0.0, high), rotation, velocity, 0.0);
+        let high = f64::from(-velocity.y) / hertz * (2.0 + phase) - f64::from(arm.y);
+        let square = (Shape::rectangle(width, height), rough(FRICTION), DVec2::new(0.0, high), rotation, velocity, 0.0);
         world(hertz, 0.0, vec![floor(rough(FRICTION))], &[square])
     };
+    let how = if slides { ", and slides on" } else { "" };
     Law {
-        name: format!("a box lands on a corner, turned by {degrees} degrees: spin after"),
-        theory: f64::from(6.0 * arm.perp_dot(impulse)),
+        name: format!("a box lands on a corner, turned by {degrees} degrees{how}: spin after"),
+        theory: f64::from(arm.perp_dot(impulse) / inertia),
         phases: PHASES,
         start: Box::new(start),
         read: |course| Ok(course.after(3.0 / course.hertz)?[0].angular_velocity.into()),
