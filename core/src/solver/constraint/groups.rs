@@ -26,8 +26,8 @@ pub(crate) struct Groups {
     pub(super) lanes: Vec<Lane>,
     /// Contacts that may bounce, of batches that keep their rows.
     pub(super) bounces: Vec<Bounce>,
-    /// The order in which they do, if it is another.
-    pub(super) bounce_order: Vec<u32>,
+    /// These contacts, ascending.
+    pub(super) bouncing: Vec<u32>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
 }

@@ -12,10 +12,10 @@ use crate::solver::bodies::SolverBodies;
 use glam::Vec2;
 
 impl Groups {
-    /// Finds the contacts that may bounce, in canonical order in each batch.
+    /// Finds the contacts that may bounce, in the order in which they do in each batch.
     pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
         self.bounces.clear();
-        self.bounce_order.clear();
+        self.bouncing.clear();
         self.bounces_at_once.clear();
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let sides = source.contacts.bodies[i];
@@ -40,30 +40,26 @@ impl Groups {
                 }
             }
         }
-        let lanes = &self.lanes;
-        self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+        self.bouncing.extend(self.bounces.iter().map(|bounce| bounce.contact));
+        let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
             // By names: then both tiles that solve a contact at their border come to the same, if they know the same.
-            let (tile, bounces) = (source.tile, &self.bounces);
-            self.bounce_order.extend(0..bounces.len() as u32);
-            self.bounce_order
-                .sort_by_cached_key(|&i| tile.pair_of(tile.contacts.keys[bounces[i as usize].contact as usize]));
+            self.bounces.sort_by_cached_key(name);
+            self.bounces_at_once.sort_by_cached_key(name);
         }
+        let lanes = &self.lanes;
+        self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
     }
 
     /// Whether a contact whose batch keeps its rows is among those.
     pub(crate) fn may_bounce(&self, contact: u32) -> bool {
-        self.bounces.binary_search_by_key(&contact, |bounce| bounce.contact).is_ok()
+        self.bouncing.binary_search(&contact).is_ok()
     }
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, bounce_order, lanes, kept, .. } = self;
-        if bounce_order.is_empty() {
-            bounce(&*bounces, lanes, kept, bodies);
-        } else {
-            bounce(bounce_order.iter().map(|&i| &bounces[i as usize]), lanes, kept, bodies);
-        }
+        let Self { bounces, lanes, kept, .. } = self;
+        bounce(bounces, lanes, kept, bodies);
     }
 
     /// Bounces of a batch that is solved at once.
@@ -76,18 +72,13 @@ impl Groups {
     }
 }
 
-/// Some passes over contacts that may bounce, in canonical order: who bounces off two others at once comes to the speeds that both want
+/// Some passes over contacts that may bounce, in their order: who bounces off two others at once comes to the speeds that both want
 /// after several. An impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and
 /// after. So with restitution 1 nothing is lost or gained where each point parts as fast as it came.
-fn bounce<'a>(
-    bounces: impl IntoIterator<Item = &'a Bounce> + Clone,
-    lanes: &[Lane],
-    columns: &mut Columns,
-    bodies: &mut SolverBodies,
-) {
+fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mut SolverBodies) {
     const PASSES: usize = 8;
     for _ in 0..PASSES {
-        for bounce in bounces.clone() {
+        for bounce in bounces {
             let at = lanes[bounce.contact as usize];
             let (sides, points, totals, lane) = at.totals_mut(columns);
             sides.bounce(points, totals, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
