@@ -216,3 +216,55 @@ fn what_is_thin_never_swings_through_what_is_thin() {
         assert!(through.is_empty(), "zigzag {is_zigzag}, {grid:?}, {exchange:?}: {through:?} came through");
     }
 }
+
+/// What strikes it is no body of a tile, so all of them rest as the step begins.
+#[test]
+fn a_ball_that_a_paddle_strikes_never_passes_a_chain_beside_it() {
+    for phase in 0..12 {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let [from, to] = [Vec2::new(0.0, 3.0), Vec2::new(0.0, -3.0)];
+        let (segment, middle) = Segment::new(None, to, from, None).unwrap();
+        let kind = Kind::new(Shape::Segment(segment), Material::default());
+        let behind = Vec2::new(0.15, 0.0);
+        scene.statics.push(StaticBody::new(GlobalId(9), kind, MIDDLE + (middle + behind).as_dvec2()));
+        let (amplitude, period) = (DVec2::new(0.25, 0.0), 0.094);
+        let travel = Travel::Sine { amplitude, period, phase: f64::from(phase) / 12.0 };
+        let paddle = Kind::new(Shape::rectangle(0.2, 1.0), Material::default());
+        let path = Some(Path { travel, turning: 0.0 });
+        scene
+            .statics
+            .push(StaticBody { path, ..StaticBody::new(GlobalId(10), paddle, MIDDLE - DVec2::new(0.35, 0.0)) });
+        let ball = scene.kind(Shape::circle(0.05), Material::default());
+        let id = scene.body(ball, MIDDLE, Vec2::ZERO);
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        for step in 0..60 {
+            sim.run(1);
+            let place = sim.body(id).position.x - MIDDLE.x;
+            assert!(place < 0.15, "phase {phase}: {place} m after step {step}");
+        }
+    }
+}
+
+/// Whoever turns about its foot is near to what it stands on all the time, and is not held for that.
+#[test]
+fn a_thin_plank_that_topples_gains_no_energy() {
+    for (length, thickness) in [(1.0_f32, 0.005_f32), (2.0, 0.01), (2.0, 0.02)] {
+        let mut scene = Scene::new(MIDDLE, -10.0);
+        let (segment, middle) = Segment::new(None, Vec2::new(-9.0, 0.0), Vec2::new(9.0, 0.0), None).unwrap();
+        let floor = Kind::new(Shape::Segment(segment), Material::default());
+        scene.statics.push(StaticBody::new(GlobalId(9), floor, MIDDLE + middle.as_dvec2()));
+        let kind = scene.kind(Shape::rectangle(thickness, length), Material::default());
+        let id = scene.body(kind, MIDDLE + DVec2::new(0.0, 0.5 * f64::from(length)), Vec2::ZERO);
+        scene.last().rotation = Rot::from_angle(-0.1);
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        let begin = sim.body(id).position.y;
+        for step in 0..120 {
+            sim.run(1);
+            let body = sim.body(id);
+            let inertia = (length * length + thickness * thickness) / 12.0;
+            let gained = 0.5 * (body.velocity.length_squared() + inertia * body.angular_velocity.powi(2));
+            let lost = 10.0 * (begin - body.position.y);
+            assert!(f64::from(gained) < 1.02 * lost + 0.03, "{length} m: {gained} of {lost} after step {step}");
+        }
+    }
+}

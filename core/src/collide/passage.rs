@@ -6,8 +6,8 @@ use crate::model::math::{Rot, dot, max, min};
 use crate::model::piece::Piece;
 use glam::Vec2;
 
-/// Steps of the search, at most. Whoever needs more has come so far.
-const ROUNDS: usize = 64;
+/// Steps of the search, at most: each goes on by such a part of the way at least, and may by so much come too deep.
+const ROUNDS: u8 = 128;
 
 /// A body comes deeper into another within a step by this part of its inner radius, and no more; and how exactly that is found.
 const DEPTH: f32 = 0.25;
@@ -91,8 +91,11 @@ impl<'a> Passage<'a> {
             if left <= EXACT * depth {
                 return part;
             }
-            part += left / bound;
+            part += max(left / bound, 1.0 / f32::from(ROUNDS));
+            if part >= 1.0 {
+                return 1.0;
+            }
         }
-        part
+        1.0
     }
 }

@@ -225,7 +225,7 @@ impl<'a> Approach<'a> {
             if bound * left < nearest.separation {
                 return None;
             }
-            // Half as if the fastest corner led, half as if the nearest point did.
+            // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };
             let speed = 0.5 * (bound + closing);
             let way = if at.manifold.is_distance() { max(nearest.separation, LEAST_WAY) } else { nearest.separation };
@@ -244,16 +244,18 @@ impl<'a> Approach<'a> {
         if at.manifold.is_distance() {
             return None;
         }
-        // Of two points the further one may be the first to touch.
+        // Of two points the further one may be the first to touch; where one is too deep, it is that one's moment.
+        let nearest = *at.manifold.nearest()?;
+        let points = if nearest.separation < 0.0 { &[nearest] } else { at.manifold.points() };
         let mut soonest = f32::INFINITY;
-        for point in at.manifold.points() {
+        for point in points {
             let closing = self.closing(&at, point.anchor);
             if closing > 0.0 {
                 soonest = min(soonest, point.separation / closing);
             }
         }
         if soonest == f32::INFINITY {
-            return (at.manifold.count > 0).then_some(at);
+            return Some(at);
         }
         let time = at.time + soonest;
         (time <= dt).then(|| self.at(max(time, 0.0), reach))
@@ -266,6 +268,9 @@ impl<'a> Approach<'a> {
         let normal = manifold.normal;
         // A second point may come down upon a static within the step, by itself or as the blow at the first turns the body: by as much
         // as that one is stopped. Between moving bodies the next step is soon enough.
+        if manifold.is_distance() {
+            return None;
+        }
         let is_fixed = self.a.kind.inv_mass * self.b.kind.inv_mass == 0.0;
         let closing = manifold.points.map(|point| self.closing(at, point.anchor));
         let mut kept = Manifold { normal, ..Manifold::EMPTY };
@@ -274,7 +279,7 @@ impl<'a> Approach<'a> {
             let closing = max(closing[k] + blow, 0.0);
             // A speed that overflows is not one that can wait for the next step.
             let ahead = if is_fixed || closing.is_infinite() { (setup.params.dt - time) * closing } else { 0.0 };
-            if point.separation < setup.params.speculative_distance + ahead && !manifold.is_distance() {
+            if point.separation < setup.params.speculative_distance + ahead {
                 kept.push(*point);
             }
         }

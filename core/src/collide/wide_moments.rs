@@ -314,7 +314,12 @@ impl<V: Wide> Pairs<V> {
             let closing = self.closing(at.anchor[point], at.offset, at.normal);
             less(zero, closing).if_positive(at.separation[point].div(closing), never)
         });
-        let soonest = at.two.if_positive(first.min(second), first);
+        // Where one is too deep, it is that one's moment.
+        let (anchor, nearest) = at.nearest();
+        let deep = less(nearest, zero);
+        let closing = self.closing(anchor, at.offset, at.normal);
+        let of_deep = less(zero, closing).if_positive(nearest.div(closing), never);
+        let soonest = deep.if_positive(of_deep, at.two.if_positive(first.min(second), first));
         let closes = less(soonest, never).mul(ending);
         let time = at.time.add(soonest);
         let exact = less(dt, time).if_positive(zero, closes);

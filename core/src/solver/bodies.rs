@@ -325,6 +325,16 @@ impl SolverBodies {
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
     }
 
+    /// Whether any has gone further than that in the step, in m, or what is so many meters from its center has. True for some that
+    /// have not quite.
+    pub(crate) fn any_moves(&self, arm: f32, least: f32) -> bool {
+        let both = self.pose.iter().zip(&self.weight);
+        both.fold(false, |any, (&[x, y, c, s], &[.., root_inv_inertia, root_inv_mass])| {
+            let turned = c.abs() + s.abs() * root_inv_inertia;
+            any | ((x.abs() + y.abs()) * root_inv_mass + arm * turned > least)
+        })
+    }
+
     /// Whether there are any that stand for statics whose surface moves.
     #[inline(always)]
     pub(crate) fn have_carriers(&self) -> bool {

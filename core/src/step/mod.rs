@@ -1,5 +1,6 @@
 //! The step, whole, from top to bottom.
 
+mod hold;
 pub(crate) mod phase;
 pub(crate) mod stage;
 
@@ -255,9 +256,9 @@ fn finalize(bench: &mut Bench<'_>) {
             b.tile.violation = solver.violation(&b.tile.contacts, b.setup);
         }
         solver.store_impulses(&mut b.tile.contacts, b.team);
-        let ways = far::ways(b.tile, &solver.bodies, b.setup);
+        let ways = hold::ways(b.tile, &solver.bodies, b.setup);
         solver::write_back(b.tile, &solver.bodies, b.setup, b.team);
-        far::hold(b.tile, &ways, b.setup, b.step);
+        hold::hold(b.tile, &ways, b.setup, b.step);
         b.tile.count_rest(b.setup);
         if let Some(figures) = &mut b.figures {
             figures.add_bodies(b.tile, b.setup, b.team);

@@ -71,14 +71,28 @@ fn is_choosy(kind: &KindRow) -> bool {
     kind.sensor || kind.filter != Filter::default()
 }
 
-/// The least inner radius of some kinds that touch anything, in meters.
-fn thinnest(kinds: &[KindRow]) -> f32 {
-    kinds.iter().filter(|kind| !kind.sensor).map(|kind| kind.inner_radius).fold(f32::INFINITY, math::min)
+/// How thin and how long anything is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slimness {
+    /// The least inner radius of a static that is no sensor, in meters; infinite where there is none.
+    pub(crate) of_statics: f32,
+    /// The least sum of that of such a static and of a dynamic body, in meters.
+    pub(crate) of_both: f32,
+    /// How far from its center anything lies of a dynamic body that is not round, at most, in meters.
+    pub(crate) longest_arm: f32,
 }
 
-/// How far from its center anything lies of a body that is not round, at most, in meters.
-fn longest_arm(kinds: &[KindRow]) -> f32 {
-    kinds.iter().map(|kind| kind.not_round * kind.bounding_radius).fold(0.0, math::max)
+impl Slimness {
+    /// Of dynamic kinds, and those of statics behind them.
+    fn of(kinds: &[KindRow], dynamic_kinds: usize) -> Self {
+        let (own, fixed) = kinds.split_at(dynamic_kinds);
+        let least = |kinds: &[KindRow]| {
+            kinds.iter().filter(|kind| !kind.sensor).map(|kind| kind.inner_radius).fold(f32::INFINITY, math::min)
+        };
+        let of_statics = least(fixed);
+        let longest_arm = own.iter().map(|kind| kind.not_round * kind.bounding_radius).fold(0.0, math::max);
+        Self { of_statics, of_both: least(own) + of_statics, longest_arm }
+    }
 }
 
 /// How the bodies of each kind move by themselves; empty if all do alike.
@@ -118,12 +132,7 @@ pub(crate) struct Setup {
     pub(crate) static_softness: Softness,
     /// Whether anything bounces.
     pub(crate) bouncy: bool,
-    /// The least inner radius of a static, in meters.
-    pub(crate) thinnest: f32,
-    /// The least sum of the inner radii of a dynamic body and of a static, in meters.
-    pub(crate) least_passage: f32,
-    /// How far from its center anything lies of a dynamic body that is not round, at most, in meters.
-    pub(crate) longest_arm: f32,
+    pub(crate) slimness: Slimness,
     /// Whether there are bodies that do not touch all others.
     pub(crate) filters: bool,
     /// Whether there are shapes of several pieces.
@@ -184,8 +193,6 @@ impl Setup {
         let filters = kinds.iter().any(is_choosy);
         let compounds = kinds.iter().any(KindRow::is_compound);
         let factors = factors(&kinds[..dynamic_kinds], &params);
-        let (own, fixed) = kinds.split_at(dynamic_kinds);
-        let thinnest = thinnest(fixed);
         Ok(Self {
             partition: blueprint.partition.clone(),
             halo_width,
@@ -197,9 +204,7 @@ impl Setup {
             softness: Softness::contact(&params),
             static_softness: Softness::static_contact(&params),
             bouncy,
-            thinnest,
-            least_passage: self::thinnest(own) + thinnest,
-            longest_arm: longest_arm(own),
+            slimness: Slimness::of(&kinds, dynamic_kinds),
             filters,
             compounds,
             factors,
@@ -234,8 +239,7 @@ impl Setup {
         setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
         setup.bouncy |= kind.material.restitution > 0.0;
         setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
-        let own = &setup.kinds[..setup.dynamic_kinds];
-        (setup.least_passage, setup.longest_arm) = (thinnest(own) + setup.thinnest, longest_arm(own));
+        setup.slimness = Slimness::of(&setup.kinds, setup.dynamic_kinds);
         setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
         setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
         Ok(setup)

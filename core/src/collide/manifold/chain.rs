@@ -17,11 +17,11 @@ const SAME: f32 = 1e-5;
 /// What is further makes no contact yet, in m.
 const FAR: f32 = 0.05;
 
-/// The distance of a piece from an end of a segment, and their manifold.
-type AtEnd = Option<(f32, Manifold)>;
-
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
 const BEYOND: f32 = 1e-5;
+
+/// The distance of a piece from an end of a segment, and their manifold.
+type AtEnd = Option<(f32, Manifold)>;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
 /// the piece. What has no contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
@@ -79,7 +79,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         (Some(over), None, _) => over,
         (None, Some((_, at_end)), _) => at_end,
         (None, None, Some((_, nearest))) => nearest,
-        (None, None, None) => Manifold::EMPTY,
+        (None, None, None) => touched.map_or(Manifold::EMPTY, |(_, at_end)| at_end),
     }
 }
 

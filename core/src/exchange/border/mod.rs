@@ -1,5 +1,5 @@
 //! The sync points within a step, for `exchange = "substep"`: ghosts are refreshed after every substep, and what both
-//! owners of a border contact found is averaged once at the end.
+//! owners of a border contact found is averaged at the end; where something bounces, before and after that.
 //!
 //! Who hears what follows from contacts and from who is near whom. Both owners of a border contact hold it, made from the same
 //! bits, so each hears of the other's body. What a tile solves for others (see [`overlap`](super::overlap)) it may remember

@@ -32,7 +32,7 @@ impl Bounds {
 }
 
 /// All statics, to find those that sweep over a rectangle in a step.
-pub(super) struct StaticsByPlace<'a> {
+pub(crate) struct StaticsByPlace<'a> {
     setup: &'a Setup,
     step: u64,
     /// Those that the terrain does not find.
@@ -40,7 +40,7 @@ pub(super) struct StaticsByPlace<'a> {
 }
 
 impl<'a> StaticsByPlace<'a> {
-    pub(super) fn new(setup: &'a Setup, step: u64) -> Self {
+    pub(crate) fn new(setup: &'a Setup, step: u64) -> Self {
         let bounds = |&row: &u32| {
             let [low, high] = setup.static_box(row, step);
             (row as usize, low, high)
@@ -49,7 +49,7 @@ impl<'a> StaticsByPlace<'a> {
     }
 
     /// Adds the rows of those that meet a rectangle, in any order, and maybe more than once.
-    pub(super) fn meeting(&self, low: DVec2, high: DVec2, rows: &mut Vec<u32>) {
+    pub(crate) fn meeting(&self, low: DVec2, high: DVec2, rows: &mut Vec<u32>) {
         rows.extend(self.others.meeting(low, high).map(|row| row as u32));
         self.setup.terrain.meeting(low, high, |row| {
             let meets = |[own_low, own_high]: [DVec2; 2]| own_low.cmple(high).all() && own_high.cmpge(low).all();

@@ -9,17 +9,13 @@
 //! others. So a small one is sent by its owner alone, with its unseen impulse. Of each other, of statics and of what goes far, large
 //! bodies and their tiles know by a halo that is as wide as the largest needs it.
 //!
-//! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands
-//! there; so whoever has gone so far, or turned so, that it could, is held back, after the step, where it met a static.
-//!
 //! Not seen: two that go far, from tiles apart, that meet over a tile where nobody is; and it may be that one of their tiles knows
 //! of it alone.
 
 mod bounds;
-mod hold;
 mod unseen;
 
-pub(crate) use hold::{hold, ways};
+pub(crate) use bounds::StaticsByPlace;
 
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
@@ -32,13 +28,13 @@ use crate::tiling::partition::Region;
 use crate::tiling::statics::surroundings;
 use crate::tiling::terrain::ascend;
 use crate::tiling::tile::Tile;
-use bounds::{Bounds, StaticsByPlace};
+use bounds::Bounds;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 use unseen::unseen_of;
 
 /// Whether some bodies' velocities take one of them far. Without a branch, as hardly ever does one.
-fn any(velocities: &[Vec2], setup: &Setup) -> bool {
+pub(crate) fn any(velocities: &[Vec2], setup: &Setup) -> bool {
     velocities.iter().fold(false, |any, &velocity| any | setup.goes_far(velocity))
 }
 

@@ -145,7 +145,8 @@ impl Sides {
         let pressed = [0, 1].map(|k| totals.get(k).is_some_and(|totals| totals.normal[lane] > 0.0));
         self.bounce_along_normals(points, totals, lane, answers, velocity);
         for (k, (point, totals)) in points.iter().zip(totals).enumerate() {
-            if pressed[k] && answers[k] != Answer::Rest {
+            // What was not to bounce yet, and keeps its impulse, keeps its friction.
+            if pressed[k] && (matches!(answers[k], Answer::Part(_)) || totals.normal[lane] == 0.0) {
                 self.rub(point, totals, lane, velocity);
             }
         }

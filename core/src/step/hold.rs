@@ -1,0 +1,93 @@
+//! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands there;
+//! so whoever has gone so far, or turned so, that it could, is held back, after the step, where it met a static.
+
+use crate::collide::passage::Passage;
+use crate::exchange::far::{self, StaticsByPlace};
+use crate::model::body::Body;
+use crate::model::kind::KindRow;
+use crate::model::math::{Rot, dot};
+use crate::solver::SolverBodies;
+use crate::tiling::blueprint::Setup;
+use crate::tiling::terrain::ascend;
+use crate::tiling::tile::Tile;
+use glam::{DVec2, Vec2};
+
+/// A body that may come to the other side of something in this step, and how it begins it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    row: usize,
+    start: DVec2,
+    rotation: Rot,
+}
+
+/// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed.
+pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way> {
+    let bodies = &tile.bodies;
+    let slimness = &setup.slimness;
+    // Looser than what is asked of each below, so that nothing depends on who shares a tile.
+    let any_moves = solved.any_moves(slimness.longest_arm, 0.49 * slimness.of_both);
+    if setup.statics.is_empty() || !any_moves && !far::any(&bodies.velocity[..tile.owned], setup) {
+        return Vec::new();
+    }
+    let may = |&row: &usize| {
+        let kind = setup.kind(bodies.kind[row]);
+        let passes = |(moved, turned): (Vec2, f32)| {
+            let swept = kind.not_round * kind.bounding_radius * turned;
+            dot(moved, moved).sqrt() + swept > 0.5 * (kind.inner_radius + slimness.of_statics)
+        };
+        setup.goes_far(bodies.velocity[row]) || solved.moved(row).is_some_and(passes)
+    };
+    let way = |row| Way { row, start: bodies.position[row], rotation: bodies.rotation[row] };
+    (0..tile.owned).filter(may).map(way).collect()
+}
+
+/// Takes bodies back to where they come to lie too deep in a static: of what they are thrown against they had no contact. Velocities
+/// stay: the next step has the contact, and goes on from there.
+///
+/// Source: continuous collision against statics after the solver, as in Box2D v3 (E. Catto), which a body pays for with time.
+pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
+    if ways.is_empty() {
+        return;
+    }
+    let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
+    for &Way { row, start, rotation } in ways {
+        let body = tile.bodies.get(row);
+        let (kind, whole) = (setup.kind(body.kind), body.position - start);
+        let passage = Passage::new(kind, [rotation, body.rotation], whole.as_vec2());
+        let (half, middle) = (DVec2::splat(kind.bounding_radius.into()) + 0.5 * whole.abs(), start + 0.5 * whole);
+        let mut held: Option<(f32, [Body; 2])> = None;
+        statics.meeting(middle - half, middle + half, &mut met);
+        ascend(&mut met);
+        for fixed in met.drain(..) {
+            let course = [step, step + 1].map(|step| setup.static_at(fixed, step));
+            let other = setup.kind(course[0].kind);
+            if kind.touches(other) {
+                let part = passage.free_part(&passage_of(other, &course), (course[0].position - start).as_vec2());
+                if part < held.map_or(1.0, |(least, _)| least) {
+                    held = Some((part, course));
+                }
+            }
+        }
+        if let Some((part, course)) = held {
+            tile.rim.is_known = false;
+            tile.bodies.position[row] = carried(start + whole * f64::from(part), part, &course, setup);
+            tile.bodies.rotation[row] = passage.rotation_at(part);
+        }
+    }
+}
+
+/// The passage of a static, given where it is as the step begins and as it ends.
+fn passage_of<'a>(kind: &'a KindRow, [now, then]: &[Body; 2]) -> Passage<'a> {
+    Passage::new(kind, [now.rotation, then.rotation], (then.position - now.position).as_vec2())
+}
+
+/// Where a body ends that met a static after a part of the step, and goes with it from then on.
+fn carried(place: DVec2, part: f32, course: &[Body; 2], setup: &Setup) -> DVec2 {
+    let [now, then] = course;
+    if now.position == then.position && now.rotation == then.rotation {
+        return place;
+    }
+    let met = now.position + (then.position - now.position) * f64::from(part);
+    let turning = passage_of(setup.kind(now.kind), course).rotation_at(part).to(then.rotation);
+    then.position + turning.rotate((place - met).as_vec2()).as_dvec2()
+}
