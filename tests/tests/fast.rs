@@ -217,34 +217,6 @@ fn what_is_thin_never_swings_through_what_is_thin() {
     }
 }
 
-/// What strikes it is no body of a tile, so all of them rest as the step begins.
-#[test]
-fn a_ball_that_a_paddle_strikes_never_passes_a_chain_beside_it() {
-    for phase in 0..12 {
-        let mut scene = Scene::new(MIDDLE, 0.0);
-        let [from, to] = [Vec2::new(0.0, 3.0), Vec2::new(0.0, -3.0)];
-        let (segment, middle) = Segment::new(None, to, from, None).unwrap();
-        let kind = Kind::new(Shape::Segment(segment), Material::default());
-        let behind = Vec2::new(0.15, 0.0);
-        scene.statics.push(StaticBody::new(GlobalId(9), kind, MIDDLE + (middle + behind).as_dvec2()));
-        let (amplitude, period) = (DVec2::new(0.25, 0.0), 0.094);
-        let travel = Travel::Sine { amplitude, period, phase: f64::from(phase) / 12.0 };
-        let paddle = Kind::new(Shape::rectangle(0.2, 1.0), Material::default());
-        let path = Some(Path { travel, turning: 0.0 });
-        scene
-            .statics
-            .push(StaticBody { path, ..StaticBody::new(GlobalId(10), paddle, MIDDLE - DVec2::new(0.35, 0.0)) });
-        let ball = scene.kind(Shape::circle(0.05), Material::default());
-        let id = scene.body(ball, MIDDLE, Vec2::ZERO);
-        let mut sim = scene.start_on((1, 1), Exchange::Step);
-        for step in 0..60 {
-            sim.run(1);
-            let place = sim.body(id).position.x - MIDDLE.x;
-            assert!(place < 0.15, "phase {phase}: {place} m after step {step}");
-        }
-    }
-}
-
 /// Whoever turns about its foot is near to what it stands on all the time, and is not held for that.
 #[test]
 fn a_thin_plank_that_topples_gains_no_energy() {
