@@ -233,3 +233,33 @@ fn what_slides_and_what_rolls_gains_the_speed_that_theory_gives() {
         }
     }
 }
+
+/// Whoever lands flat stays down, whichever of both ends friction presses, and slides on by what that leaves.
+#[test]
+fn a_box_that_lands_flat_stays_down() {
+    for ((width, height), speed, solver) in [
+        ((1.0, 1.0), 10.0, Solver::SoftStep),
+        ((1.0, 1.0), 1.0, Solver::SoftStep),
+        ((2.0, 0.3), -10.0, Solver::SoftStep),
+        ((0.9, 1.0), 6.0, Solver::SoftStep),
+        ((1.0, 1.0), 10.0, Solver::Pgs),
+    ] {
+        let fall = 3.0_f32;
+        let expected = speed - (FRICTION * fall).min(f32::abs(speed)).copysign(speed);
+        for phase in 0..PHASES {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            scene.params.solver = solver;
+            scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (30.0, 2.0), 0.0, rough());
+            let kind = scene.kind(Shape::rectangle(width, height), rough());
+            let gap = fall * scene.params.dt * (2.0 + phase as f32 / PHASES as f32);
+            let place = MIDDLE + DVec2::new(0.0, (0.5 * height + gap).into());
+            let id = scene.body(kind, place, Vec2::new(speed, -fall));
+            let mut sim = start(&scene);
+            sim.run(6);
+            let body = sim.body(id);
+            let off = [body.velocity.x - expected, body.velocity.y, 0.5 * body.angular_velocity];
+            let what = format!("{width} x {height} m at {speed} m/s, {solver:?}, phase {phase}");
+            assert!(off.iter().all(|off| off.abs() < 0.05 * fall), "{what}: {off:?}");
+        }
+    }
+}

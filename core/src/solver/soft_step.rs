@@ -112,7 +112,7 @@ impl<const BOUNCY: bool> Pass for Relax<BOUNCY> {
         let zero = V::splat(0.0);
         normals.part(&mut group.points, &pose_a, &pose_b);
         let friction = V::load(&group.sides.friction);
-        normals.push(
+        normals.push_until_settled(
             &mut group.points,
             friction,
             &mut a,
