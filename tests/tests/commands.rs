@@ -281,6 +281,25 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
             assert!(ended.stderr.contains("left out") && ended.stdout.contains("499, 0 lost"), "{text}: {ended}");
         }
     }
+    // Whoever drives need not say when, and is told what else is wrong.
+    for (line, expected) in [
+        (
+            "{\"add\": {\"x\": 1e10, \"y\": 3}}\n",
+            "what was said: line 1: step 0: add, x = 1e10: must be within -1e9 to 1e9 m",
+        ),
+        ("{\"remve\": 40}\n", "what was said: line 1: step 0: unknown field `remve`, expected one of"),
+        ("{\"remove\": 2}\n", "what was said: line 1: step 0: there is no body 2"),
+        ("{\"until\": 3, \"remove\": 40}\n", "what was said: line 1: step 0: until stands by itself"),
+    ] {
+        let (heard, mut said) = std::io::pipe().unwrap();
+        said.write_all(line.as_bytes()).unwrap();
+        drop(said);
+        let mut command = Way::Channel.command(2, CONFIG);
+        command.args(["--quiet", "--steps", "6", "--bodies", "500", "--commands", "-"]).stdin(heard);
+        let ended = program::run(&mut command);
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{line}: {ended}");
+        assert!(ended.stderr.contains(expected), "{line}: {ended}");
+    }
     let ended = start("{\"step\": 6, \"remove\": 40}\n{\"step\": 9, \"remove\": 41}\n", &[]);
     assert!(ended.stderr.contains("2 lines are for steps from 6 on, which were not made"), "{ended}");
     assert_eq!(ended.code, Some(0), "{ended}");

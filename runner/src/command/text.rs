@@ -199,12 +199,15 @@ struct RectangleText {
 const ACTIONS: &str = "add, remove, velocity, impulse, force, kind, add_kind, gravity, wake, ray, rectangle, point, \
                        touching, inside, body, contacts or sensors";
 
+/// Why nobody else may say until when nothing more will be said.
+pub(crate) const NO_UNTIL: &str = "until is for whoever drives a run by --commands -; leave it out";
+
 /// Reads a line of a file. The error is what is wrong with it.
 pub(crate) fn parse(number: u64, text: &str) -> Result<Line, String> {
     let raw = read(text)?;
     let step = raw.step.ok_or("it has no step: give the number of steps that are made when it is its turn")?;
     if raw.until.is_some() {
-        return Err("until is for whoever drives a run by --commands -; leave it out".to_owned());
+        return Err(NO_UNTIL.to_owned());
     }
     Ok(Line { step, number, name: raw.name.clone(), action: action(raw)? })
 }

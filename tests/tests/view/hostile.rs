@@ -134,6 +134,18 @@ fn a_run_is_unharmed_by_whoever_means_ill() {
     page.wish(&json!({ "do": "pause" }));
     page.look(domain(&hello), [640, 480], "speed");
     page.frame().unwrap();
+    // What cannot be done is told and left out, whatever is wrong with it.
+    let lines = [
+        "{\"remove\": 99999999}",
+        "{\"add\": {\"x\": 1e10,\n\"y\": 0}}",
+        "{\"remve\": 4}",
+        "{\"until\": 9}",
+        "",
+        "\n\u{1b}[2J",
+    ];
+    for line in lines {
+        page.wish(&json!({ "do": "command", "line": line }));
+    }
 
     // Says that a gigabyte comes, and begins to send it.
     let mut greedy = bare_socket(&served);
@@ -166,6 +178,8 @@ fn a_run_is_unharmed_by_whoever_means_ill() {
     drop(page);
     let ended = served.end();
     assert_eq!(ended.code, Some(0), "{ended}");
+    assert_eq!(ended.stderr.matches("; left out").count(), lines.len(), "{ended}");
+    assert!(ended.stderr.contains(": add, x = 1e10: must be within"), "{ended}");
     drop((idle, deaf));
     let watched = program::summary(&json);
     for key in ["state_hash", "contact_hash", "steps"] {

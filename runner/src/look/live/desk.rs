@@ -3,6 +3,7 @@
 
 use super::protocol::{Gaze, Say, Wish};
 use crate::command::{Word, word};
+use crate::wording::OneLine;
 use std::collections::BTreeMap;
 use std::mem::discriminant;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -298,11 +299,13 @@ impl Desk {
         // What there is to see is not what it was after as many steps.
         inner.pages.values_mut().for_each(|page| page.seen = None);
         drop(inner);
-        let line = |line: String| match word(0, &line, steps) {
-            Ok(Word::Line(_, text)) => format!("0\t{text}\n"),
-            _ => String::new(),
+        let line = |line: &String| {
+            let line = OneLine(line).to_string();
+            // All ranks will say what is wrong with it.
+            let line = if let Ok(Word::Line(_, line)) = word(0, &line, steps) { line } else { line };
+            format!("0\t{line}\n")
         };
-        Some(commands.into_iter().map(line).collect::<String>().into_bytes())
+        Some(commands.iter().map(line).collect::<String>().into_bytes())
     }
 
     /// How time is to go on; what was to be done once is taken.
@@ -448,6 +451,19 @@ mod tests {
         desk.close(other);
         assert_eq!(desk.take_pace(), Pace { playing: true, times: 0.0, by: 0, seek: None });
         assert_eq!(desk.picked(), None);
+    }
+
+    #[test]
+    fn what_pages_want_done_is_a_line_each_though_it_cannot_be_read() {
+        let desk = Desk::new(true, 0.0);
+        let page = desk.open().unwrap();
+        assert_eq!(desk.take_commands(7), None);
+        for line in ["{\"remove\":\n3}", "{\"add\": {\"x\": 1e10,\n\"y\": 0}}", "{\"until\": 9}"] {
+            desk.hear(page, Wish::Command { line: line.to_owned() });
+        }
+        let expected = "0\t{\"step\":7,\"remove\":3}\n0\t{\"add\": {\"x\": 1e10, \"y\": 0}}\n0\t{\"until\": 9}\n";
+        assert_eq!(desk.take_commands(7), Some(expected.as_bytes().to_vec()));
+        assert!(!desk.has_commands());
     }
 
     #[test]

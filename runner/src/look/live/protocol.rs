@@ -17,7 +17,6 @@
 //! | 12 bytes each | bodies: [`Dot`] |
 
 use super::super::picture::{ColorBy, View};
-use crate::command::{Word, word};
 use crate::folder::in_letters;
 use crate::scene::record::PathText;
 use atoll_core::{Partition, Region, TileId};
@@ -97,7 +96,6 @@ impl Wish {
             }
             Self::Speed { times } => (0.0..=1e6).contains(times),
             Self::Pick { at, .. } => at.iter().all(|x| x.is_finite()),
-            Self::Command { line } => matches!(word(0, line, 0), Ok(Word::Line(..))),
             _ => true,
         };
         sound.then_some(wish)

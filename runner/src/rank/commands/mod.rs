@@ -7,7 +7,7 @@ mod presence;
 use super::halo::RankHalo;
 use super::trouble::all_well;
 use super::{Observer, RankError, unreadable};
-use crate::command::{Action, Answer, Event, Line, NewBody, Part, Question, State, parse};
+use crate::command::{Action, Answer, Event, Line, NO_UNTIL, NewBody, Part, Question, State, Word, word};
 use crate::error::{Exit, RunError};
 use crate::folder::AnswersFile;
 use crate::folder::durable::write_durably;
@@ -197,21 +197,22 @@ impl Commander {
         let (source, step) = (LIVE, world.step_count());
         for text in String::from_utf8_lossy(words).lines() {
             let (number, text) = text.split_once('\t').unwrap_or(("0", text));
-            let line = parse(number.parse().unwrap_or(0), text).and_then(|line| match line.action {
-                _ if line.step != step => Err(format!("{} steps are made, and it is for step {}", step, line.step)),
-                _ => Ok(line),
+            let number = number.parse().unwrap_or(0);
+            let line = word(number, text, step).and_then(|word| match word {
+                Word::Line(line, _) if line.step == step => Ok(line),
+                Word::Line(line, _) => Err(format!("{step} steps are made, and it is for step {}", line.step)),
+                Word::Until(_) => Err(NO_UNTIL.to_owned()),
             });
             match line {
                 Ok(line) if step >= self.steps && !matches!(line.action, Action::Ask(_)) => {
-                    let text =
-                        format!("{source}: line {}: all steps are made, and nothing can be done any more", line.number);
+                    let text = format!("{source}: line {number}: all steps are made, and nothing can be done any more");
                     self.tell(step, None, Answer::Refused(&text));
                 }
                 Ok(line) => {
                     self.write_down(text);
                     self.obey(&[line], source, world, transport, observer)?;
                 }
-                Err(reason) => self.refuse(source, number.parse().unwrap_or(0), step, &reason, observer)?,
+                Err(reason) => self.refuse(source, number, step, &reason, observer)?,
             }
         }
         Ok(())
