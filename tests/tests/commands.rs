@@ -265,7 +265,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         ),
         ("{\"step\": 3, \"add\": {\"kind\": 9, \"x\": 1, \"y\": 1}}\n", "its kind a row of the table"),
         ("{\"step\": 3, \"kind\": {\"id\": 60, \"kind\": 9}}\n", "line 2: step 3: body 60: there is no kind 9"),
-        (crowd.as_str(), "line 2: step 3: more than 1000 bodies would come to 5, 5 at once, where every two"),
+        (crowd.as_str(), "line 2: step 3: more than 1000 bodies would come to 5.0, 5.0 at once, where every two"),
         ("{\"step\": 3, \"gravity\": [0, 1e39]}\n", "line 2"),
         ("{\"step\": 3, \"velocity\": {\"id\": 60, \"vx\": 1e39, \"vy\": 0}}\n", "line 2: step 3: body 60: velocities"),
         ("{\"step\": 3, \"remve\": 40}\n", "c.jsonl: line 2: unknown field `remve`, expected one of"),

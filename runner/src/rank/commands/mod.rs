@@ -278,7 +278,7 @@ impl Commander {
             }
             self.answer(&std::mem::take(&mut asked), world, transport)?;
             let commands = match &line.action {
-                Action::Add(bodies) => self.crowds.check(bodies, step).and_then(|()| self.name(bodies)),
+                Action::Add(bodies) => self.crowds.check(bodies).and_then(|()| self.name(bodies)),
                 Action::Do(commands) => Ok(commands.clone()),
                 Action::Tell(event, is_told) => {
                     self.state.tell(*event, *is_told);
@@ -300,12 +300,12 @@ impl Commander {
                 self.state.note(command, step);
                 self.is_used = true;
             }
-            if let Action::Add(bodies) = &line.action {
-                self.crowds.note(bodies);
-                if line.name.is_some() || bodies.iter().any(|new| !new.is_named) {
-                    let ids: Vec<u64> = commands.iter().filter_map(added).map(|id| id.0).collect();
-                    self.tell(step, line.name.as_deref(), Answer::Added(&ids));
-                }
+            self.crowds.note(&commands);
+            if let Action::Add(bodies) = &line.action
+                && (line.name.is_some() || bodies.iter().any(|new| !new.is_named))
+            {
+                let ids: Vec<u64> = commands.iter().filter_map(added).map(|id| id.0).collect();
+                self.tell(step, line.name.as_deref(), Answer::Added(&ids));
             }
         }
         self.answer(&asked, world, transport)
@@ -386,6 +386,7 @@ impl Commander {
         world: &World,
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
+        self.crowds = Crowds::default();
         if !Event::ALL.iter().any(|&event| self.state.tells(event)) {
             return Ok(());
         }

@@ -82,29 +82,27 @@ pub(super) fn check(commands: &[Command], present: &mut Present, world: &World) 
     Ok(())
 }
 
-/// How many bodies came to each place before the next step, by lines that were done.
+/// Which bodies came before the next step and are still there, by lines that were done.
 #[derive(Default)]
 pub(super) struct Crowds {
-    /// Steps made.
-    step: u64,
-    places: BTreeMap<[u64; 2], usize>,
+    /// Where each is.
+    places: BTreeMap<GlobalId, [u64; 2]>,
+    /// How many there are at each place.
+    counts: BTreeMap<[u64; 2], usize>,
 }
 
 impl Crowds {
     /// Whether so many may come beside those that came: no more to one place than the file of a scene may have there. The error is
     /// why not.
-    pub(super) fn check(&mut self, bodies: &[NewBody], step: u64) -> Result<(), String> {
-        if self.step != step {
-            *self = Self { step, ..Self::default() };
-        }
+    pub(super) fn check(&self, bodies: &[NewBody]) -> Result<(), String> {
         let mut more: BTreeMap<[u64; 2], usize> = BTreeMap::new();
         for place in bodies.iter().map(|new| place_of(&new.body)) {
             let count = more.entry(place).or_default();
             *count += 1;
-            if *count + self.places.get(&place).copied().unwrap_or_default() > MOST_AT_A_PLACE {
+            if *count + self.counts.get(&place).copied().unwrap_or_default() > MOST_AT_A_PLACE {
                 let [x, y] = place.map(f64::from_bits);
                 return Err(format!(
-                    "more than {MOST_AT_A_PLACE} bodies would come to {x}, {y} at once, where every two of them would be a \
+                    "more than {MOST_AT_A_PLACE} bodies would come to {x:?}, {y:?} at once, where every two of them would be a \
                      contact; give each a place of its own"
                 ));
             }
@@ -112,9 +110,22 @@ impl Crowds {
         Ok(())
     }
 
-    /// That they came.
-    pub(super) fn note(&mut self, bodies: &[NewBody]) {
-        bodies.iter().for_each(|new| *self.places.entry(place_of(&new.body)).or_default() += 1);
+    /// That these were done.
+    pub(super) fn note(&mut self, commands: &[Command]) {
+        for command in commands {
+            match command {
+                Command::Add(body) => {
+                    let place = place_of(body);
+                    self.places.insert(body.id, place);
+                    *self.counts.entry(place).or_default() += 1;
+                }
+                Command::Remove(id) => {
+                    let count = self.places.remove(id).and_then(|place| self.counts.get_mut(&place));
+                    count.into_iter().for_each(|count| *count -= 1);
+                }
+                _ => {}
+            }
+        }
     }
 }
 
@@ -134,15 +145,21 @@ mod tests {
 
     #[test]
     fn lines_of_one_step_crowd_a_place_together() {
-        let at = |x: f64, count: usize| {
-            let body = Body::at_rest(GlobalId(0), KindId(0), DVec2::new(x, 0.5));
-            vec![NewBody { is_named: false, body }; count]
+        let at = |x: f64, count: u64| -> Vec<NewBody> {
+            let body = |id| Body::at_rest(GlobalId(id), KindId(0), DVec2::new(x, 1e-300));
+            (0..count).map(|id| NewBody { is_named: true, body: body(id) }).collect()
         };
         let mut crowds = Crowds::default();
-        assert_eq!(crowds.check(&at(1.0, 1000), 3), Ok(()));
-        crowds.note(&at(1.0, 1000));
-        assert_eq!(crowds.check(&at(2.0, 1000), 3), Ok(()));
-        assert!(crowds.check(&at(1.0, 1), 3).unwrap_err().starts_with("more than 1000 bodies would come to 1, 0.5 at"));
-        assert_eq!(crowds.check(&at(1.0, 1), 4), Ok(()));
+        assert_eq!(crowds.check(&at(0.0, 1000)), Ok(()));
+        crowds.note(&at(0.0, 1000).iter().map(|new| Command::Add(new.body)).collect::<Vec<_>>());
+        assert_eq!(crowds.check(&at(2.0, 1000)), Ok(()));
+        for x in [0.0, -0.0] {
+            let told = crowds.check(&at(x, 1)).unwrap_err();
+            assert!(told.starts_with("more than 1000 bodies would come to 0.0, 1e-300 at once"), "{told}");
+        }
+        // Who is gone again makes room, once.
+        crowds.note(&[Command::Remove(GlobalId(7)), Command::Remove(GlobalId(7)), Command::Remove(GlobalId(5000))]);
+        assert_eq!(crowds.check(&at(0.0, 1)), Ok(()));
+        assert!(crowds.check(&at(0.0, 2)).is_err());
     }
 }

@@ -52,9 +52,9 @@ use toml::Table;
 /// More bodies than this at one and the same place are no scene that can be computed.
 pub(crate) const MOST_AT_A_PLACE: usize = 1000;
 
-/// Where a body is, as something to sort by.
+/// Where a body is, as something to sort by; 0 and -0 are one place.
 pub(crate) fn place_of(body: &Body) -> [u64; 2] {
-    body.position.to_array().map(f64::to_bits)
+    body.position.to_array().map(|at| (at + 0.0).to_bits())
 }
 
 /// The text of a scene may have so many bytes: more bodies belong into a file of their own.
@@ -317,7 +317,7 @@ impl SceneFile {
         let crowd = crowds.max_by_key(|crowd| crowd.len())?;
         let ([x, y], count) = (crowd[0].map(f64::from_bits), crowd.len());
         let reason = format!(
-            "{count} bodies have their center at {x}, {y}, where every two of them would be a contact, and at most {MOST_AT_A_PLACE} \
+            "{count} bodies have their center at {x:?}, {y:?}, where every two of them would be a contact, and at most {MOST_AT_A_PLACE} \
              may: give each a place of its own, with all digits that tell it from the others"
         );
         Some(SceneError::whole(self.bodies_path().unwrap_or(&self.path), reason))
