@@ -3,6 +3,7 @@
 use super::super::{Place, SceneError};
 use crate::wording::{did_you_mean, nearest};
 use glam::{DVec2, Vec2};
+use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -109,7 +110,9 @@ impl<'a> Entries<'a> {
         let hint = if suggestion.is_some() {
             did_you_mean(&suggestion)
         } else {
-            format!("; there are {}", self.known.join(", "))
+            let mut told = BTreeSet::new();
+            let known: Vec<&str> = self.known.iter().copied().filter(|key| told.insert(*key)).collect();
+            format!("; there are {}", known.join(", "))
         };
         Err(self.refuse(key, format!("unknown key{hint}")))
     }

@@ -1,7 +1,7 @@
 //! Kinds as scenes and commands say them: a shape, what it is made of, how it moves, and whom it touches.
 
 use super::super::SceneError;
-use super::entries::{Entries, float, pair};
+use super::entries::{Entries, float, number, pair};
 use super::row::is_turn;
 use atoll_core::{Dynamics, Filter, Kind, Material, Part, Rot, Shape};
 use glam::Vec2;
@@ -45,7 +45,6 @@ pub(super) fn kinds(file: &Path, tables: &[&Table]) -> Result<(Vec<Kind>, Vec<Op
         }
         kinds.push(of_bodies(&mut entries)?);
         names.push(name.map(str::to_owned));
-        entries.finish()?;
     }
     Ok((kinds, names))
 }
@@ -53,11 +52,10 @@ pub(super) fn kinds(file: &Path, tables: &[&Table]) -> Result<(Vec<Kind>, Vec<Op
 /// Reads a kind that comes while a run goes on. The error is what is wrong with it.
 pub(crate) fn of_command(table: &Table) -> Result<Kind, String> {
     let mut entries = Entries::new(Path::new(""), "add_kind".to_owned(), table);
-    let kind = of_bodies(&mut entries).and_then(|kind| entries.finish().map(|()| kind));
-    kind.map_err(|error| error.without_file())
+    of_bodies(&mut entries).map_err(|error| error.without_file())
 }
 
-/// A kind of bodies that move.
+/// A kind of bodies that move: all that is left to be read.
 fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
     if let Some(key) = OF_STATICS.into_iter().find(|key| entries.has(key)) {
         return Err(entries.refuse(key, "is for [[statics]] alone; here, give a capsule or parts"));
@@ -67,13 +65,12 @@ fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
     if kind.material.surface_speed != 0.0 {
         return Err(entries.refuse("surface_speed", "is for [[statics]] alone; leave it out"));
     }
+    entries.finish()?;
     // As the physics reckons them.
     let (area, per_mass) = (kind.shape.area(), kind.shape.inertia_per_mass());
     let has_mass = |density: f32| is_normal(density * area) && is_normal(density * area * per_mass);
     if !has_mass(kind.material.density) {
-        let has = |key: &&str| entries.has(key);
-        let size = ["width", "circle", "box", "polygon", "capsule", "parts", "radius"].into_iter().find(has);
-        let key = if has_mass(1.0) { "density" } else { size.unwrap_or("shape") };
+        let key = if has_mass(1.0) { "density" } else { oddest_size(entries) };
         const WRONG: &str = "mass and moment of inertia would be out of the range of 32 bits, 1e-38 to 1e38; choose sizes and \
                              a density nearer to 1";
         return Err(entries.refuse(key, WRONG));
@@ -84,6 +81,25 @@ fn of_bodies(entries: &mut Entries<'_>) -> Result<Kind, SceneError> {
 /// Whether a number and its inverse can be reckoned with.
 fn is_normal(number: f32) -> bool {
     number > 0.0 && number.is_finite() && number.recip() > 0.0 && number.recip().is_finite()
+}
+
+/// The key of the size that is furthest from 1.
+fn oddest_size(entries: &mut Entries<'_>) -> &'static str {
+    let keys = ["width", "height", "radius", "circle", "box", "polygon", "capsule", "parts"];
+    let sizes = keys.into_iter().filter_map(|key| Some((key, greatest(entries.value(key)?))));
+    let oddness = |(_, size): &(&str, f64)| size.ln().abs();
+    // Of equals the first.
+    let oddest = sizes.filter(|(_, size)| *size > 0.0).min_by(|a, b| oddness(b).total_cmp(&oddness(a)));
+    oddest.map_or("shape", |(key, _)| key)
+}
+
+/// Of all numbers in a value the one that is furthest from zero, without its sign.
+fn greatest(value: &Value) -> f64 {
+    match value {
+        Value::Array(all) => all.iter().map(greatest).fold(0.0, f64::max),
+        Value::Table(all) => all.values().map(greatest).fold(0.0, f64::max),
+        value => number(value).unwrap_or_default().abs(),
+    }
 }
 
 /// The one shape of a kind, but none of those that only statics have. `others` are keys that there may be beside those of kinds.
@@ -99,19 +115,26 @@ pub(super) fn shape(entries: &mut Entries<'_>, others: &[&'static str]) -> Resul
         return Ok(shape);
     }
     match entries.text("shape", SHAPES)? {
-        Some("box") => Ok(Shape::rectangle(size(entries, "width")?, size(entries, "height")?)),
-        Some("circle") => Ok(Shape::circle(size(entries, "radius")?)),
-        Some(_) => Err(entries.refuse("shape", format!("must be {SHAPES}"))),
-        None => {
-            // It may be there under a name that is none, which then is what is told.
-            for key in ["parts", "width", "height", "radius"].iter().chain(others) {
-                entries.value(key);
-            }
-            of_shape(entries, Shape::circle(1.0))?;
-            entries.finish()?;
-            Err(entries.missing("shape", SHAPES))
+        Some("box") => match (size(entries, "width")?, size(entries, "height")?) {
+            (Some(width), Some(height)) => Ok(Shape::rectangle(width, height)),
+            (None, _) => Err(missing(entries, "width", SIZE, others)),
+            _ => Err(missing(entries, "height", SIZE, others)),
+        },
+        Some("circle") => {
+            size(entries, "radius")?.map(Shape::circle).ok_or_else(|| missing(entries, "radius", SIZE, others))
         }
+        Some(_) => Err(entries.refuse("shape", format!("must be {SHAPES}"))),
+        None => Err(missing(entries, "shape", SHAPES, others)),
     }
+}
+
+/// That a key which must be there is not. It may be there under a name that is none, which then is what is told.
+fn missing(entries: &mut Entries<'_>, key: &str, must: &str, others: &[&'static str]) -> SceneError {
+    for key in ["parts", "width", "height", "radius"].iter().chain(others) {
+        entries.value(key);
+    }
+    let rest = of_shape(entries, Shape::circle(1.0)).and_then(|_| entries.finish());
+    rest.err().unwrap_or_else(|| entries.missing(key, must))
 }
 
 /// That there are not two shapes.
@@ -132,9 +155,8 @@ fn is_size(size: f32) -> bool {
     size > 0.0 && 0.5 * size > 0.0
 }
 
-fn size(entries: &mut Entries<'_>, key: &'static str) -> Result<f32, SceneError> {
-    let size = entries.float(key, SIZE)?.ok_or_else(|| entries.missing(key, SIZE))?;
-    if is_size(size) { Ok(size) } else { Err(entries.refuse(key, format!("must be {SIZE}"))) }
+fn size(entries: &mut Entries<'_>, key: &'static str) -> Result<Option<f32>, SceneError> {
+    entries.get(key, SIZE, |value| float(value).filter(|size| is_size(*size)))
 }
 
 /// Box, circle, polygon or capsule by that key, as parts have it as well. None if none is there.
@@ -168,14 +190,19 @@ fn parts(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
     let mut parts = Vec::with_capacity(tables.len());
     for (number, table) in tables.into_iter().enumerate() {
         let mut part = entries.within(&format!("parts {number}"), table);
-        let given = ["box", "circle", "polygon", "capsule"].into_iter().filter(|key| part.has(key)).count();
-        let shape = if given == 1 { convex(&mut part)? } else { None };
-        let shape = shape.ok_or_else(|| {
-            entries.refuse("parts", format!("part {number} must have one of box, circle, polygon and capsule"))
-        })?;
+        let none =
+            || entries.refuse("parts", format!("part {number} must have one of box, circle, polygon and capsule"));
+        if ["box", "circle", "polygon", "capsule"].into_iter().filter(|key| part.has(key)).count() > 1 {
+            return Err(none());
+        }
+        let shape = convex(&mut part)?;
+        if shape.is_none() {
+            part.value("radius");
+        }
         let position = part.get("at", "[x, y], in meters", pair)?.unwrap_or_default();
         let rotation = turn(&mut part)?;
         part.finish()?;
+        let shape = shape.ok_or_else(none)?;
         parts.push(Part { shape, position, rotation });
     }
     Shape::compound(parts).map_err(|error| entries.refuse("parts", error.to_string()))

@@ -192,6 +192,9 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("", "[[kinds]] 0, shape: is missing: must be \"box\" or \"circle\"; or give polygon, capsule or parts"),
         ("name = \"crate\"\nbax = [1, 1]\ndensity = 2", "[[kinds]] 0, bax = [...]: unknown key; did you mean box?"),
         ("prats = [{ circle = 1 }]", "[[kinds]] 0, prats = [...]: unknown key; did you mean parts?"),
+        ("shape = \"box\"\nwidth = 1\nhieght = 1", "[[kinds]] 0, hieght = 1: unknown key; did you mean height?"),
+        ("shape = \"box\"\nwidth = 1\nradius = 1", "[[kinds]] 0, height: is missing: must be a positive number"),
+        ("shape = \"circle\"\nradios = 1\ndensity = 2", "[[kinds]] 0, radios = 1: unknown key; did you mean radius?"),
         ("width = 1\nheight = 1", "[[kinds]] 0, shape: is missing"),
         ("circle = 1\nbox = [1, 1]", "circle = 1: there is box already; leave one out"),
         ("circle = 0", "circle = 0: must be its radius, a positive number, in meters"),
@@ -200,6 +203,18 @@ fn what_cannot_be_is_refused_in_one_line() {
             "[[kinds]] 0, circle = 1e30: mass and moment of inertia would be out of the range of 32 bits",
         ),
         ("shape = \"box\"\nwidth = 1e20\nheight = 1e20", "[[kinds]] 0, width = 1e20: mass and moment of inertia would"),
+        ("shape = \"box\"\nwidth = 1\nheight = 1e20", "[[kinds]] 0, height = 1e20: mass and moment of inertia would"),
+        ("shape = \"box\"\nwidth = 1e-39\nheight = 2", "[[kinds]] 0, width = 1e-39: mass and moment of inertia would"),
+        ("shape = \"circle\"\nradius = 1e20", "[[kinds]] 0, radius = 1e20: mass and moment of inertia would"),
+        (
+            "polygon = [[0, 0], [2, 0], [0, 1]]\nradius = 1e20",
+            "[[kinds]] 0, radius = 1e20: mass and moment of inertia would",
+        ),
+        (
+            "polygon = [[0, 0], [1e20, 0], [0, 1e20]]\nradius = 0",
+            "[[kinds]] 0, polygon = [...]: mass and moment of inertia would",
+        ),
+        ("circle = 1e20\nwidth = 1e30", "[[kinds]] 0, width = 1e30: unknown key"),
         ("parts = [{ circle = 1e20 }, { circle = 1 }]", "[[kinds]] 0, parts = [...]: mass and moment of inertia would"),
         ("circle = 0.1\ndensity = 1e-38", "[[kinds]] 0, density = 1e-38: mass and moment of inertia would"),
         ("circle = 0.1\ndensity = 1e-50", "[[kinds]] 0, density = 1e-50: must be a positive number, in kg/m^2"),
@@ -218,6 +233,8 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("parts = [3]", "parts = [...]: must be a list such as [{ circle = 0.5"),
         ("parts = [{ at = [0, 0] }]", "parts = [...]: part 0 must have one of box, circle, polygon and capsule"),
         ("parts = [{ circle = 1, box = [1, 1] }]", "part 0 must have one of"),
+        ("parts = [{ crcle = 1 }]", "[[kinds]] 0, parts 0, crcle = 1: unknown key; did you mean circle?"),
+        ("parts = [{ radius = 0.1, polgon = [] }]", "parts 0, polgon = [...]: unknown key; did you mean polygon?"),
         ("parts = [{ circle = 1 }, { circle = -1 }]", "[[kinds]] 0, parts 1, circle = -1: must be its radius"),
         (
             "parts = [{ circle = 1, ta = [0, 0] }]",
@@ -251,7 +268,11 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("segment = { from = [0, 0], to = [0, 0] }", "segment = {...}: two points of a chain"),
         ("segment = { from = [0, 0], to = [1, 0], next = [2, 0] }", "segment, next = [...]: unknown key"),
         ("cirle = 1\nangle = 1", "[[statics]] 0, cirle = 1: unknown key; did you mean circle?"),
+        ("shape = \"box\"\nwidht = 1\nheight = 1", "[[statics]] 0, widht = 1: unknown key; did you mean width?"),
         ("angle = 1", "[[statics]] 0, shape: is missing"),
+        ("places = 1", "[[statics]] 0, places = 1: must be the path of a file"),
+        ("wdth = 1\nzzzzzzzz = 1", "[[statics]] 0, wdth = 1: unknown key; did you mean width?"),
+        ("zzzzzzzz = 1", "[[statics]] 0, zzzzzzzz = 1: unknown key; there are id, places, segment, box, circle"),
         ("circle = 1\npath = 3", "path = 3: must be a table such as { line = [1.0, 0.0] }"),
         ("circle = 1\npath = { line = [1, 0], circle = 1 }", "path, circle = 1: there is line already"),
         ("circle = 1\npath = { line = [1, inf] }", "path, line = [...]: must be a velocity"),
@@ -266,6 +287,11 @@ fn what_cannot_be_is_refused_in_one_line() {
         at_a_place.iter().map(|(text, expected)| (*text, *expected, statics(&format!("{text}{AT}")).map(drop)));
     for (text, expected, told) in told.chain(placed) {
         let told = told.expect_err(text);
+        if let Some((_, keys)) = told.split_once("; there are ") {
+            let mut keys: Vec<&str> = keys.split(", ").collect();
+            keys.sort_unstable();
+            assert!(keys.windows(2).all(|pair| pair[0] != pair[1]), "{text}: {told}");
+        }
         assert!(told.contains(expected) && !told.contains('\n') && told.len() < 400, "{text}: {told}");
     }
 }

@@ -126,7 +126,7 @@ fn in_table(entries: &mut Entries<'_>, path: &Path) -> Result<(Vec<Placed>, Opti
 }
 
 /// What a static may say beside what its kind is.
-const OTHERS: [&str; 10] = ["segment", "chain", "loop", "x", "y", "angle", "cos", "sin", "path", "places"];
+const OTHERS: [&str; 8] = ["chain", "loop", "x", "y", "angle", "cos", "sin", "path"];
 
 /// A shape, and where its center is, seen from what `x` and `y` say.
 fn form(entries: &mut Entries<'_>) -> Result<(Shape, Vec2), SceneError> {
