@@ -55,6 +55,8 @@ pub fn is_alive(pid: u32) -> bool {
 
 /// Kills a program and all it has started, at once.
 pub fn kill_all(program: &Running) {
+    // So that it starts no more of them meanwhile.
+    program.signal("STOP");
     let mut pids = descendants(program.id());
     pids.push(program.id());
     // Those that have ended meanwhile are no trouble.
