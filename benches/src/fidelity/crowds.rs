@@ -16,7 +16,7 @@ pub(super) fn laws() -> Vec<Law> {
 
 const RADIUS: f32 = 0.1;
 
-/// Planks that meet a floor as thin as they are with one end, and come down with the other.
+/// Planks that meet a floor thinner than they are with one end, and come down with the other.
 fn planks() -> Law {
     let start = |hertz: f64, phase: f64| {
         let floor = Kind::new(Shape::rectangle(60.0, 0.02), Material::default());

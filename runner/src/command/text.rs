@@ -321,9 +321,9 @@ fn action(raw: Raw) -> Result<Action, String> {
 
 /// A place that is asked about.
 fn place(point: [f64; 2]) -> Result<DVec2, String> {
-    const FURTHEST: f64 = 1e100;
-    let is_near = point.iter().all(|part| part.abs() <= FURTHEST);
-    is_near.then(|| point.into()).ok_or_else(|| format!("places must be within {FURTHEST:e} m of the origin"))
+    const MOST_ASKED: f64 = 1e100;
+    let is_near = point.iter().all(|part| part.abs() <= MOST_ASKED);
+    is_near.then(|| point.into()).ok_or_else(|| format!("places must be within {MOST_ASKED:e} m of the origin"))
 }
 
 fn new_body(text: &BodyText) -> Result<NewBody, String> {

@@ -29,9 +29,8 @@ pub(crate) use check::Found;
 pub(crate) use description::is_scene;
 pub(crate) use digest::of_file as digest_of_file;
 pub(crate) use kinds::of_command as kind_of_command;
-pub(crate) use row::Column;
-pub(crate) use row::FARTHEST;
 pub(super) use row::is_turn;
+pub(crate) use row::{Column, FARTHEST};
 pub(super) use statics::chain_of;
 
 use super::{Place, SceneError, large};
