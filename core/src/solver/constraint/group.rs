@@ -196,7 +196,7 @@ impl Sides {
         self.add_impulse(rows, rubbed, lane, wanted - *rubbed, velocity);
     }
 
-    /// Two points at once, if that takes no pull from either.
+    /// Two points at once: both part as fast as they should; or one pulls for that, so it gives back what it pressed, and parts faster.
     fn bounce_together(
         &self,
         points: [&PointRows; 2],
@@ -213,16 +213,25 @@ impl Sides {
         let other = product(one_a, two_a) + product(one_b, two_b);
         let determinant = own[0] * own[1] - other * other;
         let lacks = [0, 1].map(|k| speeds[k] - self.normal_speed(points[k], lane, velocity));
-        let impulses = [
+        let back = [-*pressed[0], -*pressed[1]];
+        let both = [
             (own[1] * lacks[0] - other * lacks[1]) / determinant,
             (own[0] * lacks[1] - other * lacks[0]) / determinant,
         ];
-        let pulls = |k: usize| impulses[k] < -*pressed[k];
+        let first = [(lacks[0] - other * back[1]) / own[0], back[1]];
+        let second = [back[0], (lacks[1] - other * back[0]) / own[1]];
+        let pushes = |impulses: [f32; 2]| impulses[0] >= back[0] && impulses[1] >= back[1];
+        let parts = |k: usize, impulses: [f32; 2]| own[k] * impulses[k] + other * impulses[1 - k] >= lacks[k];
         // Points that are nearly one leave nothing to tell them apart by.
-        let is_regular = determinant > 1e-3 * own[0] * own[1];
-        if !is_regular || pulls(0) || pulls(1) {
+        let impulses = if determinant > 1e-3 * own[0] * own[1] && pushes(both) {
+            both
+        } else if pushes(first) && parts(1, first) {
+            first
+        } else if pushes(second) && parts(0, second) {
+            second
+        } else {
             return false;
-        }
+        };
         for ((rows, pressed), impulse) in rows.into_iter().zip(pressed).zip(impulses) {
             self.add_impulse(rows, pressed, lane, impulse, velocity);
         }
