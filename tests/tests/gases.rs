@@ -49,15 +49,21 @@ fn discs_of_restitution_1_gain_no_energy() {
     }
 }
 
-/// Both corners of an end press as it comes down upon it nearly flat, and only one may be what throws it back.
+/// Both corners of an end press as it comes down upon it nearly flat, and only one may be what throws it back; and what throws a corner
+/// back may turn its slip round: holding it then would add up to a half of the energy there was.
 #[test]
 fn a_rod_between_elastic_walls_gains_no_energy() {
-    for (length, thickness) in [(2.0, 0.1), (1.0, 0.05), (1.0, 0.4)] {
+    for (length, thickness, friction) in
+        [(2.0, 0.1, 0.0), (1.0, 0.05, 0.0), (1.0, 0.4, 0.0), (2.0, 0.1, 1.0), (1.0, 1.0, 0.3), (1.0, 0.4, 0.6)]
+    {
+        let what = format!("{length} x {thickness} m, friction {friction}");
         let mut left = 0.0;
         for rod in 0..40 {
             let mut scene = gas(1, 5.0, 0.2, 5.0, 1.0);
             scene.params.restitution_threshold = 0.0;
             scene.kinds[0].shape = Shape::rectangle(length, thickness);
+            scene.kinds[0].material.friction = friction;
+            scene.statics.iter_mut().for_each(|wall| wall.kind.material.friction = friction);
             scene.last().rotation = Rot::from_angle(6.0 * noise(8, rod) as f32);
             scene.last().angular_velocity = 8.0 * noise(9, rod) as f32 - 4.0;
             let mut sim = scene.start_on((1, 1), Exchange::Step);
@@ -66,15 +72,13 @@ fn a_rod_between_elastic_walls_gains_no_energy() {
             for step in 0..400 {
                 sim.run(1);
                 let now = sim.kinetic_energy();
-                assert!(
-                    now < 1.001 * before,
-                    "{length} x {thickness} m, rod {rod}: {now} of {before} J in step {step}"
-                );
+                let most = if friction > 0.0 { 1.01 } else { 1.001 };
+                assert!(now < most * before, "{what}, rod {rod}: {now} of {before} J in step {step}");
                 before = now;
             }
             left += before / begin / 40.0;
         }
-        assert!(left > 0.99, "{length} x {thickness} m: {left} of the energy is left");
+        assert!(left > 0.99 || friction > 0.0, "{what}: {left} of the energy is left");
     }
 }
 

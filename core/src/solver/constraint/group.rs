@@ -1,6 +1,6 @@
 //! Groups: sixteen contacts side by side, one in each lane.
 
-use super::groups::Answer;
+use super::groups::{Answer, Parting};
 use crate::model::math::{clamp, max};
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
@@ -145,9 +145,13 @@ impl Sides {
         let pressed = [0, 1].map(|k| totals.get(k).is_some_and(|totals| totals.normal[lane] > 0.0));
         self.bounce_along_normals(points, totals, lane, answers, velocity);
         for (k, (point, totals)) in points.iter().zip(totals).enumerate() {
-            // What was not to bounce yet, and keeps its impulse, keeps its friction.
-            if pressed[k] && (matches!(answers[k], Answer::Part(_)) || totals.normal[lane] == 0.0) {
-                self.rub(point, totals, lane, velocity);
+            match answers[k] {
+                Answer::Part(parting) if pressed[k] => self.rub(point, totals, lane, Some(parting), velocity),
+                // What was not to bounce yet, and keeps its impulse, keeps its friction.
+                Answer::NotYet(_) if pressed[k] && totals.normal[lane] == 0.0 => {
+                    self.rub(point, totals, lane, None, velocity);
+                }
+                _ => {}
             }
         }
     }
@@ -168,7 +172,7 @@ impl Sides {
             let totals = [&mut total_one.normal[lane], &mut total_two.normal[lane]];
             if *totals[0] > 0.0
                 && *totals[1] > 0.0
-                && self.bounce_together([one, two], totals, lane, [first, second], velocity)
+                && self.bounce_together([one, two], totals, lane, [first.speed, second.speed], velocity)
             {
                 return;
             }
@@ -176,8 +180,8 @@ impl Sides {
         for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
             let pressed = &mut totals.normal[lane];
             let wanted = match answer {
-                Answer::Part(speed) if *pressed > 0.0 => {
-                    point.normal_mass[lane] * (speed - self.normal_speed(point, lane, velocity))
+                Answer::Part(parting) if *pressed > 0.0 => {
+                    point.normal_mass[lane] * (parting.speed - self.normal_speed(point, lane, velocity))
                 }
                 Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
@@ -187,12 +191,30 @@ impl Sides {
     }
 
     /// Lets friction of the whole step be what the point's normal impulses of the whole step allow, as far as it slides yet.
-    fn rub(&self, point: &PointRows, totals: &mut Totals, lane: usize, velocity: &mut [Quad]) {
+    ///
+    /// Newton's restitution and Coulomb's friction can be at odds: where what throws a corner back turns its slip round, holding it then
+    /// would add energy (T. Kane, "A dynamics puzzle", 1984). An impulse gives half of itself times the sum of the speeds along it before
+    /// and after, so friction may give no more than the normal takes.
+    fn rub(
+        &self,
+        point: &PointRows,
+        totals: &mut Totals,
+        lane: usize,
+        parting: Option<Parting>,
+        velocity: &mut [Quad],
+    ) {
         let rows = self.tangent_rows(point, lane);
         let slip = along(rows[1], velocity[self.b[lane] as usize]) - along(rows[0], velocity[self.a[lane] as usize]);
         let most = self.friction[lane] * totals.normal[lane];
-        let rubbed = &mut totals.tangent[lane];
-        let wanted = clamp(*rubbed - point.tangent_mass[lane] * slip, -most, most);
+        let (rubbed, mass) = (&mut totals.tangent[lane], point.tangent_mass[lane]);
+        let mut wanted = clamp(*rubbed - mass * slip, -most, most);
+        if let Some(parting) = parting {
+            let taken = totals.normal[lane] * (parting.closing - self.normal_speed(point, lane, velocity));
+            // Impulses t with t * (slip before + slip after) <= taken.
+            let half = 0.5 * (mass * (parting.slip + slip) - *rubbed);
+            let root = (half * half + mass * max(taken, 0.0)).sqrt();
+            wanted = clamp(wanted, -half - root, root - half);
+        }
         self.add_impulse(rows, rubbed, lane, wanted - *rubbed, velocity);
     }
 

@@ -1,11 +1,11 @@
 //! Restitution: points that came in fast and pressed get part of their speed back, once, after the last substep.
 
 use super::columns::Columns;
-use super::groups::{Answer, Bounce, Groups, Lane};
+use super::groups::{Answer, Bounce, Groups, Lane, Parting};
 use super::rows::Source;
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
-use crate::model::math::{dot, max, turn};
+use crate::model::math::{dot, max, right_perp, turn};
 use crate::model::params::Exchange;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
@@ -26,9 +26,10 @@ impl Groups {
                 let threshold = source.setup.params.restitution_threshold;
                 let mut answers = [Answer::Rest; 2];
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
-                    let closing = closing_speed(source, sides, contact, point, source.contacts.separation[i][point]);
+                    let separation = source.contacts.separation[i][point];
+                    let [closing, slip] = meeting_speeds(source, sides, contact, point, separation);
                     if closing > threshold {
-                        *answer = Answer::Part(restitution * closing);
+                        *answer = Answer::Part(Parting { closing, slip, speed: restitution * closing });
                     } else if closing < 0.0 && contact.points[point].normal_impulse == 0.0 {
                         *answer = Answer::NotYet(threshold);
                     }
@@ -86,21 +87,24 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mu
     }
 }
 
-/// Speed at which a point's surfaces will come nearer as they touch, in m/s: that of now, and what a gravity that only one of
-/// the bodies feels adds over the gap between them. Without that each bounce loses a step's fall.
-fn closing_speed(source: Source<'_>, sides: Pair, contact: &Contact, point: usize, separation: f32) -> f32 {
+/// Speeds at which a point's surfaces will come nearer as they touch, and slide along each other, in m/s. The first is that of now, and
+/// what a gravity that only one of the bodies feels adds over the gap between them. Without that each bounce loses a step's fall.
+fn meeting_speeds(source: Source<'_>, sides: Pair, contact: &Contact, point: usize, separation: f32) -> [f32; 2] {
     let (bodies, setup) = (&source.tile.bodies, source.setup);
     let anchor = contact.points[point].anchor;
-    let motion = |body: u32, arm: Vec2| {
+    let tangent = right_perp(contact.normal);
+    let motion = |body: u32, arm: Vec2, runs: f32| {
         let i = body as usize;
         let kind = setup.kind(bodies.kind[i]);
         let falls = kind.inv_mass > 0.0;
         let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
-        (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm), gravity)
+        let belt = tangent * (runs * kind.material.surface_speed);
+        (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
     };
     let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
-        (motion(sides[0], anchor), motion(sides[1], anchor - contact.offset));
+        (motion(sides[0], anchor, 1.0), motion(sides[1], anchor - contact.offset, -1.0));
     let closing = -dot(velocity_b - velocity_a, contact.normal);
     let pull = -dot(gravity_b - gravity_a, contact.normal);
-    if closing > 0.0 { max(closing * closing + 2.0 * pull * max(separation, 0.0), 0.0).sqrt() } else { closing }
+    let touching = max(closing * closing + 2.0 * pull * max(separation, 0.0), 0.0).sqrt();
+    [if closing > 0.0 { touching } else { closing }, dot(velocity_b - velocity_a, tangent)]
 }
