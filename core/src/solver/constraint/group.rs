@@ -1,7 +1,5 @@
 //! Groups: sixteen contacts side by side, one in each lane.
 
-use super::groups::{Answer, Parting};
-use crate::model::math::{clamp, max};
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
 /// Sixteen contacts of `N` points each that share no moving body. All rows are mass-weighted.
@@ -96,7 +94,7 @@ impl<const N: usize> Group<N> {
 }
 
 /// The speed of a body along a row.
-fn along(row: [f32; 3], v: Quad) -> f32 {
+pub(super) fn along(row: [f32; 3], v: Quad) -> f32 {
     row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 }
 
@@ -114,7 +112,7 @@ impl Sides {
     };
 
     /// How bodies A and B move along the normal at a point.
-    fn normal_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
+    pub(super) fn normal_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
         let row_a = [self.normal_ax[lane], self.normal_ay[lane], point.normal_a[lane]];
         let row_b = [self.normal_bx[lane], self.normal_by[lane], point.normal_b[lane]];
         [row_a, row_b]
@@ -127,141 +125,21 @@ impl Sides {
     }
 
     /// How bodies A and B move along the tangent at a point.
-    fn tangent_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
+    pub(super) fn tangent_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
         let row_a = [self.normal_ay[lane], -self.normal_ax[lane], point.tangent_a[lane]];
         let row_b = [self.normal_by[lane], -self.normal_bx[lane], point.tangent_b[lane]];
         [row_a, row_b]
     }
 
-    /// Gives the points of a contact that pressed what they are to have, and friction what it may have of that.
-    pub(crate) fn bounce(
-        &self,
-        points: &[PointRows],
-        totals: &mut [Totals],
-        lane: usize,
-        answers: [Answer; 2],
-        velocity: &mut [Quad],
-    ) {
-        let pressed = [0, 1].map(|k| totals.get(k).is_some_and(|totals| totals.normal[lane] > 0.0));
-        self.bounce_along_normals(points, totals, lane, answers, velocity);
-        for (k, (point, totals)) in points.iter().zip(totals).enumerate() {
-            match answers[k] {
-                Answer::Part(parting) if pressed[k] => self.rub(point, totals, lane, Some(parting), velocity),
-                // What was not to bounce yet, and keeps its impulse, keeps its friction.
-                Answer::NotYet(_) if pressed[k] && totals.normal[lane] == 0.0 => {
-                    self.rub(point, totals, lane, None, velocity);
-                }
-                _ => {}
-            }
-        }
-    }
-
-    /// Two points that part do so at once: one after the other, the first would turn a box that falls flat, and the second not turn
-    /// it back.
-    fn bounce_along_normals(
-        &self,
-        points: &[PointRows],
-        totals: &mut [Totals],
-        lane: usize,
-        answers: [Answer; 2],
-        velocity: &mut [Quad],
-    ) {
-        if let ([one, two], [total_one, total_two], [Answer::Part(first), Answer::Part(second)]) =
-            (points, &mut *totals, answers)
-        {
-            let totals = [&mut total_one.normal[lane], &mut total_two.normal[lane]];
-            if *totals[0] > 0.0
-                && *totals[1] > 0.0
-                && self.bounce_together([one, two], totals, lane, [first.speed, second.speed], velocity)
-            {
-                return;
-            }
-        }
-        for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
-            let pressed = &mut totals.normal[lane];
-            let wanted = match answer {
-                Answer::Part(parting) if *pressed > 0.0 => {
-                    point.normal_mass[lane] * (parting.speed - self.normal_speed(point, lane, velocity))
-                }
-                Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
-                _ => continue,
-            };
-            self.add_impulse(self.normal_rows(point, lane), pressed, lane, max(wanted, -*pressed), velocity);
-        }
-    }
-
-    /// Lets friction of the whole step be what the point's normal impulses of the whole step allow, as far as it slides yet.
-    ///
-    /// Newton's restitution and Coulomb's friction can be at odds: where what throws a corner back turns its slip round, holding it then
-    /// would add energy (T. Kane, "A dynamics puzzle", 1984). An impulse gives half of itself times the sum of the speeds along it before
-    /// and after, so friction may give no more than the normal takes.
-    fn rub(
-        &self,
-        point: &PointRows,
-        totals: &mut Totals,
-        lane: usize,
-        parting: Option<Parting>,
-        velocity: &mut [Quad],
-    ) {
-        let rows = self.tangent_rows(point, lane);
-        let slip = along(rows[1], velocity[self.b[lane] as usize]) - along(rows[0], velocity[self.a[lane] as usize]);
-        let most = self.friction[lane] * totals.normal[lane];
-        let (rubbed, mass) = (&mut totals.tangent[lane], point.tangent_mass[lane]);
-        let mut wanted = clamp(*rubbed - mass * slip, -most, most);
-        if let Some(parting) = parting {
-            let taken = totals.normal[lane] * (parting.closing - self.normal_speed(point, lane, velocity));
-            // Impulses t with t * (slip before + slip after) <= taken.
-            let half = 0.5 * (mass * (parting.slip + slip) - *rubbed);
-            let root = (half * half + mass * max(taken, 0.0)).sqrt();
-            wanted = clamp(wanted, -half - root, root - half);
-        }
-        self.add_impulse(rows, rubbed, lane, wanted - *rubbed, velocity);
-    }
-
-    /// Two points at once: both part as fast as they should; or one pulls for that, so it gives back what it pressed, and parts faster.
-    fn bounce_together(
-        &self,
-        points: [&PointRows; 2],
-        pressed: [&mut f32; 2],
-        lane: usize,
-        speeds: [f32; 2],
-        velocity: &mut [Quad],
-    ) -> bool {
-        let rows = points.map(|point| self.normal_rows(point, lane));
-        let [[one_a, one_b], [two_a, two_b]] = rows;
-        let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-        // How much speed an impulse at one of them gives each.
-        let own = [product(one_a, one_a) + product(one_b, one_b), product(two_a, two_a) + product(two_b, two_b)];
-        let other = product(one_a, two_a) + product(one_b, two_b);
-        let determinant = own[0] * own[1] - other * other;
-        let lacks = [0, 1].map(|k| speeds[k] - self.normal_speed(points[k], lane, velocity));
-        let back = [-*pressed[0], -*pressed[1]];
-        let both = [
-            (own[1] * lacks[0] - other * lacks[1]) / determinant,
-            (own[0] * lacks[1] - other * lacks[0]) / determinant,
-        ];
-        let first = [(lacks[0] - other * back[1]) / own[0], back[1]];
-        let second = [back[0], (lacks[1] - other * back[0]) / own[1]];
-        let pushes = |impulses: [f32; 2]| impulses[0] >= back[0] && impulses[1] >= back[1];
-        let parts = |k: usize, impulses: [f32; 2]| own[k] * impulses[k] + other * impulses[1 - k] >= lacks[k];
-        // Points that are nearly one leave nothing to tell them apart by.
-        let impulses = if determinant > 1e-3 * own[0] * own[1] && pushes(both) {
-            both
-        } else if pushes(first) && parts(1, first) {
-            first
-        } else if pushes(second) && parts(0, second) {
-            second
-        } else {
-            return false;
-        };
-        for ((rows, pressed), impulse) in rows.into_iter().zip(pressed).zip(impulses) {
-            self.add_impulse(rows, pressed, lane, impulse, velocity);
-        }
-        true
-    }
-
     /// Gives both bodies some more impulse along rows, and adds it to the sum.
-    fn add_impulse(&self, rows: [[f32; 3]; 2], sum: &mut f32, lane: usize, impulse: f32, velocity: &mut [Quad]) {
+    pub(super) fn add_impulse(
+        &self,
+        rows: [[f32; 3]; 2],
+        sum: &mut f32,
+        lane: usize,
+        impulse: f32,
+        velocity: &mut [Quad],
+    ) {
         *sum += impulse;
         let ([row_a, row_b], a, b) = (rows, self.a[lane] as usize, self.b[lane] as usize);
         for k in 0..3 {

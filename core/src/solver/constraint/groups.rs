@@ -1,5 +1,6 @@
 //! All constraints of a tile, and how to find that of a contact.
 
+use super::bounce::Answer;
 use super::columns::{Color, Columns, Each, Members, Slices, lengths};
 use super::group::{PointRows, Sides, Totals};
 use crate::model::contact::Contact;
@@ -38,29 +39,6 @@ pub(crate) struct Bounce {
     pub(super) contact: u32,
     /// Of each point.
     pub(super) answers: [Answer; 2],
-}
-
-/// What becomes of a point that pressed in the step.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Answer {
-    /// No more than the solver did.
-    Rest,
-    /// It came in fast, and parts.
-    Part(Parting),
-    /// It came apart, and only a blow within the step had it press: if that gave it more than this speed, in m/s, the blow is
-    /// passed on in the next step, as one between bodies that come in fast.
-    NotYet(f32),
-}
-
-/// How a point that bounces came, and how it is to part; speeds in m/s.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Parting {
-    /// At which its surfaces came nearer.
-    pub(super) closing: f32,
-    /// At which they slid along each other.
-    pub(super) slip: f32,
-    /// At which they are to part.
-    pub(super) speed: f32,
 }
 
 /// Where a contact's constraint lies.

@@ -10,6 +10,7 @@
 //! | `groups.rs` | all of a tile's; how to find that of a contact |
 //! | `restitution.rs` | bounces |
 
+mod bounce;
 #[allow(unsafe_code)]
 pub(crate) mod columns;
 pub(crate) mod group;

@@ -1,7 +1,8 @@
 //! Restitution: points that came in fast and pressed get part of their speed back, once, after the last substep.
 
+use super::bounce::{Answer, Parting};
 use super::columns::Columns;
-use super::groups::{Answer, Bounce, Groups, Lane, Parting};
+use super::groups::{Bounce, Groups, Lane};
 use super::rows::Source;
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
