@@ -6,8 +6,8 @@ use crate::model::math::{Rot, dot, max, min};
 use crate::model::piece::Piece;
 use glam::Vec2;
 
-/// Steps of the search, at most: each goes on by such a part of the way at least, and may by so much come too deep.
-const ROUNDS: u8 = 128;
+/// Each step of the search goes on by such a part of the way at least, and may by so much come too deep.
+const LEAST: f32 = 1.0 / 128.0;
 
 /// A body comes deeper into another within a step by this part of its inner radius, and no more; and how exactly that is found.
 const DEPTH: f32 = 0.25;
@@ -77,11 +77,11 @@ impl<'a> Passage<'a> {
     fn free_part_of(&self, pieces: [&Piece; 2], other: &Self, offset: Vec2, bound: impl Fn(Vec2) -> f32) -> f32 {
         let depth = DEPTH * self.kind.inner_radius;
         let (mut part, mut deepest) = (0.0, depth);
-        for round in 0..ROUNDS {
+        while part < 1.0 {
             let rotations = [self.rotation_at(part), other.rotation_at(part)];
             let manifold = collide(pieces, rotations, offset + (other.way - self.way) * part, f32::INFINITY);
             let Some(nearest) = manifold.nearest() else { return 1.0 };
-            if round == 0 {
+            if part == 0.0 {
                 deepest = depth + max(-nearest.separation, 0.0);
             }
             let (left, bound) = (nearest.separation + deepest, bound(manifold.normal));
@@ -91,10 +91,7 @@ impl<'a> Passage<'a> {
             if left <= EXACT * depth {
                 return part;
             }
-            part += max(left / bound, 1.0 / f32::from(ROUNDS));
-            if part >= 1.0 {
-                return 1.0;
-            }
+            part += max(left / bound, LEAST);
         }
         1.0
     }

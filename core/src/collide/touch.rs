@@ -266,11 +266,11 @@ impl<'a> Approach<'a> {
     fn contact(&self, at: &Moment, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         let Moment { time, manifold, offset, turning_a, turning_b } = at;
         let normal = manifold.normal;
-        // A second point may come down upon a static within the step, by itself or as the blow at the first turns the body: by as much
-        // as that one is stopped. Between moving bodies the next step is soon enough.
         if manifold.is_distance() {
             return None;
         }
+        // A second point may come down upon a static within the step, by itself or as the blow at the first turns the body: by as much
+        // as that one is stopped. Between moving bodies the next step is soon enough.
         let is_fixed = self.a.kind.inv_mass * self.b.kind.inv_mass == 0.0;
         let closing = manifold.points.map(|point| self.closing(at, point.anchor));
         let mut kept = Manifold { normal, ..Manifold::EMPTY };

@@ -168,9 +168,15 @@ impl<V: Wide> Moments<V> {
     /// Anchor and separation of the point with the least.
     #[inline(always)]
     fn nearest(&self) -> (Vectors<V>, V) {
+        let (second, least) = self.least();
+        (Vectors::pick(second, self.anchor[1], self.anchor[0]), least)
+    }
+
+    /// Whether the second point has the least separation, and that.
+    #[inline(always)]
+    fn least(&self) -> (V, V) {
         let second = self.two.mul(less(self.separation[1], self.separation[0]));
-        let anchor = Vectors::pick(second, self.anchor[1], self.anchor[0]);
-        (anchor, second.if_positive(self.separation[1], self.separation[0]))
+        (second, second.if_positive(self.separation[1], self.separation[0]))
     }
 }
 
@@ -315,11 +321,10 @@ impl<V: Wide> Pairs<V> {
             less(zero, closing).if_positive(at.separation[point].div(closing), never)
         });
         // Where one is too deep, it is that one's moment.
-        let (anchor, nearest) = at.nearest();
-        let deep = less(nearest, zero);
-        let closing = self.closing(anchor, at.offset, at.normal);
-        let of_deep = less(zero, closing).if_positive(nearest.div(closing), never);
-        let soonest = deep.if_positive(of_deep, at.two.if_positive(first.min(second), first));
+        let (second_is_nearest, nearest) = at.least();
+        let of_nearest = second_is_nearest.if_positive(second, first);
+        let of_any = at.two.if_positive(first.min(second), first);
+        let soonest = less(nearest, zero).if_positive(of_nearest, of_any);
         let closes = less(soonest, never).mul(ending);
         let time = at.time.add(soonest);
         let exact = less(dt, time).if_positive(zero, closes);

@@ -25,8 +25,8 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     let bodies = &tile.bodies;
     let slimness = &setup.slimness;
     // Looser than what is asked of each below, so that nothing depends on who shares a tile.
-    let any_moves = solved.any_moves(slimness.longest_arm, 0.49 * slimness.of_both);
-    if setup.statics.is_empty() || !any_moves && !far::any(&bodies.velocity[..tile.owned], setup) {
+    let any_moves = || solved.any_moves(slimness.longest_arm, 0.49 * slimness.of_both);
+    if setup.statics.is_empty() || !any_moves() && !far::any(&bodies.velocity[..tile.owned], setup) {
         return Vec::new();
     }
     let may = |&row: &usize| {
