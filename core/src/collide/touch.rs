@@ -301,11 +301,12 @@ impl<'a> Approach<'a> {
         if *time == 0.0 {
             return Some((contact, points.map(|point| point.separation)));
         }
-        // As the rows of the solver will see the way there.
+        // As the rows of the solver will see the way there, each body's own surface turning with it.
         let moved = dot(self.between, normal) * time;
         let separation = points.map(|point| {
-            let on_a = self.a.swing(*turning_a, point.anchor, normal);
-            let on_b = self.b.swing(*turning_b, point.anchor - *offset, normal);
+            let out = normal * (0.5 * max(point.separation, 0.0));
+            let on_a = self.a.swing(*turning_a, point.anchor - out, normal);
+            let on_b = self.b.swing(*turning_b, point.anchor + out - *offset, normal);
             point.separation - (moved + (on_b - on_a))
         });
         Some((contact, separation))

@@ -218,8 +218,9 @@ impl Points {
             let ahead = pairs.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
-            let on_a = pairs.swing(0, at.turning[0], anchor, at.normal);
-            let on_b = pairs.swing(1, at.turning[1], anchor.minus(at.offset), at.normal);
+            let out = at.normal.scaled(V::splat(0.5).mul(separation.max(zero)));
+            let on_a = pairs.swing(0, at.turning[0], anchor.minus(out), at.normal);
+            let on_b = pairs.swing(1, at.turning[1], anchor.plus(out).minus(at.offset), at.normal);
             let before = separation.sub(moved.add(on_b.sub(on_a)));
             let now = at.time.if_positive(before, separation);
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);

@@ -220,8 +220,9 @@ impl<V: Wide> Pairs<V> {
         let ahead = self.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
         let holds = less(at.separation, speculative.add(ahead));
         let moved = self.between.dot(at.normal).mul(at.time);
-        let on_a = self.swing(0, at.turning[0], at.anchor, at.normal);
-        let on_b = self.swing(1, at.turning[1], at.anchor.minus(at.offset), at.normal);
+        let out = at.normal.scaled(V::splat(0.5).mul(at.separation.max(zero)));
+        let on_a = self.swing(0, at.turning[0], at.anchor.minus(out), at.normal);
+        let on_b = self.swing(1, at.turning[1], at.anchor.plus(out).minus(at.offset), at.normal);
         let before = at.separation.sub(moved.add(on_b.sub(on_a)));
         // Where there is no distance, or speeds overflow.
         let is_sure = at.distance.min(less(far, V::splat(f32::MAX)));

@@ -58,7 +58,7 @@ pub struct GhostRefresh {
     pub id: GlobalId,
     /// Velocity x, y and angular velocity, mass-weighted.
     pub velocity: [f32; 3],
-    /// Displacement x, y of the step so far, mass-weighted; cosine minus one, and mass-weighted sine, of its rotation.
+    /// Displacement x, y of the step so far, and of its rotation what the cosine lacks of one, and the sine: all mass-weighted.
     pub pose: [f32; 4],
     /// As in [`GhostRecord`].
     pub unseen: Unseen,

@@ -5,6 +5,7 @@ use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::record::{GhostRefresh, Unseen};
+use crate::model::kind::KindRow;
 use crate::model::math::right_perp;
 use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::Quad;
@@ -27,10 +28,10 @@ fn carrying<'a>(tile: &'a Tile, contacts: &'a [Pair], setup: &'a Setup) -> impl 
 /// Bodies with contacts, batch by batch, in the order of the tile's bodies within each.
 #[derive(Default, Debug)]
 pub(crate) struct SolverBodies {
-    /// Velocity x, y and angular velocity, mass-weighted; one unused.
+    /// Velocity x, y and angular velocity, mass-weighted; the root of the inverse mass, less than zero for a round body.
     pub(crate) velocity: Vec<Quad>,
-    /// Displacement x, y of the step so far, mass-weighted; of its rotation the cosine less one, and the sine times the
-    /// root of the inertia.
+    /// Displacement x, y of the step so far, mass-weighted; of its rotation what the cosine lacks of one, and the sine, times the root of
+    /// the inertia.
     pub(crate) pose: Vec<Quad>,
     /// Velocity in this substep before any impulse of a contact: what contacts did is the difference, and the next
     /// substep's warm start.
@@ -126,6 +127,11 @@ const CARRIER: f32 = (1_u64 << 50) as f32;
 pub(crate) const LIGHTEST: f32 = 2.0 / CARRIER;
 
 const ZERO: Quad = [0.0; 4];
+
+/// The root of a body's inverse mass, less than zero for a round one.
+fn marked(root_inv_mass: f32, kind: &KindRow) -> f32 {
+    if kind.not_round > 0.0 { root_inv_mass } else { -root_inv_mass }
+}
 
 impl SolverBodies {
     /// For each batch to take its own.
@@ -240,9 +246,9 @@ impl SolverBodies {
             let (root_mass, root_inertia) = (kind.root_mass * scale, kind.root_inertia * scale);
             let velocity = bodies.velocity[i] * root_mass;
             let velocity = [velocity.x, velocity.y, bodies.angular_velocity[i] * root_inertia];
-            self.velocity[place.get()] = [velocity[0], velocity[1], velocity[2], 0.0];
-            self.weight[place.get()] =
-                [root_mass, root_inertia, kind.root_inv_inertia / scale, kind.root_inv_mass / scale];
+            let root_inv_mass = kind.root_inv_mass / scale;
+            self.velocity[place.get()] = [velocity[0], velocity[1], velocity[2], marked(root_inv_mass, kind)];
+            self.weight[place.get()] = [root_mass, root_inertia, kind.root_inv_inertia / scale, root_inv_mass];
             if let Some(&factors) = setup.factors.get(bodies.kind[i].0 as usize) {
                 self.factors[place.get()] = factors;
             }
@@ -266,10 +272,11 @@ impl SolverBodies {
             let normal = tile.contacts.contacts[contact as usize].normal;
             let outward = if first == body { normal } else { -normal };
             let i = body as usize;
-            let runs = right_perp(outward) * setup.kind(bodies.kind[i]).material.surface_speed;
+            let kind = setup.kind(bodies.kind[i]);
+            let runs = right_perp(outward) * kind.material.surface_speed;
             let velocity = bodies.velocity[i] + runs;
             let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
-            self.velocity[place.get()] = [given[0], given[1], given[2], 0.0];
+            self.velocity[place.get()] = [given[0], given[1], given[2], marked(1.0 / CARRIER, kind)];
             self.weight[place.get()] = [CARRIER, CARRIER, 1.0 / CARRIER, 1.0 / CARRIER];
             self.ghosts.push(Ghost { place, given, held: true });
         }
@@ -317,10 +324,9 @@ impl SolverBodies {
     pub(crate) fn moved(&self, body: usize) -> Option<(Vec2, f32)> {
         let place = self.index[body];
         let moved = |place: SolverIndex| {
-            let [x, y, c, s] = self.pose[place.get()];
+            let [x, y, lost, s] = self.pose[place.get()];
             let [.., root_inv_inertia, root_inv_mass] = self.weight[place.get()];
-            let s = s * root_inv_inertia;
-            (Vec2::new(x, y) * root_inv_mass, (c * c + s * s).sqrt())
+            (Vec2::new(x, y) * root_inv_mass, (lost * lost + s * s).sqrt() * root_inv_inertia)
         };
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
     }
@@ -329,8 +335,8 @@ impl SolverBodies {
     /// have not quite.
     pub(crate) fn any_moves(&self, arm: f32, least: f32) -> bool {
         let both = self.pose.iter().zip(&self.weight);
-        both.fold(false, |any, (&[x, y, c, s], &[.., root_inv_inertia, root_inv_mass])| {
-            let turned = c.abs() + s.abs() * root_inv_inertia;
+        both.fold(false, |any, (&[x, y, lost, s], &[.., root_inv_inertia, root_inv_mass])| {
+            let turned = (lost.abs() + s.abs()) * root_inv_inertia;
             any | ((x.abs() + y.abs()) * root_inv_mass + arm * turned > least)
         })
     }

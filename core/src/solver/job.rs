@@ -159,10 +159,11 @@ impl<'a> Job<'a> {
             for (pose, (velocity, weight)) in pose.as_chunks_mut::<LANES>().0.iter_mut().zip(blocks) {
                 let [vx, vy, w, _] = V::load_quads(velocity);
                 let [_, root_inertia, root_inv_inertia, _] = V::load_quads(weight);
-                let [x, y, c, s] = V::load_quads(pose);
-                let before = Vectors::new(c.add(one), s.mul(root_inv_inertia));
+                let [x, y, lost, s] = V::load_quads(pose);
+                let before = Vectors::new(one.sub(lost.mul(root_inv_inertia)), s.mul(root_inv_inertia));
                 let Vectors { x: c, y: s } = motion.turn(before, w.mul(root_inv_inertia));
-                V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), c.sub(one), s.mul(root_inertia)], pose);
+                let (lost, s) = (one.sub(c).mul(root_inertia), s.mul(root_inertia));
+                V::store_quads([x.add(h.mul(vx)), y.add(h.mul(vy)), lost, s], pose);
             }
         }
     }

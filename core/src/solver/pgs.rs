@@ -61,12 +61,10 @@ impl Pass for Iterate {
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
-        let normals = Normals::<V>::load(&group.sides);
+        let normals = Normals::<V>::load(&group.sides, &a, &b);
         let zero = V::splat(0.0);
         if self.moved {
-            let pose_a = V::gather(bodies.pose, &group.sides.a);
-            let pose_b = V::gather(bodies.pose, &group.sides.b);
-            normals.part(&mut group.points, &pose_a, &pose_b);
+            normals.part(group, bodies, &a, &b);
         }
         let friction = V::load(&group.sides.friction);
         normals.push(

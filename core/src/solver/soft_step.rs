@@ -6,11 +6,13 @@
 
 use super::constraint::group::Group;
 use super::constraint::kernels::{Normals, Pass, Press, Table, WarmStart};
+use super::bodies::LIGHTEST;
 use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;
 use crate::parallel::crew::Member;
 use crate::parallel::lanes::{Lanes, Wide};
+use crate::parallel::vectors::absolute;
 use crate::tiling::blueprint::Setup;
 
 /// One substep of a batch.
@@ -55,10 +57,11 @@ impl Pass for Solve {
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
-        let normals = Normals::<V>::load(&group.sides);
-        let fixed = V::load(&group.sides.fixed);
+        let normals = Normals::<V>::load(&group.sides, &a, &b);
+        // The roots of a static's inverse masses are zero, or next to it.
+        let both_move = absolute(a[3]).min(absolute(b[3])).sub(V::splat(LIGHTEST));
         let either = |of: fn(&Softness) -> f32| {
-            fixed.if_positive(V::splat(of(&self.static_softness)), V::splat(of(&self.softness)))
+            both_move.if_positive(V::splat(of(&self.softness)), V::splat(of(&self.static_softness)))
         };
         let (rate, mass_scale, impulse_scale) =
             (either(|s| s.bias_rate), either(|s| s.mass_scale), either(|s| s.impulse_scale));
@@ -106,11 +109,9 @@ impl<const BOUNCY: bool> Pass for Relax<BOUNCY> {
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
-        let pose_a = V::gather(bodies.pose, &group.sides.a);
-        let pose_b = V::gather(bodies.pose, &group.sides.b);
-        let normals = Normals::<V>::load(&group.sides);
+        let normals = Normals::<V>::load(&group.sides, &a, &b);
         let zero = V::splat(0.0);
-        normals.part(&mut group.points, &pose_a, &pose_b);
+        normals.part(group, bodies, &a, &b);
         let friction = V::load(&group.sides.friction);
         normals.push_until_settled(
             &mut group.points,

@@ -357,11 +357,11 @@ impl Mover<'_> {
     #[inline(always)]
     fn solved<V: Lanes>(&self, index: &[u32; LANES]) -> Motions<V> {
         let [_, _, root_inv_inertia, root_inv_mass] = V::gather_fixed(&self.solved.weight, index);
-        let [x, y, c, s] = V::gather_fixed(&self.solved.pose, index);
+        let [x, y, lost, s] = V::gather_fixed(&self.solved.pose, index);
         let [vx, vy, w, _] = V::gather_fixed(&self.solved.velocity, index);
         Motions {
             moved: Vectors::new(x, y).scaled(root_inv_mass),
-            turned: Vectors::new(c.add(V::splat(1.0)), s.mul(root_inv_inertia)),
+            turned: Vectors::new(V::splat(1.0).sub(lost.mul(root_inv_inertia)), s.mul(root_inv_inertia)),
             velocity: Vectors::new(vx, vy).scaled(root_inv_mass),
             spin: w.mul(root_inv_inertia),
         }

@@ -1,6 +1,6 @@
 //! The bounce of one contact: what becomes of its points once the solver has stopped them.
 
-use super::group::{PointRows, Sides, Totals, along};
+use super::group::{PointRows, Sides, Totals};
 use crate::model::math::{clamp, max};
 use crate::parallel::lanes::Quad;
 
@@ -81,7 +81,8 @@ impl Sides {
                 Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
             };
-            self.add_impulse(self.normal_rows(point, lane), pressed, lane, max(wanted, -*pressed), velocity);
+            let rows = self.normal_rows(point, lane, velocity);
+            self.add_impulse(rows, pressed, lane, max(wanted, -*pressed), velocity);
         }
     }
 
@@ -98,8 +99,8 @@ impl Sides {
         parting: Option<Parting>,
         velocity: &mut [Quad],
     ) {
-        let rows = self.tangent_rows(point, lane);
-        let slip = along(rows[1], velocity[self.b[lane] as usize]) - along(rows[0], velocity[self.a[lane] as usize]);
+        let rows = self.tangent_rows(point, lane, velocity);
+        let slip = self.speed(rows, lane, velocity);
         let most = self.friction[lane] * totals.normal[lane];
         let (rubbed, mass) = (&mut totals.tangent[lane], point.tangent_mass[lane]);
         let mut wanted = clamp(*rubbed - mass * slip, -most, most);
@@ -122,7 +123,7 @@ impl Sides {
         speeds: [f32; 2],
         velocity: &mut [Quad],
     ) -> bool {
-        let rows = points.map(|point| self.normal_rows(point, lane));
+        let rows = points.map(|point| self.normal_rows(point, lane, velocity));
         let [[one_a, one_b], [two_a, two_b]] = rows;
         let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
         // How much speed an impulse at one of them gives each.

@@ -19,14 +19,10 @@ pub(crate) struct Sides {
     /// Bodies, as places in their batch; that of its slice's static in a lane without a contact.
     pub(crate) a: [u32; WIDE],
     pub(crate) b: [u32; WIDE],
-    /// The normal, times the root of the inverse mass of A and of B.
-    pub(crate) normal_ax: WideRow,
-    pub(crate) normal_ay: WideRow,
-    pub(crate) normal_bx: WideRow,
-    pub(crate) normal_by: WideRow,
+    /// From A to B, of length one.
+    pub(crate) normal_x: WideRow,
+    pub(crate) normal_y: WideRow,
     pub(crate) friction: WideRow,
-    /// One for a contact with a static, else zero.
-    pub(crate) fixed: WideRow,
 }
 
 /// One point of sixteen contacts.
@@ -38,9 +34,6 @@ pub(crate) struct PointRows {
     pub(crate) normal_b: WideRow,
     pub(crate) tangent_a: WideRow,
     pub(crate) tangent_b: WideRow,
-    /// The anchor's length along the normal, from A and from B: what turning further shortens. Zero for a round body.
-    pub(crate) depth_a: WideRow,
-    pub(crate) depth_b: WideRow,
     /// Effective masses.
     pub(crate) normal_mass: WideRow,
     pub(crate) tangent_mass: WideRow,
@@ -77,8 +70,6 @@ impl PointRows {
         normal_b: ZERO,
         tangent_a: ZERO,
         tangent_b: ZERO,
-        depth_a: ZERO,
-        depth_b: ZERO,
         normal_mass: ZERO,
         tangent_mass: ZERO,
         first_separation: ZERO,
@@ -94,7 +85,7 @@ impl<const N: usize> Group<N> {
 }
 
 /// The speed of a body along a row.
-pub(super) fn along(row: [f32; 3], v: Quad) -> f32 {
+fn along(row: [f32; 3], v: Quad) -> f32 {
     row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 }
 
@@ -103,32 +94,39 @@ impl Sides {
     const EMPTY: Self = Self {
         a: [0; WIDE],
         b: [0; WIDE],
-        normal_ax: ZERO,
-        normal_ay: ZERO,
-        normal_bx: ZERO,
-        normal_by: ZERO,
+        normal_x: ZERO,
+        normal_y: ZERO,
         friction: ZERO,
-        fixed: ZERO,
     };
 
+    /// The normal times the roots of the inverse masses of A and B, which bodies tell with their velocities.
+    fn normals(&self, lane: usize, velocity: &[Quad]) -> [[f32; 2]; 2] {
+        [&self.a, &self.b].map(|bodies| {
+            let root = velocity[bodies[lane] as usize][3].abs();
+            [self.normal_x[lane] * root, self.normal_y[lane] * root]
+        })
+    }
+
     /// How bodies A and B move along the normal at a point.
-    pub(super) fn normal_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
-        let row_a = [self.normal_ax[lane], self.normal_ay[lane], point.normal_a[lane]];
-        let row_b = [self.normal_bx[lane], self.normal_by[lane], point.normal_b[lane]];
-        [row_a, row_b]
+    pub(super) fn normal_rows(&self, point: &PointRows, lane: usize, velocity: &[Quad]) -> [[f32; 3]; 2] {
+        let [[ax, ay], [bx, by]] = self.normals(lane, velocity);
+        [[ax, ay, point.normal_a[lane]], [bx, by, point.normal_b[lane]]]
     }
 
     /// Speed at which a point's surfaces move apart, in m/s.
     pub(crate) fn normal_speed(&self, point: &PointRows, lane: usize, velocity: &[Quad]) -> f32 {
-        let [row_a, row_b] = self.normal_rows(point, lane);
+        self.speed(self.normal_rows(point, lane, velocity), lane, velocity)
+    }
+
+    /// Speed at which B moves along rows, seen from A.
+    pub(super) fn speed(&self, [row_a, row_b]: [[f32; 3]; 2], lane: usize, velocity: &[Quad]) -> f32 {
         along(row_b, velocity[self.b[lane] as usize]) - along(row_a, velocity[self.a[lane] as usize])
     }
 
     /// How bodies A and B move along the tangent at a point.
-    pub(super) fn tangent_rows(&self, point: &PointRows, lane: usize) -> [[f32; 3]; 2] {
-        let row_a = [self.normal_ay[lane], -self.normal_ax[lane], point.tangent_a[lane]];
-        let row_b = [self.normal_by[lane], -self.normal_bx[lane], point.tangent_b[lane]];
-        [row_a, row_b]
+    pub(super) fn tangent_rows(&self, point: &PointRows, lane: usize, velocity: &[Quad]) -> [[f32; 3]; 2] {
+        let [[ax, ay], [bx, by]] = self.normals(lane, velocity);
+        [[ay, -ax, point.tangent_a[lane]], [by, -bx, point.tangent_b[lane]]]
     }
 
     /// Gives both bodies some more impulse along rows, and adds it to the sum.
@@ -157,12 +155,11 @@ impl Sides {
         impulse: [f32; 2],
         velocity: &mut [Quad],
     ) {
-        let (body, sign, x, y, normal, tangent) = if upon_a {
-            let (normal, tangent) = (point.normal_a[lane], point.tangent_a[lane]);
-            (self.a[lane], -1.0, self.normal_ax[lane], self.normal_ay[lane], normal, tangent)
+        let [normal_a, normal_b] = self.normals(lane, velocity);
+        let (body, sign, [x, y], normal, tangent) = if upon_a {
+            (self.a[lane], -1.0, normal_a, point.normal_a[lane], point.tangent_a[lane])
         } else {
-            let (normal, tangent) = (point.normal_b[lane], point.tangent_b[lane]);
-            (self.b[lane], 1.0, self.normal_bx[lane], self.normal_by[lane], normal, tangent)
+            (self.b[lane], 1.0, normal_b, point.normal_b[lane], point.tangent_b[lane])
         };
         let velocity = &mut velocity[body as usize];
         let [along, across] = impulse.map(|impulse| sign * impulse);
@@ -172,16 +169,15 @@ impl Sides {
     }
 
     /// Separation at a point by the bodies' poses now, in meters.
-    pub(crate) fn separation(&self, point: &PointRows, lane: usize, pose: &[Quad]) -> f32 {
-        let (pose_a, pose_b) = (pose[self.a[lane] as usize], pose[self.b[lane] as usize]);
-        let moved_a = self.normal_ax[lane] * pose_a[0]
-            + self.normal_ay[lane] * pose_a[1]
-            + point.normal_a[lane] * pose_a[3]
-            + point.depth_a[lane] * pose_a[2];
-        let moved_b = self.normal_bx[lane] * pose_b[0]
-            + self.normal_by[lane] * pose_b[1]
-            + point.normal_b[lane] * pose_b[3]
-            + point.depth_b[lane] * pose_b[2];
+    pub(crate) fn separation(&self, point: &PointRows, lane: usize, velocity: &[Quad], pose: &[Quad]) -> f32 {
+        let rows = self.normal_rows(point, lane, velocity);
+        let moved = |body: u32, [x, y, normal]: [f32; 3], tangent: f32| {
+            let (pose, is_round) = (pose[body as usize], velocity[body as usize][3] < 0.0);
+            let lost = if is_round { 0.0 } else { pose[2] };
+            x * pose[0] + y * pose[1] + normal * pose[3] + tangent * lost
+        };
+        let moved_a = moved(self.a[lane], rows[0], point.tangent_a[lane]);
+        let moved_b = moved(self.b[lane], rows[1], point.tangent_b[lane]);
         point.first_separation[lane] + (moved_b - moved_a)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::group::{Group, PointRows, Sides};
 use crate::parallel::lanes::{Quad, Wide, WideRow};
+use crate::parallel::vectors::absolute;
 use std::cell::Cell;
 
 /// The bodies of a batch, as the contacts of one color see them: each lane reads and writes bodies of its own.
@@ -35,13 +36,14 @@ impl<V: Wide> Axis<V> {
         on_b.sub(on_a)
     }
 
-    /// How far the surfaces have moved apart since the step began, in m.
+    /// How far the surfaces have moved apart along this normal since the step began, in m. By what a turn takes from the arm along the
+    /// normal, which is the tangent's moment arm, both come away from where they were; but not those of round bodies.
     #[inline(always)]
-    pub(crate) fn moved_apart(&self, rows: &PointRows, a: &[V; 4], b: &[V; 4]) -> V {
+    fn moved_apart(&self, rows: &PointRows, a: &[V; 4], b: &[V; 4]) -> V {
         let moved_a = self.ax.mul(a[0]).add(self.ay.mul(a[1])).add(self.aw.mul(a[3]));
-        let moved_a = moved_a.add(V::load(&rows.depth_a).mul(a[2]));
+        let moved_a = moved_a.add(V::load(&rows.tangent_a).mul(a[2]));
         let moved_b = self.bx.mul(b[0]).add(self.by.mul(b[1])).add(self.bw.mul(b[3]));
-        let moved_b = moved_b.add(V::load(&rows.depth_b).mul(b[2]));
+        let moved_b = moved_b.add(V::load(&rows.tangent_b).mul(b[2]));
         moved_b.sub(moved_a)
     }
 
@@ -56,7 +58,7 @@ impl<V: Wide> Axis<V> {
     }
 }
 
-/// The normals of a group, loaded once for all its points.
+/// The normals of a group, times the roots of both bodies' inverse masses: once for all its points.
 pub(crate) struct Normals<V> {
     ax: V,
     ay: V,
@@ -65,14 +67,12 @@ pub(crate) struct Normals<V> {
 }
 
 impl<V: Wide> Normals<V> {
+    /// Of bodies of such velocities.
     #[inline(always)]
-    pub(crate) fn load(sides: &Sides) -> Self {
-        Self {
-            ax: V::load(&sides.normal_ax),
-            ay: V::load(&sides.normal_ay),
-            bx: V::load(&sides.normal_bx),
-            by: V::load(&sides.normal_by),
-        }
+    pub(crate) fn load(sides: &Sides, a: &[V; 4], b: &[V; 4]) -> Self {
+        let (x, y) = (V::load(&sides.normal_x), V::load(&sides.normal_y));
+        let (root_a, root_b) = (absolute(a[3]), absolute(b[3]));
+        Self { ax: x.mul(root_a), ay: y.mul(root_a), bx: x.mul(root_b), by: y.mul(root_b) }
     }
 
     #[inline(always)]
@@ -91,11 +91,15 @@ impl<V: Wide> Normals<V> {
 }
 
 impl<V: Wide> Normals<V> {
-    /// Takes the separations that bodies have moved to.
+    /// Takes the separations that bodies of such velocities have moved to.
     #[inline(always)]
-    pub(crate) fn part<const N: usize>(&self, points: &mut [PointRows; N], pose_a: &[V; 4], pose_b: &[V; 4]) {
-        for rows in points {
-            let moved = self.normal(rows).moved_apart(rows, pose_a, pose_b);
+    pub(crate) fn part<const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>, a: &[V; 4], b: &[V; 4]) {
+        let mut pose_a = V::gather(bodies.pose, &group.sides.a);
+        let mut pose_b = V::gather(bodies.pose, &group.sides.b);
+        let zero = V::splat(0.0);
+        (pose_a[2], pose_b[2]) = (a[3].if_positive(pose_a[2], zero), b[3].if_positive(pose_b[2], zero));
+        for rows in &mut group.points {
+            let moved = self.normal(rows).moved_apart(rows, &pose_a, &pose_b);
             V::load(&rows.first_separation).add(moved).store(&mut rows.separation);
         }
     }
@@ -156,7 +160,7 @@ impl<V: Wide> Normals<V> {
         press: impl Fn(&PointRows) -> Press<V> + Copy,
     ) {
         /// In m/s.
-        const SLIGHT: f32 = 0.05;
+        const SLIGHT: f32 = 0.2;
         const TIMES: usize = 8;
         let mut turned = self.push(points, friction, a, b, press);
         if N == 1 {
@@ -259,7 +263,7 @@ impl Pass for WarmStart {
     fn group<V: Wide, const N: usize>(&self, group: &mut Group<N>, bodies: Table<'_>) {
         let mut a = V::gather(bodies.velocity, &group.sides.a);
         let mut b = V::gather(bodies.velocity, &group.sides.b);
-        let normals = Normals::<V>::load(&group.sides);
+        let normals = Normals::<V>::load(&group.sides, &a, &b);
         for rows in &group.points {
             normals.normal(rows).apply_impulse(V::load(&rows.normal_impulse), &mut a, &mut b);
             normals.tangent(rows).apply_impulse(V::load(&rows.tangent_impulse), &mut a, &mut b);

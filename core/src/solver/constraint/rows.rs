@@ -9,7 +9,7 @@ use crate::parallel::lanes::{Kernel, Lanes, Quad, WIDE, Wide, WideRow};
 use crate::parallel::team::Team;
 use crate::parallel::vectors::Vectors;
 use crate::solver::batches::{Batch, Batches};
-use crate::solver::bodies::{LIGHTEST, SolverBodies};
+use crate::solver::bodies::SolverBodies;
 use crate::solver::index::SolverIndex;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -204,14 +204,9 @@ fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
     let sides = &mut group.sides;
     sides.a = inputs.a;
     sides.b = inputs.b;
-    on_a.x.store(&mut sides.normal_ax);
-    on_a.y.store(&mut sides.normal_ay);
-    on_b.x.store(&mut sides.normal_bx);
-    on_b.y.store(&mut sides.normal_by);
+    normal.x.store(&mut sides.normal_x);
+    normal.y.store(&mut sides.normal_y);
     V::load(&inputs.friction_a).mul(V::load(&inputs.friction_b)).sqrt().store(&mut sides.friction);
-    // The roots of a static's inverse masses are zero, or next to it.
-    let moves = |root: V| root.sub(V::splat(LIGHTEST));
-    moves(root_mass_a).if_positive(moves(root_mass_b).if_positive(zero, one), one).store(&mut sides.fixed);
     let linear = on_a.dot(on_a).add(on_b.dot(on_b));
     // Where there is no contact nothing may come of it, not even the inverse of zero.
     let inverse = |sum: V| sum.if_positive(one.div(sum), zero);
@@ -230,8 +225,6 @@ fn write<V: Wide, const N: usize>(group: &mut Group<N>, inputs: &Inputs) {
         normal_b.store(&mut rows.normal_b);
         tangent_a.store(&mut rows.tangent_a);
         tangent_b.store(&mut rows.tangent_b);
-        not_round_a.if_positive(arm_a.dot(normal), zero).store(&mut rows.depth_a);
-        not_round_b.if_positive(arm_b.dot(normal), zero).store(&mut rows.depth_b);
         let normal_mass = inverse(linear.add(normal_a.mul(normal_a)).add(normal_b.mul(normal_b)));
         normal_mass.store(&mut rows.normal_mass);
         // Of the tangent alone; or, where one point is pushed at once, while the normal keeps its speed.
