@@ -14,7 +14,7 @@ use crate::collide::wide_pairs::{Outlook, ROLLING, TOUCHING};
 use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
-use crate::model::math::{Rot, cross, dot, max, min, turn};
+use crate::model::math::{Rot, clamp, cross, dot, max, min, tangent, turn};
 use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -59,13 +59,15 @@ impl<'a> Side<'a> {
         self.kind.form == Form::Round
     }
 
-    /// How it will have turned after some seconds, as far as that can be seen: in four parts, as in the substeps of a step.
+    /// How it will have turned after some seconds, in four parts, as in the substeps of a step: as far as that can be followed, a radian
+    /// each.
     #[inline(always)]
     fn turning(&self, time: f32) -> Rot {
         if self.is_round() {
             return Rot::IDENTITY;
         }
-        let quarter = Rot { c: 1.0, s: 0.25 * time * self.angular_velocity }.normalized();
+        let angle = clamp(0.25 * time * self.angular_velocity, -1.0, 1.0);
+        let quarter = Rot { c: 1.0, s: tangent(angle) }.normalized();
         let half = quarter.after(quarter);
         half.after(half)
     }
@@ -147,11 +149,12 @@ impl<'a> Approach<'a> {
         if is_now || far.is_infinite() {
             return self.contact(&now, known, setup);
         }
-        match self.first_touch(&now, reach, setup.params.dt) {
-            Some(then) => self.contact(&then, known, setup),
-            None if nearest < setup.params.speculative_distance => self.contact(&now, known, setup),
-            None => None,
-        }
+        let (then, touches) = self.first_touch(&now, reach, setup.params.dt);
+        // Near ones may be driven together within the step: as they are where they would be nearest, or who passes by would be turned
+        // aside.
+        let is_near = touches || nearest < setup.params.speculative_distance;
+        let at = if then.manifold.is_distance() { now } else { then };
+        if is_near { self.contact(&at, known, setup) } else { None }
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.
@@ -199,31 +202,32 @@ impl<'a> Approach<'a> {
         -dot(self.between + velocity_b - velocity_a, at.manifold.normal)
     }
 
-    /// The moment in which the two, apart now, touch, if that is within the step.
+    /// The moment in which the two, apart now, touch, and whether that is within the step; if not, the last one in which it was seen that
+    /// they do not yet, or of circles that in which they are nearest.
     #[inline(never)]
-    fn first_touch(&self, now: &Moment, reach: f32, dt: f32) -> Option<Moment> {
+    fn first_touch(&self, now: &Moment, reach: f32, dt: f32) -> (Moment, bool) {
         if self.a.is_round() && self.b.is_round() {
             // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
             let (Self { offset, between, .. }, sum) = (self, self.a.kind.bounding_radius + self.b.kind.bounding_radius);
             let (square, half, rest) =
                 (dot(*between, *between), -dot(*offset, *between), dot(*offset, *offset) - sum * sum);
             let root = half * half - square * rest;
-            return (half > 0.0 && root >= 0.0)
-                .then(|| rest / (half + root.sqrt()))
-                .filter(|&time| time <= dt)
-                .map(|time| self.at(max(time, 0.0), reach));
+            let time = rest / (half + max(root, 0.0).sqrt());
+            let touches = half > 0.0 && root >= 0.0 && time <= dt;
+            let nearest = min(max(half / max(square, f32::MIN_POSITIVE), 0.0), dt);
+            return (self.at(if touches { max(time, 0.0) } else { nearest }, reach), touches);
         }
         let sweep = self.a.sweep() + self.b.sweep();
         let mut at = *now;
         // Who goes beyond a segment is let through, and so must not come there by a step of the search.
         let is_let_through = self.pieces.is_some_and(|pieces| pieces.iter().any(|piece| piece.side.is_some()));
         for _ in 0..if is_let_through { MORE_ROUNDS } else { ROUNDS } {
-            let nearest = *at.manifold.nearest()?;
+            let Some(nearest) = at.manifold.nearest() else { return (at, false) };
             // What is apart along a direction stays so for as long as nothing moves further along it.
             let bound = -dot(self.between, at.manifold.normal) + sweep;
             let left = dt - at.time;
             if bound * left < nearest.separation {
-                return None;
+                return (at, false);
             }
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };
@@ -233,19 +237,19 @@ impl<'a> Approach<'a> {
             if at.manifold.is_distance() {
                 continue;
             }
-            let nearest = at.manifold.nearest()?.separation;
-            if nearest < DEEP {
+            let Some(nearest) = at.manifold.nearest() else { return (at, false) };
+            if nearest.separation < DEEP {
                 break;
             }
-            if nearest < NEAR {
-                return Some(at);
+            if nearest.separation < NEAR {
+                return (at, true);
             }
         }
         if at.manifold.is_distance() {
-            return None;
+            return (at, false);
         }
         // Of two points the further one may be the first to touch; where one is too deep, it is that one's moment.
-        let nearest = *at.manifold.nearest()?;
+        let Some(&nearest) = at.manifold.nearest() else { return (at, false) };
         let points = if nearest.separation < 0.0 { &[nearest] } else { at.manifold.points() };
         let mut soonest = f32::INFINITY;
         for point in points {
@@ -255,10 +259,10 @@ impl<'a> Approach<'a> {
             }
         }
         if soonest == f32::INFINITY {
-            return Some(at);
+            return (at, true);
         }
         let time = at.time + soonest;
-        (time <= dt).then(|| self.at(max(time, 0.0), reach))
+        if time <= dt { (self.at(max(time, 0.0), reach), true) } else { (at, false) }
     }
 
     /// The contact with the geometry of a moment, and the separations that its points have now.
@@ -314,11 +318,12 @@ impl<'a> Approach<'a> {
 
     /// The separations of a contact whose manifold still serves: they touch, and have hardly moved against each other.
     ///
-    /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever.
+    /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever. Not of
+    /// one point: bodies rock and roll on that, and an arm that lags behind them would drive them on.
     #[inline(always)]
     fn recycle(&self, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
         let Approach { a, b, offset, .. } = self;
-        if a.is_round() || b.is_round() {
+        if a.is_round() || b.is_round() || known.point_count() == 1 {
             return None;
         }
         let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));

@@ -203,9 +203,8 @@ impl Points {
         let mut meets = is_now.max(less(separation, speculative));
         if count > if search == Search::Always { 0 } else { FEW } {
             self.postponed = [0.0; WIDE];
-            let (then, found) = pairs.first_moments(shapes, &now, later, reach);
-            at = Moments::pick(found, &then, &now);
-            at.unsure = at.unsure.max(then.unsure);
+            let found;
+            (at, found) = pairs.first_moments(shapes, &now, later, reach);
             meets = meets.max(found);
         }
         meets = meets.mul(asked).mul(at.some);
@@ -289,7 +288,8 @@ impl<V: Wide> Pairs<V> {
         less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
     }
 
-    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step.
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step; for the others the
+    /// last that was looked at.
     #[inline(always)]
     fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V) -> (Moments<V>, V) {
         let (zero, dt) = (V::splat(0.0), self.dt);

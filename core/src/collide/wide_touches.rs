@@ -7,7 +7,7 @@ use super::cull::passes;
 use super::touch::{DEEP, NEAR, ROUNDS};
 use super::wide_pairs::{Pairs, TOUCHING};
 use crate::parallel::lanes::Wide;
-use crate::parallel::vectors::{Vectors, less};
+use crate::parallel::vectors::{Vectors, less, tangent};
 use crate::tiling::blueprint::Setup;
 
 /// Manifolds of one point, and the moments in which they are those.
@@ -110,8 +110,8 @@ impl<V: Wide> Pairs<V> {
     #[inline(always)]
     fn turned_after(&self, side: usize, time: V) -> Vectors<V> {
         let one = V::splat(1.0);
-        let sine = V::splat(0.25).mul(time).mul(self.spin[side]);
-        let quarter = Vectors::new(one, sine);
+        let angle = V::splat(0.25).mul(time).mul(self.spin[side]).max(V::splat(-1.0)).min(one);
+        let quarter = Vectors::new(one, tangent(angle));
         let quarter = quarter.scaled(one.div(quarter.dot(quarter).sqrt()));
         let half = quarter.rotate(quarter);
         let identity = Vectors::new(one, V::splat(0.0));
@@ -210,11 +210,9 @@ impl<V: Wide> Pairs<V> {
         let mut at = now;
         let mut meets = is_now.max(less(nearest, speculative));
         if later.any_positive() {
-            let (then, found) = self.first_touch(&now, later);
-            at = Moments::pick(found, &then, &now);
+            let found;
+            (at, found) = self.first_touch(&now, later, setup);
             meets = meets.max(found);
-            // One that was looked for in vain was looked for all the same.
-            at.distance = at.distance.min(then.distance);
         }
         let closing = self.closing(at.anchor, at.offset, at.normal).max(zero);
         let ahead = self.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
@@ -238,9 +236,10 @@ impl<V: Wide> Pairs<V> {
         }
     }
 
-    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step.
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step; for the others the
+    /// last that was looked at, or of circles that in which they are nearest.
     #[inline(always)]
-    fn first_touch(&self, now: &Moments<V>, asked: V) -> (Moments<V>, V) {
+    fn first_touch(&self, now: &Moments<V>, asked: V, setup: &Setup) -> (Moments<V>, V) {
         let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.dt);
         let mixed = self.not_round(0).max(self.not_round(1)).mul(asked);
         // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
@@ -250,12 +249,14 @@ impl<V: Wide> Pairs<V> {
         let rest = self.offset.dot(self.offset).sub(sum.mul(sum));
         let root = half.mul(half).sub(square.mul(rest));
         let time = rest.div(half.add(root.max(zero).sqrt()));
+        let nearest = half.div(square.max(V::splat(f32::MIN_POSITIVE))).max(zero).min(dt);
         let meet =
             less(zero, half).mul(less(root, zero).if_positive(zero, one)).mul(less(dt, time).if_positive(zero, one));
         let mut found = mixed.if_positive(zero, meet).mul(asked);
         // Who has a moment of touch already, to be found once more or as it is; and who is still looked for.
-        let (mut last, mut at) = (time.max(zero), *now);
-        let mut exact = found;
+        let (mut last, mut at) = (found.if_positive(time.max(zero), nearest), *now);
+        let near = less(now.separation, V::splat(setup.params.speculative_distance)).mul(asked);
+        let mut exact = mixed.if_positive(zero, found.max(near));
         if mixed.any_positive() {
             let sweep = self.sweep(0).add(self.sweep(1));
             let (mut going, mut ending) = (mixed, zero);

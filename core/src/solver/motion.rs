@@ -2,7 +2,7 @@
 
 use crate::model::math::min;
 use crate::parallel::lanes::{LANES, Lanes, Quad};
-use crate::parallel::vectors::Vectors;
+use crate::parallel::vectors::{Vectors, tangent};
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
@@ -117,11 +117,11 @@ impl Motion {
         rotation
     }
 
-    /// Turned by a tangent: longer than before, by half at most.
+    /// Turned along a tangent: longer than before, by half at most.
     #[inline(always)]
     fn turn_part<V: Lanes>(&self, rotation: Vectors<V>, speed: V) -> Vectors<V> {
-        let (angle, Vectors { x: c, y: s }) = (V::splat(self.h / self.parts as f32).mul(speed), rotation);
-        Vectors::new(c.sub(angle.mul(s)), s.add(angle.mul(c)))
+        let (way, Vectors { x: c, y: s }) = (tangent(V::splat(self.h / self.parts as f32).mul(speed)), rotation);
+        Vectors::new(c.sub(way.mul(s)), s.add(way.mul(c)))
     }
 }
 

@@ -4,9 +4,9 @@
 //! (warm starting), solves with soft contacts that push overlap out, integrates positions, and solves once more without
 //! the push ("relax"), so that the push adds no energy.
 
+use super::bodies::LIGHTEST;
 use super::constraint::group::Group;
 use super::constraint::kernels::{Normals, Pass, Press, Table, WarmStart};
-use super::bodies::LIGHTEST;
 use super::job::Job;
 use super::motion::Motion;
 use crate::model::softness::Softness;

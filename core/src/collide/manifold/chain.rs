@@ -31,14 +31,20 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let length = dot(along, along).sqrt();
     let along = along / length;
     let n = Vec2::new(-along.y, along.x);
-    let heights = other.corners().map(|corner| (dot(corner - from, n), dot(corner - from, along)));
-    let (lowest, place) = heights.fold((f32::INFINITY, 0.0), |least, at| if at.0 < least.0 { at } else { least });
+    let heights = other.corners().map(|corner| (dot(corner - from, n), dot(corner - from, along), corner)).zip(0..);
+    let none = ((f32::INFINITY, 0.0, Vec2::ZERO), 0);
+    let ((lowest, place, corner), number) = heights.fold(none, |least, at| if at.0.0 < least.0.0 { at } else { least });
+    let is_over = (0.0..=length).contains(&place);
     let is_before = dot(center - from, n) >= 0.0;
-    let over = is_before.then(|| against_face(own, n, other, radius)).flatten();
+    let mut over = is_before.then(|| against_face(own, n, other, radius)).flatten();
+    if over.is_none() && is_before && is_over {
+        // Round, with an edge that leans out beyond the end: its other corner is what comes down.
+        over = Some(of_corner(corner, lowest, n, radius, 1 << 9 | number));
+    }
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over
         && lowest > 0.0
-        && (0.0..=length).contains(&place)
+        && is_over
     {
         return over;
     }
@@ -91,11 +97,16 @@ fn against_face(own: &Convex, n: Vec2, other: &Convex, radius: f32) -> Option<Ma
         let (along, height) = (dot(point - from, to - from), dot(point - from, n));
         let square = dot(to - from, to - from);
         let is_over = (-BEYOND * square..=(1.0 + BEYOND) * square).contains(&along);
-        let separation = height - radius;
-        return is_over.then(|| Manifold::single(n, point - n * (height - 0.5 * separation), separation, 0));
+        return is_over.then(|| of_corner(point, height, n, radius, 0));
     }
     let edge = other.against(n);
     clip([to, from], n, other.edge(edge), [0.0, radius], (edge as u32) << 1)
+}
+
+/// A corner, with a radius around it, so high over a segment.
+fn of_corner(corner: Vec2, height: f32, n: Vec2, radius: f32, feature: u32) -> Manifold {
+    let separation = height - radius;
+    Manifold::single(n, corner - n * (height - 0.5 * separation), separation, feature)
 }
 
 /// Whether a unit vector lies between two others, nearer to each other than half a turn, and so far from both.

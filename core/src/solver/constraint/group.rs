@@ -91,13 +91,7 @@ fn along(row: [f32; 3], v: Quad) -> f32 {
 
 /// One lane alone. Bodies are given as those of the batch.
 impl Sides {
-    const EMPTY: Self = Self {
-        a: [0; WIDE],
-        b: [0; WIDE],
-        normal_x: ZERO,
-        normal_y: ZERO,
-        friction: ZERO,
-    };
+    const EMPTY: Self = Self { a: [0; WIDE], b: [0; WIDE], normal_x: ZERO, normal_y: ZERO, friction: ZERO };
 
     /// The normal times the roots of the inverse masses of A and B, which bodies tell with their velocities.
     fn normals(&self, lane: usize, velocity: &[Quad]) -> [[f32; 2]; 2] {

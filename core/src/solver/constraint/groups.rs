@@ -171,7 +171,8 @@ impl Groups {
         let at = self.lanes[contact as usize];
         let (sides, points, lane) = at.rows_mut(&mut self.kept);
         for point in points {
-            point.separation[lane] = sides.separation(point, lane, at.bodies(&bodies.velocity), at.bodies(&bodies.pose));
+            point.separation[lane] =
+                sides.separation(point, lane, at.bodies(&bodies.velocity), at.bodies(&bodies.pose));
         }
     }
 
