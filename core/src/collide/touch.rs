@@ -318,12 +318,12 @@ impl<'a> Approach<'a> {
 
     /// The separations of a contact whose manifold still serves: they touch, and have hardly moved against each other.
     ///
-    /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever. Not of
-    /// one point: bodies rock and roll on that, and an arm that lags behind them would drive them on.
+    /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever. Bodies
+    /// rock and roll on one point: an arm that lags behind them would drive them on.
     #[inline(always)]
     fn recycle(&self, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
         let Approach { a, b, offset, .. } = self;
-        if a.is_round() || b.is_round() || known.point_count() == 1 {
+        if a.is_round() || b.is_round() {
             return None;
         }
         let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
@@ -334,7 +334,9 @@ impl<'a> Approach<'a> {
         let turns = |side: &Side<'_>| side.kind.inv_mass > 0.0 || side.angular_velocity != 0.0;
         let extent = |side: &Side<'_>| if turns(side) { side.kind.bounding_radius } else { 0.0 };
         let twist = turned_a.to(turned_b).s.abs() * max(extent(a), extent(b));
-        if dot(moved, moved).sqrt() + twist >= setup.params.recycle_distance {
+        let most = setup.params.recycle_distance;
+        let most = if known.point_count() == 1 { min(most, TOUCHING) } else { most };
+        if dot(moved, moved).sqrt() + twist >= most {
             return None;
         }
         let shift = *offset - known.offset;
