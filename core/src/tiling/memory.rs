@@ -17,11 +17,12 @@ impl Blueprint {
             + f64::from(largest_radius(&self.kinds, self.params.large_radius))
             + 0.5 * f64::from(self.params.margin_floor + self.params.margin_cap);
         let partition = &self.partition;
-        // How many tiles of that size a body's grown AABB and the halo around it meet, along an axis.
-        let met = |tiles: u64, side: f64| (1.0 + 2.0 * reach / side).min(tiles as f64);
+        let (domain, tiles) = (partition.max() - partition.min(), partition.tiles() as f64);
+        // How many tiles of that size a body's grown AABB and the halo around it meet, but for its own; there are no more.
         let copies = |tile: TileId| {
-            let (size, (_, [columns, rows])) = (partition.rectangle(tile).size(), partition.cell(tile));
-            met(columns, size.x) * met(rows, size.y) - 1.0
+            let size = partition.rectangle(tile).size();
+            let met = (1.0 + 2.0 * reach / size).min(domain / size);
+            (met.x * met.y).min(tiles) - 1.0
         };
         // Equal tiles are all like the first.
         let looked_at = if partition.is_uniform() { 1 } else { partition.tiles() as u32 };
@@ -29,5 +30,31 @@ impl Blueprint {
         let ghosts = (bodies as f64 * copies * PER_GHOST) as u64;
         let tiles = partition.tiles() as u64 * (size_of::<Tile>() as u64 + 64);
         bodies.saturating_mul(PER_BODY).saturating_add(ghosts).saturating_add(tiles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::params::Params;
+    use crate::testing::circle;
+    use crate::tiling::partition::{Bisector, Partition};
+    use glam::DVec2;
+
+    #[test]
+    fn a_body_has_no_more_copies_than_there_are_other_tiles() {
+        let (low, high) = (DVec2::ZERO, DVec2::splat(20.0));
+        // Borders so near to each other that a halo is very many times as wide.
+        let slivers = [2, 1, 3].map(|at| Bisector { axis: 0, at });
+        for partition in [
+            Partition::uniform(low, high, 2, 2),
+            Partition::forest(low, high, 1, 1, &[1; 4]),
+            Partition::bisection(low, high, &slivers),
+        ] {
+            let (partition, kinds) = (partition.unwrap(), vec![circle(0.5)]);
+            let blueprint = Blueprint { params: Params::default(), partition, kinds, statics: Vec::new() };
+            let per_body = (blueprint.memory(100) - blueprint.memory(0)) / 100;
+            assert!((PER_BODY..=PER_BODY + 3 * PER_GHOST as u64).contains(&per_body), "{per_body} bytes");
+        }
     }
 }
