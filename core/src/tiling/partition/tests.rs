@@ -395,6 +395,30 @@ fn borders_move_to_where_there_is_much_to_do_and_stay_there() {
 }
 
 #[test]
+fn far_from_the_origin_tiles_keep_a_width_as_borders_move() {
+    let bisected = |low: DVec2, tiles| {
+        let even = (0..400).map(|k| (low + DVec2::new(f64::from(k % 20), f64::from(k / 20)), 1));
+        Partition::bisected(low, low + 20.0, tiles, 0.0, even)
+    };
+    // From each domain all bodies lie far away, so that every cut goes as near to an edge as it may.
+    for low in [DVec2::splat(1e8), DVec2::new(9e8, 0.0), DVec2::new(-1e8, 9e8)] {
+        let mut partition = bisected(low, 64).unwrap();
+        let spacing = low.abs().to_array().map(|far| far.next_up() - far);
+        for _ in 0..8 {
+            let Some(next) = rebisected(&partition, 0.85) else { break };
+            partition = next;
+            let wide = |tile| partition.rectangle(tile).size().cmpgt(500.0 * DVec2::from_array(spacing)).all();
+            assert!(tiles(&partition).all(wide), "{low}");
+        }
+    }
+    // More than there is room for are refused before any is cut.
+    let refused = bisected(DVec2::splat(1e12), 1000).unwrap_err();
+    assert!(matches!(refused, SetupError::BadGrid { columns: 1000, rows: 1, .. }), "{refused}");
+    // But there are two axes to cut across.
+    assert!(bisected(DVec2::new(1e12, 0.0), 1000).is_ok());
+}
+
+#[test]
 fn cuts_must_lie_within_what_they_cut() {
     let cut = |axis, at| Bisector { axis, at };
     let refused = |cuts: &[Bisector]| match Partition::bisection(DVec2::ZERO, DVec2::ONE, cuts) {

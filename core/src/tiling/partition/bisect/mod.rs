@@ -39,6 +39,17 @@ fn is_fair(share: f64, [low, high]: [f64; 2]) -> bool {
     ((1.0 - share) * low - share * high).abs() <= TOLERANCE * share * (low + high)
 }
 
+/// A tile is at least so many times as wide as the next number is away from the greatest coordinate of the domain.
+const LEAST_WIDTH: f64 = 1000.0;
+
+/// The least width of a tile along either axis, in parts of the domain.
+fn least_width(min: DVec2, max: DVec2) -> [u64; 2] {
+    let spacing = |far: f64| far.next_up() - far;
+    let far = min.abs().max(max.abs());
+    let least = LEAST_WIDTH * DVec2::new(spacing(far.x), spacing(far.y)) / (max - min) * PARTS as f64;
+    least.to_array().map(|parts| (parts.ceil() as u64).clamp(1, PARTS))
+}
+
 /// A block that is to be cut.
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -53,19 +64,6 @@ struct Node {
     is_old: bool,
     /// Whether that was at the same places.
     is_same: bool,
-}
-
-impl Node {
-    /// Whether it can be cut across an axis as often as it will be.
-    fn fits(&self, axis: usize) -> bool {
-        self.block.max[axis] - self.block.min[axis] >= self.tiles as u64
-    }
-
-    /// From where to where it can be cut across an axis, so that each part can be cut as often as it will be.
-    fn room(&self, axis: usize) -> [u64; 2] {
-        let first = tiles_of_first(self.tiles) as u64;
-        [self.block.min[axis] + first, self.block.max[axis].saturating_sub(self.tiles as u64 - first)]
-    }
 }
 
 /// Where a block is cut.
@@ -84,6 +82,8 @@ pub struct Bisecting {
     max: DVec2,
     /// The width of the halo along either axis, in parts of the domain.
     halo: [f64; 2],
+    /// The least width of a tile along either axis, in parts of the domain.
+    least: [u64; 2],
     /// The cuts that there were before, if there were any.
     old: Vec<Bisector>,
     /// What each tile had to do, where there were any.
@@ -97,12 +97,31 @@ pub struct Bisecting {
 }
 
 impl Bisecting {
-    fn new(min: DVec2, max: DVec2, tiles: usize, halo_width: f64) -> Self {
+    fn new(min: DVec2, max: DVec2, tiles: usize, halo_width: f64) -> Result<Self, SetupError> {
         let halo = (halo_width / (max - min) * PARTS as f64).to_array();
         let root = Node { block: Block::ALL, first: 0, tiles, cut: 0, depth: 0, is_old: false, is_same: false };
         let nodes = if tiles > 1 { vec![root] } else { Vec::new() };
         let cuts = vec![Bisector { axis: 0, at: 0 }; tiles - 1];
-        Self { min, max, halo, old: Vec::new(), loads: Vec::new(), sums: Vec::new(), nodes, cuts }
+        let (least, old, loads, sums) = (least_width(min, max), Vec::new(), Vec::new(), Vec::new());
+        let bisecting = Self { min, max, halo, least, old, loads, sums, nodes, cuts };
+        if bisecting.nodes.iter().any(|root| ![0, 1].into_iter().any(|axis| bisecting.fits(root, axis))) {
+            let (columns, rows, DVec2 { x: width, y: height }) = (tiles as u32, 1, max - min);
+            let must = "so far from the origin there must be fewer for each to have a width";
+            return Err(SetupError::BadGrid { columns, rows, width, height, must });
+        }
+        Ok(bisecting)
+    }
+
+    /// Whether a block can be cut across an axis as often as it will be.
+    fn fits(&self, node: &Node, axis: usize) -> bool {
+        node.block.max[axis] - node.block.min[axis] >= node.tiles as u64 * self.least[axis]
+    }
+
+    /// From where to where a block can be cut across an axis, so that each part can be cut as often as it will be.
+    fn room(&self, node: &Node, axis: usize) -> [u64; 2] {
+        let (first, least) = (tiles_of_first(node.tiles), self.least[axis]);
+        let rest = (node.tiles - first) as u64 * least;
+        [node.block.min[axis] + first as u64 * least, node.block.max[axis].saturating_sub(rest)]
     }
 
     /// Whether all blocks are cut.
@@ -173,11 +192,11 @@ impl Bisecting {
             if let Some(known) = known.filter(|known| is_fair(share, profile.sides(f64::from(known.at), halo, inner))) {
                 return known;
             }
-            let [least, most] = node.room(axis);
+            let [least, most] = self.room(node, axis);
             let at = (profile.place(share, halo, inner).round() as u64).clamp(least, most);
             Bisector { axis: axis as u32, at: at as u32 }
         };
-        match [0, 1].map(|axis| node.fits(axis)) {
+        match [0, 1].map(|axis| self.fits(node, axis)) {
             [true, true] => {
                 let cuts = [0, 1].map(place);
                 let severed = [0, 1].map(|axis| profiles[axis].severed(f64::from(cuts[axis].at), self.halo[axis]));
@@ -196,21 +215,22 @@ impl Bisecting {
         }
     }
 
-    /// The cut of a block in which there is nothing: the one that was, or across the longer side.
+    /// The cut of a block in which there is nothing: the one that was, or across the longer side that has room for it.
     fn default(&self, node: &Node) -> Bisector {
         let Node { block, tiles, .. } = *node;
         self.old(node).unwrap_or_else(|| {
             let sides = [0, 1].map(|axis| block.max[axis] - block.min[axis]);
             let longer = usize::from(sides[1] > sides[0]);
-            let at = block.min[longer] + sides[longer] / tiles as u64 * tiles_of_first(tiles) as u64;
-            Bisector { axis: longer as u32, at: at as u32 }
+            let axis = if self.fits(node, longer) { longer } else { 1 - longer };
+            let at = block.min[axis] + sides[axis] / tiles as u64 * tiles_of_first(tiles) as u64;
+            Bisector { axis: axis as u32, at: at as u32 }
         })
     }
 
     /// The cut that a block had, if that can be made in it and leaves room for all others.
     fn old(&self, node: &Node) -> Option<Bisector> {
         let old = *self.old.get(node.cut).filter(|_| node.is_old)?;
-        let [least, most] = node.room(old.axis as usize);
+        let [least, most] = self.room(node, old.axis as usize);
         (least..=most).contains(&u64::from(old.at)).then_some(old)
     }
 
@@ -257,7 +277,7 @@ impl Bisecting {
             let low = Node { block: blocks[0], first, tiles, cut: node.cut + 1, depth, is_old, is_same };
             let (first, tiles) = (first + tiles, node.tiles - tiles);
             let high = Node { block: blocks[1], first, tiles, cut: node.cut + low.tiles, depth, is_old, is_same };
-            if !(low.fits(cut.axis as usize) && high.fits(cut.axis as usize)) {
+            if !(self.fits(&low, cut.axis as usize) && self.fits(&high, cut.axis as usize)) {
                 return Err(bad);
             }
             let parts = [low, high].map(|part| {
@@ -310,7 +330,7 @@ impl Partition {
         let point = |(place, bodies)| Point::new(place, min, max - min, u32::try_from(bodies).unwrap_or(u32::MAX), 0);
         let points: Vec<Point> = bodies.map(point).collect();
         let mut tallies: Vec<Tally> = points.chunks(TALLIED).map(|some| Tally::of_points(some.to_vec())).collect();
-        let mut bisecting = Bisecting::new(min, max, tiles.max(1) as usize, halo_width);
+        let mut bisecting = Bisecting::new(min, max, tiles.max(1) as usize, halo_width)?;
         while !bisecting.is_done() {
             let counts: Vec<u32> =
                 tallies.iter().flat_map(|tally| bisecting.counts(tally)).flat_map(|(_, words)| words).collect();
@@ -324,14 +344,14 @@ impl Partition {
     /// do; `loads` tells what each has to do now, in any order. Cuts stay where they will do. Nothing if it is none.
     ///
     /// # Errors
-    /// If there is no such tile.
+    /// If there is no such tile, or no room for so many.
     pub fn bisect(&self, loads: &[Load], halo_width: f64) -> Result<Option<Bisecting>, SetupError> {
         let Cut::Bisection(bisection) = &self.0 else { return Ok(None) };
         let mut all: Vec<Load> = (0..bisection.tiles() as u32).map(|tile| Load::nothing(TileId(tile))).collect();
         for load in loads {
             *all.get_mut(load.tile.0 as usize).ok_or(SetupError::BadBisection { cut: 0 })? = *load;
         }
-        let mut bisecting = Bisecting::new(self.min(), self.max(), bisection.tiles(), halo_width);
+        let mut bisecting = Bisecting::new(self.min(), self.max(), bisection.tiles(), halo_width)?;
         let mut sum = 0;
         bisecting.sums = iter::once(0).chain(all.iter().map(|load| (sum += load.all(), sum).1)).collect();
         (bisecting.loads, bisecting.old) = (all, bisection.cuts().to_vec());
