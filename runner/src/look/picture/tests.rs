@@ -216,6 +216,11 @@ fn densities_are_what_bodies_cover() {
         field.splat(place, 1.0, Rgb::hex(0));
     }
     assert_near(field.area(), 0.5, "half a body");
+    // A form beyond the image leaves nothing to clear.
+    let beyond = Form::Disc { center: [9.0, f64::from(2 * SIZE)], radius: 2.0 };
+    field.cover(&Canvas::new([SIZE; 2]), &beyond, Rgb::hex(0));
+    field.reset([SIZE; 2]);
+    assert_eq!(field.area(), 0.0);
 }
 
 #[test]

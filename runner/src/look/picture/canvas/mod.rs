@@ -46,10 +46,10 @@ impl Canvas {
         self.clip = self.image.size.map(|length| [0, length as usize]);
     }
 
-    /// Columns, or rows, that are drawn on and may have a part of what lies between two coordinates.
+    /// Columns, or rows, that are drawn on and may have a part of what lies between two coordinates. Never beyond the image.
     pub(super) fn span(&self, axis: usize, low: f64, high: f64) -> std::ops::Range<usize> {
         let [from, to] = self.clip[axis];
-        let first = (low.floor().max(0.0) as usize).max(from);
+        let first = (low.floor().max(0.0) as usize).max(from).min(to);
         first..(high.ceil().max(0.0) as usize).min(to).max(first)
     }
 
