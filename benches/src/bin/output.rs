@@ -79,7 +79,7 @@ fn run_into(folder: &Path, every: Option<(&str, &str)>, steps: u64) -> Result<at
         Some(_) => Plan::beginning(&config, RunFolder::new("the folder", folder))?,
         None => Plan::new(&config)?,
     };
-    let _claim = plan.output.as_ref().map(|output| output.claim(None)).transpose()?;
+    let _claim = plan.claim(None)?;
     run_plan(&plan, &Observer::default())
 }
 

@@ -67,7 +67,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     tell(&first);
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
-        let _claim = claim(&first, held)?;
+        let _claim = first.claim(held)?;
         let quit = StopFlag::default();
         let second = quit.clone();
         let stop = stop_on_signals(true, move || {
@@ -78,7 +78,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         return conclude(&supervise(args, &config, first, run, || wishes.stop.is_requested())?, &outputs);
     }
     let window = Caller::open(args, true)?;
-    let _claim = claim(&first, held)?;
+    let _claim = first.claim(held)?;
     let stop = stop_on_signals(true, || std::process::exit(Exit::Interrupted as i32));
     let run = |plan: &Plan, goes_on| {
         let host = window.as_ref().map(|window| window.host(plan));
@@ -244,11 +244,6 @@ fn hold_new(args: &RunArgs, plan: &Plan, held: Option<Claim>) -> Result<Option<C
     }
 }
 
-/// Makes the folder of a run ready, if it has one.
-fn claim(plan: &Plan, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
-    plan.output.as_ref().map(|output| output.claim(held)).transpose()
-}
-
 /// Whether ranks are to be joined by MPI. Where the configuration cannot be read, the command line says so, or that a
 /// launcher started this process among others: then the ranks meet to complain once.
 #[cfg(feature = "mpi")]
@@ -292,7 +287,7 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     if job.told(speaks && !begun && is_begun(args)) {
         plan = job.agree(prepare(&plan.config, &outputs, true), |plan| plan)?;
     }
-    let _claim = job.all_well(if speaks { claim(&plan, held) } else { Ok(None) })?;
+    let _claim = job.all_well(if speaks { plan.claim(held) } else { Ok(None) })?;
     if speaks {
         tell(&plan);
     }

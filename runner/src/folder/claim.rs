@@ -1,6 +1,6 @@
 //! Who may write to the folder of a run: all processes of one run, and nobody else.
 
-use super::durable::{create_folder_durably, write_durably};
+use super::durable::{create_folder_durably, remove_if_there, sync_folder, write_durably};
 use super::{FolderError, RunFolder};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
@@ -71,11 +71,12 @@ impl RunFolder {
     }
 
     /// Makes the folder that of a run about to begin or to go on: what an overwritten run left is gone, and the configuration
-    /// is there. `held` is what [`hold`](Self::hold) gave before the folder was looked at.
+    /// is there. `begins` are the commands of one that begins: wherever it is killed, no configuration is there without its own.
+    /// `held` is what [`hold`](Self::hold) gave before the folder was looked at.
     ///
     /// # Errors
     /// If it cannot be written to, or another run has begun there meanwhile.
-    pub fn claim(&self, held: Option<Claim>, begins: bool, configuration: &str) -> Result<Claim, FolderError> {
+    pub fn claim(&self, held: Option<Claim>, begins: Option<&str>, configuration: &str) -> Result<Claim, FolderError> {
         let failed = |error: io::Error| self.not_writable(&error);
         let claim = match held {
             Some(claim) => claim,
@@ -85,8 +86,8 @@ impl RunFolder {
                 claim
             }
         };
-        if begins {
-            self.remove_after(None).map_err(failed)?;
+        if let Some(commands) = begins {
+            self.remove_after(None).and_then(|()| self.begin(commands)).map_err(failed)?;
         }
         let write = |file: &mut File| file.write_all(configuration.as_bytes());
         write_durably(&self.configuration(), write).map_err(failed)?;
@@ -94,6 +95,24 @@ impl RunFolder {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         fs::write(self.lock(), format!("{} {now}\n", process::id())).map_err(failed)?;
         Ok(claim)
+    }
+
+    /// Makes the commands those of a run that begins, when nothing else is left of an older one than its configuration.
+    fn begin(&self, commands: &str) -> io::Result<()> {
+        remove_if_there(&self.configuration())?;
+        sync_folder(self.path())?;
+        self.write_commands(commands)
+    }
+
+    /// Keeps these commands, and no others; no file if there are none.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write_commands(&self, commands: &str) -> io::Result<()> {
+        match commands {
+            "" => remove_if_there(&self.commands()),
+            _ => write_durably(&self.commands(), |file| file.write_all(commands.as_bytes())),
+        }
     }
 
     /// What tells the folder from any other, once a run has claimed it.
@@ -149,7 +168,7 @@ mod tests {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", &folder.path().join("new"));
         assert!(run.hold(None).unwrap().is_none());
-        let claim = run.claim(None, true, &configuration()).unwrap();
+        let claim = run.claim(None, Some(""), &configuration()).unwrap();
         let token = run.token().unwrap();
         let shared = run.share(&token, Duration::ZERO).unwrap();
         // A folder of the same name on another host has another, and a broken one none.
@@ -169,7 +188,24 @@ mod tests {
         assert!(held.is_some());
         // Who comes later finds what was begun meanwhile.
         drop(held);
-        let told = run.claim(None, true, "").unwrap_err().to_string();
+        let told = run.claim(None, Some(""), "").unwrap_err().to_string();
         assert!(told.contains("it holds a run"), "{told}");
+    }
+
+    #[test]
+    fn no_configuration_is_there_without_its_commands() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--out", folder.path());
+        let commands = || fs::read_to_string(run.commands()).ok();
+        drop(run.claim(None, Some("one\n"), &configuration()).unwrap());
+        assert_eq!(commands().as_deref(), Some("one\n"));
+        // Who goes on does not know yet from which step.
+        drop(run.claim(run.hold(None).unwrap(), None, &configuration()).unwrap());
+        assert_eq!(commands().as_deref(), Some("one\n"));
+        // Killed before its configuration is there, a run leaves what another can begin over.
+        run.begin("two\n").unwrap();
+        assert!(!run.holds_run() && run.check_free(false).is_ok());
+        drop(run.claim(run.hold(None).unwrap(), Some(""), &configuration()).unwrap());
+        assert_eq!(commands(), None);
     }
 }

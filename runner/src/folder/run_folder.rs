@@ -93,7 +93,9 @@ impl RunFolder {
             let how = "go on with that with --resume, replace it with --overwrite, or name another folder";
             return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
         }
-        let is_ours = |name: &OsStr| name == LOCK || self.is_unfinished(name);
+        // Of commands the lock tells whose they are.
+        let is_begun = self.lock().exists();
+        let is_ours = |name: &OsStr| name == LOCK || is_begun && name == COMMANDS || self.is_unfinished(name);
         match fs::read_dir(&self.path).map(|mut all| all.all(|entry| entry.is_ok_and(|one| is_ours(&one.file_name()))))
         {
             // A run that was killed before it began leaves a little.
@@ -115,7 +117,7 @@ impl RunFolder {
 
     /// Whether a file of that name in here is one that a killed run did not finish.
     fn is_unfinished(&self, name: &OsStr) -> bool {
-        [self.configuration(), self.summary(), self.timings()].iter().any(|path| is_temporary(name, path))
+        [self.configuration(), self.commands(), self.summary(), self.timings()].iter().any(|path| is_temporary(name, path))
     }
 
     /// Refuses a folder in which no run was begun.
@@ -151,7 +153,7 @@ impl RunFolder {
     }
 
     /// Removes what a run left after `step`, as it goes on from there, but for the log, which only loses rows; everything but
-    /// the configuration if there is no such step.
+    /// the configuration and the commands if there is no such step.
     ///
     /// # Errors
     /// What the system says.
@@ -203,6 +205,7 @@ mod tests {
         assert_eq!(refused(&["run.toml", "summary.json"], true), None);
         for (files, overwrite, expected) in [
             (&["run.toml", "lock"][..], false, "it holds a run; go on with that with --resume"),
+            (&["commands.jsonl"], true, "it is not empty, and what it holds is no run"),
             (&["lock", "thesis.tex"], true, "it is not empty, and what it holds is no run"),
             (&[".thesis.tex.1.tmp"], true, "it is not empty, and what it holds is no run"),
         ] {
@@ -232,7 +235,7 @@ mod tests {
         let run = RunFolder::new("--resume", folder.path());
         let check = |overrides| run.check_same_run(&config(overrides), [2, 2]).map_err(|error| error.to_string());
         assert!(check(&[]).unwrap_err().contains("no run was begun there"));
-        run.claim(None, true, &config(&[]).to_toml([2, 2])).unwrap();
+        run.claim(None, Some(""), &config(&[]).to_toml([2, 2])).unwrap();
         check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
         // Wherever it was begun.
         let begun = fs::read_to_string(run.configuration()).unwrap();

@@ -61,16 +61,6 @@ pub struct Output {
     pub begins: bool,
 }
 
-impl Output {
-    /// Makes the folder that of this run. `held` is what [`RunFolder::hold`] gave before the plan was made.
-    ///
-    /// # Errors
-    /// If it cannot be written to, or another run writes there.
-    pub fn claim(&self, held: Option<Claim>) -> Result<Claim, RunError> {
-        Ok(self.folder.claim(held, self.begins, &self.configuration)?)
-    }
-}
-
 /// A configuration with what it takes from its scene, the scene, and its tiles.
 fn open(config: &Config) -> Result<(Config, Scene, [u32; 2]), SceneError> {
     let (scene, mut config) = (Scene::open(&config.scene)?, config.clone());
@@ -136,6 +126,16 @@ impl Plan {
             return Err(folder.refusal(format!("{reason}; begin another run with --out")).into());
         }
         Self::from_found(config, scene, tiles, found, Some((folder, false)))
+    }
+
+    /// Makes the folder that of this run, if it has one. `held` is what [`RunFolder::hold`] gave before the plan was made.
+    ///
+    /// # Errors
+    /// If it cannot be written to, or another run writes there.
+    pub fn claim(&self, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
+        let Some(output) = &self.output else { return Ok(None) };
+        let begins = output.begins.then(|| self.commands.record(0));
+        Ok(Some(output.folder.claim(held, begins.as_deref(), &output.configuration)?))
     }
 
     /// Everywhere figures over time are written to.

@@ -10,7 +10,6 @@ use super::{Observer, RankError, unreadable};
 use crate::command::{Action, Answer, Event, Line, NO_UNTIL, NewBody, Part, Question, State, Word, word};
 use crate::error::{Exit, RunError};
 use crate::folder::AnswersFile;
-use crate::folder::durable::write_durably;
 use crate::plan::Plan;
 use crate::wording::OneLine;
 use atoll_core::{Command, GlobalId, World};
@@ -113,14 +112,9 @@ impl Commander {
             let opened = AnswersFile::open(path, from);
             self.answers = Some(opened.map_err(|error| not_written(path, &error))?);
         }
-        let Some(path) = &self.kept_in else { return Ok(()) };
-        let text = plan.commands.record(from);
-        let written = match (text.is_empty(), path.exists()) {
-            (true, false) => Ok(()),
-            (true, true) => std::fs::remove_file(path),
-            (false, _) => write_durably(path, |file| file.write_all(text.as_bytes())),
-        };
-        written.map_err(|error| not_written(path, &error))
+        let Some(output) = &plan.output else { return Ok(()) };
+        let written = output.folder.write_commands(&plan.commands.record(from));
+        written.map_err(|error| not_written(&output.folder.commands(), &error))
     }
 
     /// What a snapshot is to tell of it, if there is anything.
