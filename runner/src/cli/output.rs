@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::folder::RunFolder;
-use crate::folder::durable::{temporary, write_durably};
+use crate::folder::durable::{follow, is_stream, temporary, write_durably};
 use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -57,7 +57,7 @@ impl Kept<'_> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // The name itself, and what it leads to.
         let named = folder.canonicalize().ok().zip(path.file_name()).map(|(folder, name)| folder.join(name));
-        let places: Vec<PathBuf> = named.into_iter().chain(path.canonicalize()).collect();
+        let places: Vec<PathBuf> = named.into_iter().chain(follow(path)).collect();
         let configuration = self.configuration.and_then(|file| file.canonicalize().ok());
         if configuration.is_some_and(|file| places.contains(&file)) {
             return Some("the configuration of this run".to_owned());
@@ -108,10 +108,11 @@ impl WholeFile {
     pub(super) fn check_all<const N: usize>(
         options: [(&'static str, Option<&Path>); N],
     ) -> Result<[Option<Self>; N], RunError> {
+        let named = options.map(|(_, path)| path.map(|path| path.canonicalize().or_else(|_| follow(path))));
         for (i, (option, path)) in options.iter().enumerate() {
-            let before = options[..i].iter().find(|(_, other)| path.is_some() && other == path);
-            if let (Some((first, _)), Some(path)) = (before, path) {
-                let reason = format!("{first} writes to the same file");
+            let is_same = |other: &usize| matches!((&named[*other], &named[i]), (Some(Ok(a)), Some(Ok(b))) if a == b);
+            if let (Some(first), Some(path)) = ((0..i).find(is_same), path) {
+                let reason = format!("{} writes to the same file", options[first].0);
                 return Err(RunError::BadOutput { option, path: path.to_path_buf(), reason });
             }
         }
@@ -132,11 +133,9 @@ impl WholeFile {
     /// # Errors
     /// If the path can no longer be written.
     pub(super) fn write(&self, content: &[u8]) -> Result<(), RunError> {
-        let write = || {
-            if self.is_special() {
-                return File::create(&self.path)?.write_all(content);
-            }
-            write_durably(&self.path, |file| file.write_all(content))
+        let write = || match follow(&self.path)? {
+            end if is_stream(&end) => write_to_stream(&end, content),
+            end => write_durably(&end, |file| file.write_all(content)),
         };
         write().map_err(|error| RunError::Output { path: self.path.clone(), reason: error.to_string() })
     }
@@ -145,22 +144,47 @@ impl WholeFile {
         if self.path.is_dir() {
             return Err(io::Error::other("it is a directory"));
         }
-        if self.path.file_name().is_none() {
-            return Err(io::Error::other("it names no file"));
+        let end = follow(&self.path)?;
+        if is_stream(&end) {
+            // Whoever reads a pipe would take it for the end that it is opened and closed.
+            return fs::metadata(end).map(drop);
         }
-        if self.path.exists() {
-            File::options().append(true).open(&self.path)?;
+        if end.exists() {
+            File::options().append(true).open(&end)?;
         }
-        if !self.is_special() {
-            let temporary = temporary(&self.path);
-            File::create(&temporary)?;
-            fs::remove_file(temporary)?;
-        }
-        Ok(())
+        let temporary = temporary(&end);
+        File::create(&temporary)?;
+        fs::remove_file(temporary)
     }
+}
 
-    /// A device or a pipe: written to as it is, never replaced.
-    fn is_special(&self) -> bool {
-        fs::metadata(&self.path).is_ok_and(|data| !data.is_file())
+/// Writes to what is never replaced.
+fn write_to_stream(end: &Path, content: &[u8]) -> io::Result<()> {
+    let leads_to = |name: &str| follow(Path::new(name)).is_ok_and(|standard| standard == end);
+    // Opened again, a file would be written over by what else this process says there.
+    if leads_to("/dev/stdout") {
+        let mut stdout = io::stdout().lock();
+        return stdout.write_all(content).and_then(|()| stdout.flush());
+    }
+    if leads_to("/dev/stderr") {
+        return io::stderr().write_all(content);
+    }
+    File::options().append(true).open(end)?.write_all(content)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_reads_a_pipe_gets_all_that_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let (pipe, link) = (folder.path().join("pipe"), folder.path().join("link"));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
+        std::os::unix::fs::symlink("pipe", &link).unwrap();
+        let reader = std::thread::spawn(move || fs::read_to_string(pipe).unwrap());
+        let file = WholeFile::check("--json", &link).unwrap();
+        file.write(b"all of it").unwrap();
+        assert_eq!(reader.join().unwrap(), "all of it");
     }
 }

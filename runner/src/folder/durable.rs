@@ -5,11 +5,15 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Writes a file whole and durably, or not at all: under another name first.
+/// More of them in a row lead nowhere.
+const MOST_LINKS: usize = 40;
+
+/// Writes a file whole and durably, or not at all: under another name first. Links to it stay.
 ///
 /// # Errors
 /// What the system says. What was begun is removed then.
 pub(crate) fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    let path = &follow(path)?;
     let temporary = temporary(path);
     let written = File::create(&temporary).and_then(|mut file| {
         write(&mut file)?;
@@ -35,7 +39,38 @@ pub(crate) fn create_folder_durably(path: &Path) -> io::Result<()> {
 /// # Errors
 /// If the system says that it is not.
 pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
-    sync_folder(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+    sync_folder(folder_of(path))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where the links of a path end, whether anything is there or not. What this process has open, which is where `/dev/stdout`
+/// leads, is an end.
+///
+/// # Errors
+/// If a folder on the way is not there, or links lead in a circle.
+pub(crate) fn follow(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let name = path.file_name().ok_or_else(|| io::Error::other("it names no file"))?;
+        let end = folder_of(&path).canonicalize()?.join(name);
+        path = match fs::read_link(&end) {
+            Ok(link) if !is_open(&end) => end.with_file_name(link),
+            _ => return Ok(end),
+        };
+    }
+    Err(io::Error::other("its links lead in a circle"))
+}
+
+/// Whether what [`follow`] came to is a stream: a device, a pipe, or what a process has open. Such are written to as they are.
+pub(crate) fn is_stream(end: &Path) -> bool {
+    is_open(end) || fs::metadata(end).is_ok_and(|data| !data.is_file())
+}
+
+fn is_open(end: &Path) -> bool {
+    end.starts_with("/proc") || end.starts_with("/dev/fd")
 }
 
 /// Makes the names in a folder durable, where folders can be made durable.
@@ -77,4 +112,29 @@ pub(crate) fn temporary(path: &Path) -> PathBuf {
     name.push(path.file_name().unwrap_or_default());
     name.push(format!(".{}.tmp", std::process::id()));
     path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn links_stay_and_what_they_name_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("below")).unwrap();
+        for (link, to) in [("link", "below/other"), ("below/other", "../file"), ("round", "round")] {
+            std::os::unix::fs::symlink(to, at(link)).unwrap();
+        }
+        for text in ["one", "two"] {
+            write_durably(&at("link"), |file| io::Write::write_all(file, text.as_bytes())).unwrap();
+            assert_eq!(fs::read_to_string(at("file")).unwrap(), text);
+        }
+        assert!(at("link").is_symlink() && at("below/other").is_symlink() && !at("file").is_symlink());
+        assert!(follow(&at("round")).unwrap_err().to_string().contains("in a circle"));
+        assert_eq!(follow(&at("below/../link")).unwrap(), at("file").canonicalize().unwrap());
+        let open = follow(Path::new("/dev/stdout")).unwrap();
+        assert!(is_stream(&open) && is_stream(Path::new("/dev/null")) && !is_stream(&at("file")));
+    }
 }

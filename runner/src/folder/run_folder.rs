@@ -117,7 +117,8 @@ impl RunFolder {
 
     /// Whether a file of that name in here is one that a killed run did not finish.
     fn is_unfinished(&self, name: &OsStr) -> bool {
-        [self.configuration(), self.commands(), self.summary(), self.timings()].iter().any(|path| is_temporary(name, path))
+        let written = [self.configuration(), self.commands(), self.summary(), self.timings()];
+        written.iter().any(|path| is_temporary(name, path))
     }
 
     /// Refuses a folder in which no run was begun.

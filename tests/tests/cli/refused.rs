@@ -212,7 +212,7 @@ fn a_path_that_cannot_be_written_is_refused_before_anything_heavy() {
     refused("--log .", "--log .: it is a directory");
     refused("--log world.toml", "--log world.toml: that is the configuration of this run and must not be written over");
     refused("--json out --log out", "--log out: --json writes to the same file");
-    refused("--json out --timings out", "--timings out: --json writes to the same file");
+    refused("--json out --timings ./out", "--timings ./out: --json writes to the same file");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What is being written under another name.
 
-use crate::folder::durable::{sync_folder_of, temporary};
+use crate::folder::durable::{follow, is_stream, sync_folder_of, temporary};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,6 +21,9 @@ impl Unfinished {
     pub(super) fn file(path: &Path) -> io::Result<(Self, File)> {
         if path.is_dir() {
             return Err(io::Error::other("it is a directory"));
+        }
+        if follow(path).is_ok_and(|end| is_stream(&end)) {
+            return Err(io::Error::other("it is a device or a pipe, and a picture becomes a file; name one"));
         }
         let unfinished = Self::new(path)?;
         let file = File::create(&unfinished.temporary)?;
@@ -43,10 +46,8 @@ impl Unfinished {
     }
 
     fn new(path: &Path) -> io::Result<Self> {
-        if path.file_name().is_none() {
-            return Err(io::Error::other("it names no file"));
-        }
-        Ok(Self { path: path.to_owned(), temporary: temporary(path), is_complete: false })
+        let path = follow(path)?;
+        Ok(Self { temporary: temporary(&path), path, is_complete: false })
     }
 
     /// Where it is until it is complete.
@@ -78,7 +79,9 @@ impl Drop for Unfinished {
 
 /// Removes what this process has begun to write that was to become a path, if anything.
 pub(crate) fn remove_unfinished(path: &Path) {
-    remove(&temporary(path));
+    if let Ok(path) = follow(path) {
+        remove(&temporary(&path));
+    }
 }
 
 fn remove(temporary: &Path) {
