@@ -93,7 +93,8 @@ fn script() -> String {
             17_000 + k
         );
     }
-    text
+    // Where bodies were removed in the same step.
+    text + &format!("{{\"step\": {}, \"contacts\": true}}\n", length() - 2)
 }
 
 const ADAPTIVE: [&str; 6] = ["--tiles=5x5", "--set", "max_bodies=700", "--set", "retile_every=7", "--quiet"];

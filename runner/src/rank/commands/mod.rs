@@ -275,6 +275,8 @@ impl Commander {
                 Action::Add(bodies) => self.crowds.check(bodies).and_then(|()| self.name(bodies)),
                 Action::Do(commands) => Ok(commands.clone()),
                 Action::Tell(event, is_told) => {
+                    // What is gone already ends no contact later: so it is where each line is heard alone.
+                    world.settle();
                     self.state.tell(*event, *is_told);
                     self.followed.set(*event, *is_told, world, transport)?;
                     self.is_used = true;
