@@ -55,6 +55,8 @@ struct Setting {
     value: Value,
     given: Given,
     read: bool,
+    /// What it won over, if the command line said that too: it must make sense all the same.
+    beneath: Option<Box<Setting>>,
 }
 
 /// Everything that was given.
@@ -129,7 +131,8 @@ impl Settings {
 
     fn insert(&mut self, key: &'static str, value: Value, written: String, origin: Origin) {
         let given = Given { origin, key: key.to_owned(), value: written };
-        self.all.insert(key, Setting { value, given, read: false });
+        let beneath = self.all.remove(key).filter(|before| !matches!(before.given.origin, Origin::File(_)));
+        self.all.insert(key, Setting { value, given, read: false, beneath: beneath.map(Box::new) });
     }
 
     /// Refuses whatever was given and never read.
@@ -159,12 +162,18 @@ impl Settings {
         &mut self,
         key: &'static str,
         must: impl Display,
-        convert: impl FnOnce(&Value) -> Option<T>,
+        convert: impl Fn(&Value) -> Option<T>,
     ) -> Result<Option<T>, ConfigError> {
         debug_assert!(self.keys.contains(&key), "{key} is not in the list of keys");
         let Some(setting) = self.all.get_mut(key) else { return Ok(None) };
         setting.read = true;
-        convert(&setting.value).map(Some).ok_or_else(|| self.refusal(key, must))
+        let mut said = std::iter::successors(Some(&*setting), |setting| setting.beneath.as_deref());
+        match said.find(|setting| convert(&setting.value).is_none()) {
+            Some(Setting { given, .. }) => {
+                Err(ConfigError::BadValue { given: given.clone(), must: must.to_string(), suggestion: None })
+            }
+            None => Ok(convert(&setting.value)),
+        }
     }
 
     /// A whole number; `1e6` counts as one.
@@ -254,13 +263,14 @@ impl Settings {
 
     /// One of some words.
     pub(super) fn choice<T: Copy>(&mut self, key: &'static str, words: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
-        let must = one_of(words);
-        let Some(text) = self.get(key, &must, |value| value.as_str().map(str::to_owned))? else { return Ok(None) };
-        if let Some((_, value)) = words.iter().find(|(word, _)| *word == text) {
-            return Ok(Some(*value));
-        }
-        let suggestion = nearest(words.iter().map(|(word, _)| *word), &text);
-        Err(ConfigError::BadValue { given: self.all[key].given.clone(), must, suggestion })
+        let word = |value: &Value| words.iter().find(|(word, _)| value.as_str() == Some(word)).map(|(_, value)| *value);
+        self.get(key, one_of(words), word).map_err(|error| match error {
+            ConfigError::BadValue { given, must, .. } => {
+                let suggestion = nearest(words.iter().map(|(word, _)| *word), given.value.trim_matches('"'));
+                ConfigError::BadValue { given, must, suggestion }
+            }
+            error => error,
+        })
     }
 }
 

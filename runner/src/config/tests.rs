@@ -166,6 +166,11 @@ fn every_key_can_be_given() {
 fn overrides_win_and_the_last_of_them_most() {
     let config = read(ROOMS, &[("scene.bodies", "1e3"), ("bodies", "2000"), ("tiles", "3x2")]).unwrap();
     assert_eq!((config.scene.bodies, config.run.tiles), (2000, Some([3, 2])));
+    // What is wrong is refused, also where something else wins over it.
+    let error = read(ROOMS, &[("steps", "many"), ("run.steps", "2")]).unwrap_err();
+    assert!(error.starts_with("--set run.steps=many: must be a whole number"), "{error}");
+    let error = read(ROOMS, &[("solver", "pgz"), ("solver", "pgs")]).unwrap_err();
+    assert!(error.contains("pgz") && error.contains("did you mean"), "{error}");
     let retiling = |overrides: &[_]| read(ROOMS, overrides).unwrap().run.retiling.map(|r| (r.how, r.every));
     let adaptive = |max_bodies| Retile::Adaptive { max_bodies };
     assert_eq!(retiling(&[("tiles", "adaptive"), ("retile_every", "5")]), Some((adaptive(48_000), 5)));
