@@ -65,7 +65,7 @@ impl Ended {
             Ok(text) => serde_json::from_slice(&text)
                 .map(Some)
                 .map_err(|error| EndedError::Damaged { path, reason: error.to_string() }),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
             Err(error) => Err(EndedError::Read { path, reason: error.to_string() }),
         }
     }
@@ -94,5 +94,7 @@ mod tests {
             let error = read(damaged).unwrap_err();
             assert!(error.contains("summary.json is no summary of a run: ") && !error.contains('\n'), "{error}");
         }
+        // What is no folder has none.
+        assert_eq!(Ended::read(&folder.path().join("summary.json")).unwrap(), None);
     }
 }
