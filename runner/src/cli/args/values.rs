@@ -9,7 +9,7 @@ pub struct ValueArgs {
     /// Ranks that share the tiles [default: the configuration's, else 1].
     #[arg(long, value_name = "N")]
     pub ranks: Option<String>,
-    /// Threads of each rank [default: the configuration's, else 1].
+    /// Threads of each rank [default: the configuration's, else auto].
     #[arg(long, value_name = "T")]
     pub threads: Option<String>,
     /// What carries bytes between ranks: local, channel, iceoryx2 or mpi [default: local for one rank, else channel].
