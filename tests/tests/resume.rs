@@ -288,6 +288,7 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
         assert!(named && ended.stderr.contains("after step 100"), "byte {place}: {ended}");
         assert_eq!(summary(&damaged)["state_hash"], summary(&longer)["state_hash"], "byte {place}");
         assert_eq!(summary(&damaged)["resumed_at"], 100, "byte {place}");
+        assert!(ended.stdout.contains(" migrations since step 100\n"), "byte {place}: {ended}");
     }
     // Where none is whole, that is an error and nothing is lost.
     fs::remove_dir_all(whole.join("snapshots/step-0000000120")).unwrap();

@@ -55,11 +55,10 @@ impl Summary {
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;
         row(f, "energy", format_args!("{:.6e} J, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
-        row(
-            f,
-            "tiles",
-            format_args!("{} ghosts in the last step, {} migrations in all", self.ghosts, self.migrations),
-        )?;
+        // Of those before no snapshot tells.
+        let since = if self.resumed_at > 0 { format!("since step {}", self.resumed_at) } else { "in all".to_owned() };
+        let (ghosts, migrations) = (self.ghosts, self.migrations);
+        row(f, "tiles", format_args!("{ghosts} ghosts in the last step, {migrations} migrations {since}"))?;
         let sent = self.bytes_sent as f64 * mega;
         row(f, "sent", format_args!("{sent:.1} MB between ranks in {} messages", self.messages_sent))?;
         if self.ranks > 1 {

@@ -175,7 +175,11 @@ fn facts(sources: &[Source]) -> String {
             let (bytes, messages) = (source.number("bytes_sent")?, whole(source, "messages_sent")?);
             Some(format!("{} in {messages} messages", Unit(bytes, "B")))
         }),
-        ("Migrations", |source| whole(source, "migrations")),
+        ("Migrations", |source| {
+            let since = whole(source, "resumed_at").filter(|step| step != "0");
+            let since = since.map(|step| format!(", since step {step}")).unwrap_or_default();
+            whole(source, "migrations").map(|count| count + &since)
+        }),
         ("Memory at most", |source| Some(Unit(source.number("peak_rss_bytes")?, "B").to_string())),
         ("On disk", |source| {
             let [recording, snapshots] = source.size.map(|size| Unit(size as f64, "B").to_string());
