@@ -354,6 +354,15 @@ fn another_run_is_refused_by_the_key_that_differs() {
     let ended = begins("--out");
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
     assert!(ended.stderr.contains("it holds a run; go on with that with --resume"), "{ended}");
+    // A run is not lost to a world that turns out to be none.
+    let world = folder.path().join("world.toml");
+    let text = "format = \"atoll-scene/1\"\ndomain = [[-9, -9], [9, 9]]\n[[kinds]]\nbox = [1, 1]\n[bodies]\npath = \"w.csv\"\n";
+    fs::write(&world, text).unwrap();
+    fs::write(folder.path().join("w.csv"), "id,x,y\n1,0,0\n1,3,3\n").unwrap();
+    let mut command = Way::Channel.command(2, world.to_str().unwrap());
+    let ended = program::run(command.args(["--steps", "2", "--tiles", "2x1", "--overwrite", "--out"]).arg(&whole));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+    assert!(ended.stderr.contains("has this id as well") && whole.join("snapshots").exists(), "{ended}");
     // What is no run is never overwritten.
     let other = folder.path().join("other");
     fs::create_dir(&other).unwrap();

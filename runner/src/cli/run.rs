@@ -192,9 +192,13 @@ fn is_standard(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// A plan whose run can go on with what is recorded, and with its log.
+/// A plan whose run can go on with what is recorded, and with its log; or does not begin in vain over another.
 fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
-    plan.and_then(|plan| plan.check_recording().and_then(|()| check_logs(&plan)).map(|()| plan))
+    let plan = plan?;
+    plan.check_recording()?;
+    check_logs(&plan)?;
+    plan.check_overwriting()?;
+    Ok(plan)
 }
 
 fn observer(args: &RunArgs, goes_on: bool) -> Observer {

@@ -17,7 +17,7 @@ use crate::error::RunError;
 use crate::folder::recording::{OfRun, Recording, RunFacts, StageText};
 use crate::folder::snapshot::{self, Found, Snapshot};
 use crate::folder::{Claim, Ended, RunFolder};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Scene, SceneError, SceneFile};
 use atoll_core::Blueprint;
 use std::path::PathBuf;
 
@@ -158,6 +158,16 @@ impl Plan {
         let run = OfRun { path: output.folder.configuration(), facts, stage };
         Recording::check_until(output.folder.path(), run, newest)
             .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())
+    }
+
+    /// Where a run is about to be overwritten by a world in files, whether that is one: it is not to be lost to a fault in them.
+    /// For one process of a run to ask.
+    ///
+    /// # Errors
+    /// If not.
+    pub fn check_overwriting(&self) -> Result<(), RunError> {
+        let overwrites = self.output.as_ref().is_some_and(|output| output.begins && output.folder.holds_run());
+        Ok(self.scene.file().filter(|_| overwrites).map_or(Ok(()), SceneFile::check_bodies)?)
     }
 
     /// `folder` is written to, and says whether the run begins there.
