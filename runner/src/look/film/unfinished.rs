@@ -23,7 +23,7 @@ impl Unfinished {
             return Err(io::Error::other("it is a directory"));
         }
         if follow(path).is_ok_and(|end| is_stream(&end)) {
-            return Err(io::Error::other("it is a device or a pipe, and a picture becomes a file; name one"));
+            return Err(io::Error::other("it is a device or a pipe, and no file"));
         }
         let unfinished = Self::new(path)?;
         let file = File::create(&unfinished.temporary)?;
