@@ -133,6 +133,8 @@ fn a_gas_of_discs_cools_by_haffs_law() {
     assert!((slope / expected - 1.0).abs() < 0.1, "slope {slope} instead of {expected}");
 }
 
+const SEEDS: u64 = 3;
+
 /// Grains of two sizes about 0.1 m in a silo 3 m wide with a flat bottom, and an opening in that; so many rows of them.
 fn silo(opening: f64, rows: u64, seed: u64) -> Scene {
     const COLUMNS: u64 = 26;
@@ -150,14 +152,15 @@ fn silo(opening: f64, rows: u64, seed: u64) -> Scene {
     let kinds = [0.045, 0.055].map(|radius| scene.kind(Shape::circle(radius), material));
     for k in 0..COLUMNS * rows {
         let place = DVec2::new((k % COLUMNS) as f64 - 0.5 * (COLUMNS - 1) as f64, (k / COLUMNS) as f64 + 0.54) * 0.112;
-        scene.body(kinds[usize::from(noise(seed, k) < 0.5)], place, Vec2::ZERO);
+        // Columns that are quite straight would stand.
+        let aside = DVec2::new(0.001 * noise(seed + SEEDS, k), 0.0);
+        scene.body(kinds[usize::from(noise(seed, k) < 0.5)], place + aside, Vec2::ZERO);
     }
     scene
 }
 
 /// Grains that leave it in a second, once they lie on each other, the mean of some silos.
 fn discharge(opening: f64, rows: u64) -> f64 {
-    const SEEDS: u64 = 3;
     let rates = (0..SEEDS).map(|seed| {
         let mut sim = silo(opening, rows, seed).start_on((3, 4), Exchange::Substep);
         let below = |sim: &Sim| sim.bodies().iter().filter(|body| body.position.y < -0.5).count();

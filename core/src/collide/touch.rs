@@ -149,12 +149,13 @@ impl<'a> Approach<'a> {
         if is_now || far.is_infinite() {
             return self.contact(&now, known, setup);
         }
-        let (then, touches) = self.first_touch(&now, reach, setup.params.dt);
-        // Near ones may be driven together within the step: as they are where they would be nearest, or who passes by would be turned
-        // aside.
-        let is_near = touches || nearest < setup.params.speculative_distance;
+        // Near ones may be driven together within the step: as they will be when they pass, or who passes by would be turned aside. A
+        // substep more, as the last one looks beyond the step.
+        let is_near = nearest < setup.params.speculative_distance;
+        let time = if is_near { setup.params.dt + setup.h } else { setup.params.dt };
+        let (then, touches) = self.first_touch(&now, reach, time);
         let at = if then.manifold.is_distance() { now } else { then };
-        if is_near { self.contact(&at, known, setup) } else { None }
+        if touches || is_near { self.contact(&at, known, setup) } else { None }
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.
@@ -202,8 +203,8 @@ impl<'a> Approach<'a> {
         -dot(self.between + velocity_b - velocity_a, at.manifold.normal)
     }
 
-    /// The moment in which the two, apart now, touch, and whether that is within the step; if not, the last one in which it was seen that
-    /// they do not yet, or of circles that in which they are nearest.
+    /// The moment in which the two, apart now, touch, and whether that is within so many seconds; if not, the last one in which it was seen
+    /// that they do not yet, or of circles that in which they are nearest.
     #[inline(never)]
     fn first_touch(&self, now: &Moment, reach: f32, dt: f32) -> (Moment, bool) {
         if self.a.is_round() && self.b.is_round() {
@@ -282,7 +283,8 @@ impl<'a> Approach<'a> {
             let blow = if manifold.count == 2 { 0.5 * max(closing[1 - k], 0.0) } else { 0.0 };
             let closing = max(closing[k] + blow, 0.0);
             // A speed that overflows is not one that can wait for the next step.
-            let ahead = if is_fixed || closing.is_infinite() { (setup.params.dt - time) * closing } else { 0.0 };
+            let ahead =
+                if is_fixed || closing.is_infinite() { max(setup.params.dt - time, 0.0) * closing } else { 0.0 };
             if point.separation < setup.params.speculative_distance + ahead {
                 kept.push(*point);
             }

@@ -196,7 +196,8 @@ impl Points {
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
         let later = is_now.max(now.unsure).if_positive(zero, asked);
-        let later = pairs.come_near(&now).if_positive(later, zero);
+        let within = less(separation, speculative).if_positive(dt.add(V::splat(setup.h)), dt);
+        let later = pairs.come_near(&now, within).if_positive(later, zero);
         later.store(&mut self.postponed);
         let count = self.postponed.iter().fold(0, |count, &later| count + usize::from(later > 0.0));
         let mut at = now;
@@ -204,7 +205,7 @@ impl Points {
         if count > if search == Search::Always { 0 } else { FEW } {
             self.postponed = [0.0; WIDE];
             let found;
-            (at, found) = pairs.first_moments(shapes, &now, later, reach);
+            (at, found) = pairs.first_moments(shapes, &now, later, reach, within);
             meets = meets.max(found);
         }
         meets = meets.mul(asked).mul(at.some);
@@ -214,7 +215,7 @@ impl Points {
             let (anchor, separation) = (at.anchor[point], at.separation[point]);
             let blow = at.two.if_positive(V::splat(0.5).mul(closing[1 - point].max(zero)), zero);
             let closing = closing[point].add(blow).max(zero);
-            let ahead = pairs.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
+            let ahead = pairs.fixed.if_positive(dt.sub(at.time).max(zero).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
             let out = at.normal.scaled(V::splat(0.5).mul(separation.max(zero)));
@@ -279,25 +280,25 @@ impl<V: Wide> Pairs<V> {
         negated(self.between.dot(normal)).add(self.sweep(0).add(self.sweep(1)))
     }
 
-    /// One for those that may touch within the rest of the step: what is apart along a direction stays so for as long as nothing moves
-    /// further along it.
+    /// One for those that may touch within the rest of so many seconds: what is apart along a direction stays so for as long as nothing
+    /// moves further along it.
     #[inline(always)]
-    fn come_near(&self, at: &Moments<V>) -> V {
+    fn come_near(&self, at: &Moments<V>, dt: V) -> V {
         let (_, separation) = at.nearest();
-        let way = self.bound_along(at.normal).mul(self.dt.sub(at.time));
+        let way = self.bound_along(at.normal).mul(dt.sub(at.time));
         less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
     }
 
-    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step; for the others the
-    /// last that was looked at.
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within so many seconds; for the
+    /// others the last that was looked at.
     #[inline(always)]
-    fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V) -> (Moments<V>, V) {
-        let (zero, dt) = (V::splat(0.0), self.dt);
+    fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V, dt: V) -> (Moments<V>, V) {
+        let zero = V::splat(0.0);
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
         for _ in 0..ROUNDS {
             let (anchor, separation) = at.nearest();
             let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
-            going = self.come_near(&at).if_positive(going, zero);
+            going = self.come_near(&at, dt).if_positive(going, zero);
             if !going.any_positive() {
                 break;
             }

@@ -210,12 +210,13 @@ impl<V: Wide> Pairs<V> {
         let mut at = now;
         let mut meets = is_now.max(less(nearest, speculative));
         if later.any_positive() {
+            let within = less(nearest, speculative).if_positive(dt.add(V::splat(setup.h)), dt);
             let found;
-            (at, found) = self.first_touch(&now, later, setup);
+            (at, found) = self.first_touch(&now, later, within, setup);
             meets = meets.max(found);
         }
         let closing = self.closing(at.anchor, at.offset, at.normal).max(zero);
-        let ahead = self.fixed.if_positive(dt.sub(at.time).mul(closing), zero);
+        let ahead = self.fixed.if_positive(dt.sub(at.time).max(zero).mul(closing), zero);
         let holds = less(at.separation, speculative.add(ahead));
         let moved = self.between.dot(at.normal).mul(at.time);
         let out = at.normal.scaled(V::splat(0.5).mul(at.separation.max(zero)));
@@ -236,11 +237,11 @@ impl<V: Wide> Pairs<V> {
         }
     }
 
-    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the step; for the others the
-    /// last that was looked at, or of circles that in which they are nearest.
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within so many seconds; for the
+    /// others the last that was looked at, or of circles that in which they are nearest.
     #[inline(always)]
-    fn first_touch(&self, now: &Moments<V>, asked: V, setup: &Setup) -> (Moments<V>, V) {
-        let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.dt);
+    fn first_touch(&self, now: &Moments<V>, asked: V, dt: V, setup: &Setup) -> (Moments<V>, V) {
+        let (one, zero) = (V::splat(1.0), V::splat(0.0));
         let mixed = self.not_round(0).max(self.not_round(1)).mul(asked);
         // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
         let sum = self.bound[0].add(self.bound[1]);

@@ -160,7 +160,7 @@ impl<V: Wide> Normals<V> {
         press: impl Fn(&PointRows) -> Press<V> + Copy,
     ) {
         /// In m/s.
-        const SLIGHT: f32 = 0.2;
+        const SLIGHT: f32 = 0.1;
         const TIMES: usize = 8;
         let mut turned = self.push(points, friction, a, b, press);
         if N == 1 {
