@@ -104,7 +104,7 @@ fn sleep_has_one_result() {
     for (path, small, steps) in [
         ("configs/stack.toml", &[("tiles", "1x1")][..], "200"),
         ("configs/pyramids.toml", &[("bodies", "550"), ("tiles", "1x1")][..], "150"),
-        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "1x1"), ("seed", "4")][..], "300"),
+        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "1x1"), ("seed", "1")][..], "300"),
     ] {
         let asleep = run((path, small), &[("sleep", "true"), ("steps", steps)]).asleep;
         assert!(asleep > 0, "{path}: nobody sleeps");

@@ -62,7 +62,7 @@ fn a_full_disk_ends_the_run_cleanly() {
             &whole,
         );
         let script = format!(
-            "mount -t tmpfs -o size=7m none $DISK || exit 99
+            "mount -t tmpfs -o size=6m none $DISK || exit 99
              $ATOLL {run} {options} --out $DISK/run
              echo \"first: $?\"
              cp -r $DISK/run $KEPT/full
