@@ -193,10 +193,16 @@ fn zigzag(scene: &mut Scene) {
     let corner = |k: i32| Vec2::new(0.3 * k as f32 - 0.5 * LAND as f32, 0.15 * (1.7 * k as f32).sin());
     for k in 0..(LAND / 0.3) as i32 {
         let [before, from, to, after] = [k - 1, k, k + 1, k + 2].map(corner);
-        let (segment, middle) = Segment::new(Some(before), from, to, Some(after)).unwrap();
-        let kind = Kind::new(Shape::Segment(segment), Material::default());
-        scene.statics.push(StaticBody::new(GlobalId(k as u64), kind, MIDDLE + middle.as_dvec2()));
+        segment(scene, MIDDLE, [from, to], [Some(before), Some(after)]);
     }
+}
+
+/// Adds a segment between two corners, seen from a place, and those before and after.
+fn segment(scene: &mut Scene, place: DVec2, [from, to]: [Vec2; 2], [before, after]: [Option<Vec2>; 2]) {
+    let (segment, middle) = Segment::new(before, from, to, after).unwrap();
+    let kind = Kind::new(Shape::Segment(segment), Material::default());
+    let id = GlobalId(scene.statics.len() as u64);
+    scene.statics.push(StaticBody::new(id, kind, place + middle.as_dvec2()));
 }
 
 /// Who meets it with an end is spun, and comes down with the other; who slides down comes upon the next that rises.
@@ -251,16 +257,11 @@ fn a_round_end_does_not_sink_where_segments_meet() {
     let mut scene = Scene::new(MIDDLE, 0.0);
     scene.half = DVec2::new(400.0, 20.0);
     let kind = scene.kind(Shape::capsule(1.0, 0.25).unwrap(), Material { friction: 0.0, ..Material::default() });
-    let ends = [-3.0_f32, 0.0, 3.0].map(|x| Vec2::new(x, 0.0));
-    let segments =
-        [[None, Some(ends[0]), Some(ends[1]), Some(ends[2])], [Some(ends[0]), Some(ends[1]), Some(ends[2]), None]];
+    let [begin, joint, end] = [-3.0, 0.0, 3.0].map(|x| Vec2::new(x, 0.0));
     let place = |k: u64| MIDDLE + DVec2::new(7.0 * k as f64 - 350.0, 0.0);
     for k in 0..100 {
-        for (number, [before, from, to, after]) in (0..).zip(segments) {
-            let (segment, middle) = Segment::new(before, from.unwrap(), to.unwrap(), after).unwrap();
-            let kind = Kind::new(Shape::Segment(segment), Material::default());
-            scene.statics.push(StaticBody::new(GlobalId(2 * k + number), kind, place(k) + middle.as_dvec2()));
-        }
+        segment(&mut scene, place(k), [begin, joint], [None, Some(end)]);
+        segment(&mut scene, place(k), [joint, end], [Some(begin), None]);
     }
     let bodies: Vec<_> = (0..100_u64)
         .map(|k| {
@@ -289,9 +290,7 @@ fn a_round_end_does_not_sink_where_segments_meet() {
 fn a_thin_plank_that_topples_gains_no_energy() {
     for (length, thickness) in [(1.0_f32, 0.005_f32), (2.0, 0.01), (2.0, 0.02)] {
         let mut scene = Scene::new(MIDDLE, -10.0);
-        let (segment, middle) = Segment::new(None, Vec2::new(-9.0, 0.0), Vec2::new(9.0, 0.0), None).unwrap();
-        let floor = Kind::new(Shape::Segment(segment), Material::default());
-        scene.statics.push(StaticBody::new(GlobalId(9), floor, MIDDLE + middle.as_dvec2()));
+        segment(&mut scene, MIDDLE, [-9.0, 9.0].map(|x| Vec2::new(x, 0.0)), [None, None]);
         let kind = scene.kind(Shape::rectangle(thickness, length), Material::default());
         let id = scene.body(kind, MIDDLE + DVec2::new(0.0, 0.5 * f64::from(length)), Vec2::ZERO);
         scene.last().rotation = Rot::from_angle(-0.1);

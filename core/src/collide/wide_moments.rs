@@ -196,12 +196,13 @@ impl Points {
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
         let later = is_now.max(now.unsure).if_positive(zero, asked);
-        let within = less(separation, speculative).if_positive(dt.add(V::splat(setup.h)), dt);
+        let near = less(separation, speculative);
+        let within = pairs.ahead(near, setup);
         let later = pairs.come_near(&now, within).if_positive(later, zero);
         later.store(&mut self.postponed);
         let count = self.postponed.iter().fold(0, |count, &later| count + usize::from(later > 0.0));
         let mut at = now;
-        let mut meets = is_now.max(less(separation, speculative));
+        let mut meets = is_now.max(near);
         if count > if search == Search::Always { 0 } else { FEW } {
             self.postponed = [0.0; WIDE];
             let found;
@@ -218,10 +219,8 @@ impl Points {
             let ahead = pairs.fixed.if_positive(dt.sub(at.time).max(zero).mul(closing), zero);
             let there = if point == 0 { meets } else { meets.mul(at.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
-            let out = at.normal.scaled(V::splat(0.5).mul(separation.max(zero)));
-            let on_a = pairs.swing(0, at.turning[0], anchor.minus(out), at.normal);
-            let on_b = pairs.swing(1, at.turning[1], anchor.plus(out).minus(at.offset), at.normal);
-            let before = separation.sub(moved.add(on_b.sub(on_a)));
+            let swung = pairs.swing_apart(at.turning, at.offset, at.normal, anchor, separation);
+            let before = separation.sub(moved.add(swung));
             let now = at.time.if_positive(before, separation);
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
             at.feature[point].store(&mut self.feature[point]);

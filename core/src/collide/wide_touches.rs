@@ -188,9 +188,32 @@ impl<V: Wide> Pairs<V> {
 
     /// How far a body's surface, at a point, comes along a normal as it turns so.
     #[inline(always)]
-    pub(super) fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
+    fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
         let way = turning.x.sub(V::splat(1.0)).mul(arm.dot(normal)).add(turning.y.mul(arm.cross(normal)));
         self.not_round(side).mul(way)
+    }
+
+    /// How far the surfaces, at a point with such a separation, come apart along a normal as both bodies turn so: each one's own surface
+    /// turns with it.
+    #[inline(always)]
+    pub(super) fn swing_apart(
+        &self,
+        turning: [Vectors<V>; 2],
+        offset: Vectors<V>,
+        normal: Vectors<V>,
+        anchor: Vectors<V>,
+        separation: V,
+    ) -> V {
+        let out = normal.scaled(V::splat(0.5).mul(separation.max(V::splat(0.0))));
+        let on_a = self.swing(0, turning[0], anchor.minus(out), normal);
+        let on_b = self.swing(1, turning[1], anchor.plus(out).minus(offset), normal);
+        on_b.sub(on_a)
+    }
+
+    /// Within so many seconds a touch is looked for: of those that are near a substep beyond the step, as in `touch.rs`.
+    #[inline(always)]
+    pub(super) fn ahead(&self, near: V, setup: &Setup) -> V {
+        near.if_positive(self.dt.add(V::splat(setup.h)), self.dt)
     }
 
     /// The contacts of all pairs.
@@ -208,21 +231,19 @@ impl<V: Wide> Pairs<V> {
         let passes = passes(self.offset, self.between, self.bound[0].add(self.bound[1]), setup);
         let later = is_now.max(passes).if_positive(zero, one);
         let mut at = now;
-        let mut meets = is_now.max(less(nearest, speculative));
+        let near = less(nearest, speculative);
+        let mut meets = is_now.max(near);
         if later.any_positive() {
-            let within = less(nearest, speculative).if_positive(dt.add(V::splat(setup.h)), dt);
             let found;
-            (at, found) = self.first_touch(&now, later, within, setup);
+            (at, found) = self.first_touch(&now, later, near, setup);
             meets = meets.max(found);
         }
         let closing = self.closing(at.anchor, at.offset, at.normal).max(zero);
         let ahead = self.fixed.if_positive(dt.sub(at.time).max(zero).mul(closing), zero);
         let holds = less(at.separation, speculative.add(ahead));
         let moved = self.between.dot(at.normal).mul(at.time);
-        let out = at.normal.scaled(V::splat(0.5).mul(at.separation.max(zero)));
-        let on_a = self.swing(0, at.turning[0], at.anchor.minus(out), at.normal);
-        let on_b = self.swing(1, at.turning[1], at.anchor.plus(out).minus(at.offset), at.normal);
-        let before = at.separation.sub(moved.add(on_b.sub(on_a)));
+        let swung = self.swing_apart(at.turning, at.offset, at.normal, at.anchor, at.separation);
+        let before = at.separation.sub(moved.add(swung));
         // Where there is no distance, or speeds overflow.
         let is_sure = at.distance.min(less(far, V::splat(f32::MAX)));
         Touches {
@@ -237,11 +258,11 @@ impl<V: Wide> Pairs<V> {
         }
     }
 
-    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within so many seconds; for the
-    /// others the last that was looked at, or of circles that in which they are nearest.
+    /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the time that is looked
+    /// [`ahead`](Self::ahead); for the others the last that was looked at, or of circles that are near that in which they are nearest.
     #[inline(always)]
-    fn first_touch(&self, now: &Moments<V>, asked: V, dt: V, setup: &Setup) -> (Moments<V>, V) {
-        let (one, zero) = (V::splat(1.0), V::splat(0.0));
+    fn first_touch(&self, now: &Moments<V>, asked: V, near: V, setup: &Setup) -> (Moments<V>, V) {
+        let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.ahead(near, setup));
         let mixed = self.not_round(0).max(self.not_round(1)).mul(asked);
         // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
         let sum = self.bound[0].add(self.bound[1]);
@@ -256,8 +277,7 @@ impl<V: Wide> Pairs<V> {
         let mut found = mixed.if_positive(zero, meet).mul(asked);
         // Who has a moment of touch already, to be found once more or as it is; and who is still looked for.
         let (mut last, mut at) = (found.if_positive(time.max(zero), nearest), *now);
-        let near = less(now.separation, V::splat(setup.params.speculative_distance)).mul(asked);
-        let mut exact = mixed.if_positive(zero, found.max(near));
+        let mut exact = mixed.if_positive(zero, found.max(near.mul(asked)));
         if mixed.any_positive() {
             let sweep = self.sweep(0).add(self.sweep(1));
             let (mut going, mut ending) = (mixed, zero);

@@ -31,16 +31,14 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let length = dot(along, along).sqrt();
     let along = along / length;
     let n = Vec2::new(-along.y, along.x);
-    let heights = other.corners().map(|corner| (dot(corner - from, n), dot(corner - from, along), corner)).zip(0..);
-    let none = ((f32::INFINITY, 0.0, Vec2::ZERO), 0);
-    let ((lowest, place, corner), number) = heights.fold(none, |least, at| if at.0.0 < least.0.0 { at } else { least });
-    let is_over = (0.0..=length).contains(&place);
+    let heights = other.corners().zip(0..).map(|(corner, number)| (dot(corner - from, n), corner, number));
+    let none = (f32::INFINITY, from, 0);
+    let (lowest, corner, number) = heights.fold(none, |least, at| if at.0 < least.0 { at } else { least });
+    let is_over = (0.0..=length).contains(&dot(corner - from, along));
     let is_before = dot(center - from, n) >= 0.0;
-    let mut over = is_before.then(|| against_face(own, n, other, radius)).flatten();
-    if over.is_none() && is_before && is_over {
-        // Round, with an edge that leans out beyond the end: its other corner is what comes down.
-        over = Some(of_corner(corner, lowest, n, radius, 1 << 9 | number));
-    }
+    // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
+    let of_lowest = || is_over.then(|| of_corner(corner, lowest, n, radius, 1 << 9 | number));
+    let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over
         && lowest > 0.0

@@ -73,15 +73,14 @@ impl Sides {
             }
         }
         for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
-            let pressed = &mut totals.normal[lane];
+            let (pressed, rows) = (&mut totals.normal[lane], self.normal_rows(point, lane, velocity));
             let wanted = match answer {
                 Answer::Part(parting) if *pressed > 0.0 => {
-                    point.normal_mass[lane] * (parting.speed - self.normal_speed(point, lane, velocity))
+                    point.normal_mass[lane] * (parting.speed - self.speed(rows, lane, velocity))
                 }
                 Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
             };
-            let rows = self.normal_rows(point, lane, velocity);
             self.add_impulse(rows, pressed, lane, max(wanted, -*pressed), velocity);
         }
     }
@@ -130,7 +129,7 @@ impl Sides {
         let own = [product(one_a, one_a) + product(one_b, one_b), product(two_a, two_a) + product(two_b, two_b)];
         let other = product(one_a, two_a) + product(one_b, two_b);
         let determinant = own[0] * own[1] - other * other;
-        let lacks = [0, 1].map(|k| speeds[k] - self.normal_speed(points[k], lane, velocity));
+        let lacks = [0, 1].map(|k| speeds[k] - self.speed(rows[k], lane, velocity));
         let back = [-*pressed[0], -*pressed[1]];
         let both = [
             (own[1] * lacks[0] - other * lacks[1]) / determinant,

@@ -52,16 +52,11 @@ impl SceneFile {
             }
         }
         scene.count = rows;
-        ids.sort_unstable();
-        if let Some(pair) = ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        for error in scene.of_all(&mut ids, &mut places).into_iter().flatten() {
             found.faults += 1;
-            tell(scene.doubled(pair[0]));
+            tell(error);
         }
         found.ids = ids.first().copied().zip(ids.last().copied()).map(|(least, most)| [least, most]);
-        if let Some(crowd) = scene.crowd(&mut places) {
-            found.faults += 1;
-            tell(crowd);
-        }
         let last = ids.last().map(|id| id.0);
         for wrong in [scene.check_count(told), scene.name_statics(last)] {
             if let Err(error) = wrong {
@@ -83,8 +78,13 @@ impl SceneFile {
             ids.push(body.id);
             places.push(place_of(&body));
         }
+        self.of_all(&mut ids, &mut places).into_iter().flatten().next().map_or(Ok(()), Err)
+    }
+
+    /// What is wrong with all bodies together: an id that is there twice, a crowd at one place. Sorts both.
+    fn of_all(&self, ids: &mut [GlobalId], places: &mut [[u64; 2]]) -> [Option<SceneError>; 2] {
         ids.sort_unstable();
         let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| self.doubled(pair[0]));
-        twice.or_else(|| self.crowd(&mut places)).map_or(Ok(()), Err)
+        [twice, self.crowd(places)]
     }
 }
