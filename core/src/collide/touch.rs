@@ -14,7 +14,7 @@ use crate::collide::wide_pairs::{Outlook, ROLLING, TOUCHING};
 use crate::collide::wide_polygons::WidePolygons;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
-use crate::model::math::{Rot, clamp, cross, dot, max, min, tangent, turn};
+use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
 use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
@@ -33,6 +33,16 @@ pub(super) const ROUNDS: usize = 3;
 /// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m.
 const MORE_ROUNDS: usize = 12;
 const LEAST_WAY: f32 = 0.002;
+
+/// Slower than this, in m/s, nothing runs against a corner.
+pub(super) const CREEPING: f32 = 0.01;
+
+/// Corners that overlap by less, in m, pass over each other, given the half extents of both bodies: what touches, but of what is thin no
+/// more than a tenth of its half thickness.
+#[inline(always)]
+fn least_overlap(a: Vec2, b: Vec2) -> f32 {
+    min(TOUCHING, 0.1 * min(min(a.x, a.y), min(b.x, b.y)))
+}
 
 /// One body of a pair.
 struct Side<'a> {
@@ -147,7 +157,7 @@ impl<'a> Approach<'a> {
         let is_now = is_near && !now.manifold.is_distance();
         // Speeds that overflow tell of no other moment.
         if is_now || far.is_infinite() {
-            return self.contact(&now, known, setup);
+            return self.contact(&self.over_corner(now), known, setup);
         }
         // Near ones may be driven together within the step: as they will be when they pass, or who passes by would be turned aside. A
         // substep more, as the last one looks beyond the step.
@@ -155,7 +165,38 @@ impl<'a> Approach<'a> {
         let time = if is_near { setup.params.dt + setup.h } else { setup.params.dt };
         let (then, touches) = self.first_touch(&now, reach, time);
         let at = if then.manifold.is_distance() { now } else { then };
-        if touches || is_near { self.contact(&at, known, setup) } else { None }
+        if touches || is_near { self.contact(&self.over_corner(at), known, setup) } else { None }
+    }
+
+    /// As it is, or where two corners meet that overlap by less than is worth a stumble, and hardly come nearer across: the moment with
+    /// what lets one pass over the other. What lies on a floor of boxes lies a little in each, and must not catch on the next.
+    fn over_corner(&self, at: Moment) -> Moment {
+        let ([one, two], normal) = (at.manifold.points, at.manifold.normal);
+        let closing = self.closing(&at, one.anchor);
+        let is_solid = self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()));
+        let touches = at.manifold.nearest().is_some_and(|nearest| nearest.separation < TOUCHING);
+        if at.manifold.count < 2 || !is_solid || !touches || !(closing > CREEPING) {
+            return at;
+        }
+        let along = right_perp(normal);
+        let overlap = dot(two.anchor - one.anchor, along).abs();
+        if !(overlap < least_overlap(self.a.kind.extent, self.b.kind.extent)) {
+            return at;
+        }
+        // From the piece of A to that of B.
+        let offset = match self.pieces {
+            None => at.offset,
+            Some([a, b]) => {
+                let centers = [(at.turning_a, &self.a, a), (at.turning_b, &self.b, b)]
+                    .map(|(turning, side, piece)| turning.after(side.rotation).rotate(piece.center));
+                at.offset + centers[1] - centers[0]
+            }
+        };
+        let across = if dot(offset, along) < 0.0 { -along } else { along };
+        let mut over = Manifold { normal: across, ..Manifold::EMPTY };
+        over.push(ManifoldPoint { separation: -overlap, ..one });
+        let over = Moment { manifold: over, ..at };
+        if self.closing(&over, one.anchor) < 0.25 * closing { over } else { at }
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.

@@ -5,13 +5,13 @@
 
 use super::broad_phase::Pair;
 use super::cull::passes;
-use super::touch::{DEEP, NEAR, ROUNDS};
+use super::touch::{CREEPING, DEEP, NEAR, ROUNDS};
 use super::wide_pairs::{Outlook, Pairs, TOUCHING};
 use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
-use crate::parallel::vectors::{Vectors, less};
+use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -225,8 +225,9 @@ impl Points {
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
             at.feature[point].store(&mut self.feature[point]);
         }
-        // Speeds that overflow tell of no other moment.
-        less(far, V::splat(0.125 * f32::MAX)).if_positive(at.unsure, one).store(&mut self.unsure);
+        // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
+        let unsure = at.unsure.max(pairs.run_into_corners(&at));
+        less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
         V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
@@ -286,6 +287,18 @@ impl<V: Wide> Pairs<V> {
         let (_, separation) = at.nearest();
         let way = self.bound_along(at.normal).mul(dt.sub(at.time));
         less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
+    }
+
+    /// One for those of which one corner runs into another that it overlaps by so little that it may pass over it: see `touch.rs`.
+    #[inline(always)]
+    fn run_into_corners(&self, at: &Moments<V>) -> V {
+        let (_, nearest) = at.least();
+        let overlap = absolute(at.anchor[1].minus(at.anchor[0]).cross(at.normal));
+        let closing = self.closing(at.anchor[0], at.offset, at.normal);
+        let [a, b] = [0, 1].map(|side| self.half[side].x.min(self.half[side].y));
+        let touching = V::splat(TOUCHING);
+        let overlaps = less(overlap, touching.min(V::splat(0.1).mul(a.min(b))));
+        at.two.mul(overlaps).mul(less(nearest, touching)).mul(less(V::splat(CREEPING), closing))
     }
 
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within so many seconds; for the
