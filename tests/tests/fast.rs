@@ -160,6 +160,28 @@ fn who_passes_close_by_is_not_turned_aside() {
     }
 }
 
+/// Defect: what slides over boxes set edge to edge, a tenth of a millimeter in each, stopped at the first seam.
+#[test]
+fn boxes_slide_over_the_seams_of_a_floor_of_boxes() {
+    let smooth = Material { friction: 0.0, ..Material::default() };
+    let trapezoid = [(-0.5, -0.25), (0.5, -0.25), (0.3, 0.25), (-0.3, 0.25)].map(Vec2::from);
+    for shape in [Shape::rectangle(1.0, 0.5), Shape::polygon(&trapezoid, 0.0).unwrap()] {
+        for speed in [0.5, 5.0, 12.0] {
+            let mut scene = Scene::new(MIDDLE, -10.0);
+            for k in 0..20 {
+                scene.wall(MIDDLE + DVec2::new(1.3 * f64::from(k) - 7.0, -0.5), (1.3, 1.0), 0.0, smooth);
+            }
+            let kind = scene.kind(shape.clone(), smooth);
+            let id = scene.body(kind, MIDDLE + DVec2::new(-6.0, 0.25), Vec2::new(speed, 0.0));
+            let mut sim = scene.start_on((1, 1), Exchange::Step);
+            sim.run((60.0 * 12.0 / speed).min(300.0) as u32);
+            let velocity = sim.body(id).velocity;
+            assert!((velocity.x - speed).abs() < 0.01 * speed, "{shape:?} at {speed} m/s comes to {velocity}");
+            assert!(velocity.y.abs() < 0.1, "{shape:?} at {speed} m/s comes to {velocity}");
+        }
+    }
+}
+
 /// Defect: at 500 m/s 6 to 96 of 196 discs left a walled room.
 #[test]
 fn discs_at_500_m_s_stay_in_their_room() {

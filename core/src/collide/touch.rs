@@ -175,12 +175,10 @@ impl<'a> Approach<'a> {
         let closing = self.closing(&at, one.anchor);
         let is_solid = self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()));
         let touches = at.manifold.nearest().is_some_and(|nearest| nearest.separation < TOUCHING);
-        if at.manifold.count < 2 || !is_solid || !touches || !(closing > CREEPING) {
-            return at;
-        }
         let along = right_perp(normal);
         let overlap = dot(two.anchor - one.anchor, along).abs();
-        if !(overlap < least_overlap(self.a.kind.extent, self.b.kind.extent)) {
+        let is_little = overlap < least_overlap(self.a.kind.extent, self.b.kind.extent);
+        if at.manifold.count < 2 || !is_solid || !touches || !is_little || closing <= CREEPING {
             return at;
         }
         // From the piece of A to that of B.
