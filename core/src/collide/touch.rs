@@ -6,12 +6,13 @@
 //! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013),
 //! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
+mod meeting;
+
+pub(super) use meeting::{Meeting, Met, meet};
+
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
-use crate::collide::piece_boxes::PieceBoxes;
-use crate::collide::wide_moments::PointOutlook;
-use crate::collide::wide_pairs::{Outlook, ROLLING, TOUCHING};
-use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
@@ -37,12 +38,8 @@ const LEAST_WAY: f32 = 0.002;
 /// Slower than this, in m/s, nothing runs against a corner.
 pub(super) const CREEPING: f32 = 0.01;
 
-/// Corners that overlap by less, in m, pass over each other, given the half extents of both bodies: what touches, but of what is thin no
-/// more than a tenth of its half thickness.
-#[inline(always)]
-fn least_overlap(a: Vec2, b: Vec2) -> f32 {
-    min(TOUCHING, 0.1 * min(min(a.x, a.y), min(b.x, b.y)))
-}
+/// Corners pass over each other that overlap by less than what touches, and by less than this part of the lesser half extent.
+pub(super) const PASSABLE: f32 = 0.1;
 
 /// One body of a pair.
 struct Side<'a> {
@@ -171,14 +168,15 @@ impl<'a> Approach<'a> {
     /// As it is, or where two corners meet that overlap by less than is worth a stumble, and hardly come nearer across: the moment with
     /// what lets one pass over the other. What lies on a floor of boxes lies a little in each, and must not catch on the next.
     fn over_corner(&self, at: Moment) -> Moment {
-        let ([one, two], normal) = (at.manifold.points, at.manifold.normal);
-        let closing = self.closing(&at, one.anchor);
+        let &[one, two] = at.manifold.points() else { return at };
         let is_solid = self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()));
-        let touches = at.manifold.nearest().is_some_and(|nearest| nearest.separation < TOUCHING);
-        let along = right_perp(normal);
+        let touches = one.separation < TOUCHING || two.separation < TOUCHING;
+        let along = right_perp(at.manifold.normal);
         let overlap = dot(two.anchor - one.anchor, along).abs();
-        let is_little = overlap < least_overlap(self.a.kind.extent, self.b.kind.extent);
-        if at.manifold.count < 2 || !is_solid || !touches || !is_little || closing <= CREEPING {
+        let [a, b] = [&self.a, &self.b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
+        let is_little = overlap < min(TOUCHING, PASSABLE * min(a, b));
+        let closing = self.closing(&at, one.anchor);
+        if !is_solid || !touches || !is_little || closing <= CREEPING {
             return at;
         }
         // From the piece of A to that of B.
@@ -415,100 +413,4 @@ impl<'a> Approach<'a> {
 #[inline(always)]
 pub(super) fn recycle(tile: &Tile, pair: Pair, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
     Approach::new(tile, pair, setup).recycle(known, setup)
-}
-
-/// Two pieces of a pair of bodies that may touch, and what came of it.
-pub(super) struct Meeting<'a> {
-    pub(super) bodies: Pair,
-    pub(super) pieces: [&'a Piece; 2],
-    features: u32,
-    /// The contact that they had in the last step.
-    known: Option<&'a Contact>,
-    pub(super) outcome: Met,
-}
-
-/// What comes of two pieces.
-pub(super) enum Met {
-    Nothing,
-    /// The contact that is known, whose points have these separations now.
-    Known([f32; 2]),
-    Found(Contact, [f32; 2]),
-    /// It is not known yet.
-    Open,
-}
-
-impl<'a> Meeting<'a> {
-    /// Looks again, which only those need that are open.
-    pub(super) fn touch(&mut self, tile: &Tile, setup: &Setup) {
-        let mut pair = Approach::new(tile, self.bodies, setup);
-        (pair.pieces, pair.features) = (Some(self.pieces), self.features);
-        self.outcome = Met::from(pair.touch(self.known, pair.far(setup.params.dt), setup));
-    }
-
-    /// Takes what was seen of it in a lane.
-    #[inline(always)]
-    pub(super) fn see(&mut self, lane: usize, outlook: &PointOutlook<WidePolygons>) {
-        let found = outlook.meets(lane).then(|| outlook.points.contact(lane, self.features, self.known));
-        self.outcome = Met::from(found);
-    }
-
-    /// The contact, if there is one, and the separations of its points now.
-    pub(super) fn contact(&self) -> Option<(&Contact, [f32; 2])> {
-        match &self.outcome {
-            Met::Nothing => None,
-            Met::Known(separation) => self.known.map(|known| (known, *separation)),
-            Met::Found(contact, separation) => Some((contact, *separation)),
-            Met::Open => unreachable!("all are looked at"),
-        }
-    }
-}
-
-impl From<Option<(Contact, [f32; 2])>> for Met {
-    fn from(found: Option<(Contact, [f32; 2])>) -> Self {
-        found.map_or(Self::Nothing, |(contact, separation)| Self::Found(contact, separation))
-    }
-}
-
-/// Tells which pieces of two bodies may touch: in their order, and what comes of
-/// those that had a contact that still serves, or of which one is a disc or a segment of a chain. `known` are the contacts of the
-/// last step.
-pub(super) fn meet<'a>(
-    tile: &Tile,
-    bodies: Pair,
-    boxes: &PieceBoxes,
-    known: &[&'a Contact],
-    setup: &'a Setup,
-    mut met: impl FnMut(Meeting<'a>),
-) {
-    let mut pair = Approach::new(tile, bodies, setup);
-    // Who touched will hardly have gone so far.
-    if known.is_empty() && pair.pass_by(setup) {
-        return;
-    }
-    let far = pair.far(setup.params.dt);
-    let is_slow = far < setup.params.speculative_distance;
-    let rolls = pair.a.is_round() || pair.b.is_round();
-    let [pieces_a, pieces_b] = [&pair.a.kind, &pair.b.kind].map(|kind| &kind.pieces[..]);
-    let offset = pair.offset;
-    let mut meet = |number_a: usize, number_b: usize| {
-        let (pieces, features) =
-            ([&pieces_a[number_a], &pieces_b[number_b]], Contact::features_of(number_a as u32, number_b as u32));
-        (pair.pieces, pair.features) = (Some(pieces), features);
-        let known = known.iter().copied().find(|known| known.pieces() == features);
-        let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
-        let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
-        let outcome = match (kept, rolled) {
-            (Some(separation), _) => Met::Known(separation),
-            (None, Some((contact, separation))) => Met::Found(contact, separation),
-            _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
-            _ => Met::from(pair.touch(known, far, setup)),
-        };
-        met(Meeting { bodies, pieces, features, known, outcome });
-    };
-    if pieces_a.len() * pieces_b.len() == 1 {
-        meet(0, 0);
-    } else {
-        let far = setup.params.speculative_distance + far;
-        boxes.each_near(bodies, tile, setup, (offset, far), meet);
-    }
 }

@@ -5,7 +5,7 @@
 
 use super::broad_phase::Pair;
 use super::cull::passes;
-use super::touch::{CREEPING, DEEP, NEAR, ROUNDS};
+use super::touch::{CREEPING, DEEP, NEAR, PASSABLE, ROUNDS};
 use super::wide_pairs::{Outlook, Pairs, TOUCHING};
 use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
@@ -226,7 +226,7 @@ impl Points {
             at.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
-        let unsure = at.unsure.max(pairs.run_into_corners(&at));
+        let unsure = at.unsure.max(pairs.run_into_corners(&at, closing[0]));
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
@@ -289,15 +289,15 @@ impl<V: Wide> Pairs<V> {
         less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
     }
 
-    /// One for those of which one corner runs into another that it overlaps by so little that it may pass over it: see `touch.rs`.
+    /// One for those of which one corner runs into another, at such a speed, that it overlaps by so little that it may pass over it: see
+    /// `touch.rs`.
     #[inline(always)]
-    fn run_into_corners(&self, at: &Moments<V>) -> V {
+    fn run_into_corners(&self, at: &Moments<V>, closing: V) -> V {
         let (_, nearest) = at.least();
         let overlap = absolute(at.anchor[1].minus(at.anchor[0]).cross(at.normal));
-        let closing = self.closing(at.anchor[0], at.offset, at.normal);
         let [a, b] = [0, 1].map(|side| self.half[side].x.min(self.half[side].y));
         let touching = V::splat(TOUCHING);
-        let overlaps = less(overlap, touching.min(V::splat(0.1).mul(a.min(b))));
+        let overlaps = less(overlap, touching.min(V::splat(PASSABLE).mul(a.min(b))));
         at.two.mul(overlaps).mul(less(nearest, touching)).mul(less(V::splat(CREEPING), closing))
     }
 
