@@ -1,7 +1,7 @@
 //! Small worlds whose outcome is known, each on one tile and again with a tile border, and a corner of four tiles,
 //! through the middle of the action: same thresholds.
 
-use atoll_core::{Body, GlobalId, Material, Rot, Shape};
+use atoll_core::{Body, Exchange, GlobalId, Material, Rot, Shape};
 use atoll_tests::scenes;
 use atoll_tests::world::{ALL_WAYS, Cut, EXACT_WAYS, Scene, Sim, Way};
 use glam::{DVec2, Vec2};
@@ -166,6 +166,49 @@ fn pyramid(shape: Shape) {
         println!("{way:?}: moved {most:.4} m, speed {:.5} m/s", sim.greatest_speed());
         assert!(most < 0.05, "{way:?}: a box moved {most} m");
         assert!(sim.greatest_speed() < 0.01, "{way:?}: a box moves at {} m/s", sim.greatest_speed());
+    }
+}
+
+/// Both points of its contact are stopped at once, whenever in the step it lands.
+#[test]
+fn who_lands_flat_does_not_turn() {
+    for (way, shape) in ALL_WAYS.into_iter().flat_map(|way| scenes::boxes(0.2, 2.0).map(|shape| (way, shape))) {
+        for k in 0..5 {
+            let mut scene = Scene::new(MIDDLE, -10.0);
+            scene.wall(MIDDLE + DVec2::new(0.0, -0.5), (20.0, 1.0), 0.0, Material::default());
+            let column = scene.kind(shape.clone(), Material::default());
+            let id = scene.body(column, MIDDLE + DVec2::new(0.3, 2.0 + 0.02 * f64::from(k)), Vec2::ZERO);
+            let mut sim = scene.start(way);
+            for step in 0..40 {
+                sim.run(1);
+                let spin = sim.body(id).angular_velocity;
+                assert!(spin.abs() < 1e-3, "{way:?}, fall {k}: {spin} rad/s after step {step}");
+            }
+        }
+    }
+}
+
+/// Turned about a lower corner, with nine tenths of the energy that it takes to come over it, and eleven.
+#[test]
+fn slender_boxes_tip_with_the_energy_that_it_takes() {
+    for (width, height) in [(0.1_f32, 1.0_f32), (0.2, 2.0), (0.5, 2.0)] {
+        for shape in scenes::boxes(width, height) {
+            for (part, tips) in [(0.9_f32, false), (1.1, true)] {
+                let mut scene = Scene::new(MIDDLE, -10.0);
+                scene.wall(MIDDLE + DVec2::new(0.0, -0.5), (20.0, 1.0), 0.0, rough(1.0));
+                let kind = scene.kind(shape.clone(), rough(1.0));
+                let half = 0.5 * Vec2::new(width, height);
+                let id = scene.body(kind, MIDDLE + DVec2::new(0.0, f64::from(half.y)), Vec2::ZERO);
+                let inertia = half.length_squared() * (4.0 / 3.0);
+                let spin = (part * 2.0 * 10.0 * (half.length() - half.y) / inertia).sqrt();
+                scene.last().velocity = Vec2::new(half.y, half.x) * spin;
+                scene.last().angular_velocity = -spin;
+                let mut sim = scene.start_on((1, 1), Exchange::Step);
+                sim.run(300);
+                let fell = sim.body(id).rotation.c < 0.5;
+                assert_eq!(fell, tips, "{width} m x {height} m with {part} of the energy");
+            }
+        }
     }
 }
 

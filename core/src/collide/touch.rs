@@ -24,6 +24,11 @@ use glam::Vec2;
 /// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
 const RECYCLE_COSINE: f32 = 0.98;
 
+/// And while the two have moved by less than this part of the lesser half extent, and turned by less than that part of the way between their
+/// points: arms that lag further behind hold up what tips.
+const KEPT_BY_SIZE: f32 = 0.2;
+const KEPT_BY_PATCH: f32 = 0.025;
+
 /// The search for a touch ends with surfaces this near, in m; from deeper than the second it takes a step back.
 pub(super) const NEAR: f32 = 0.0002;
 pub(super) const DEEP: f32 = -0.01;
@@ -373,9 +378,14 @@ impl<'a> Approach<'a> {
         let turns = |side: &Side<'_>| side.kind.inv_mass > 0.0 || side.angular_velocity != 0.0;
         let extent = |side: &Side<'_>| if turns(side) { side.kind.bounding_radius } else { 0.0 };
         let twist = turned_a.to(turned_b).s.abs() * max(extent(a), extent(b));
-        let most = setup.params.recycle_distance;
-        let most = if known.point_count() == 1 { min(most, TOUCHING) } else { most };
-        if dot(moved, moved).sqrt() + twist >= most {
+        let [twist_most, most] = if let [one, two] = known.points() {
+            let [a, b] = [a, b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
+            let most = min(setup.params.recycle_distance, KEPT_BY_SIZE * min(a, b));
+            [KEPT_BY_PATCH * (two.anchor - one.anchor).length(), most]
+        } else {
+            [f32::INFINITY, min(setup.params.recycle_distance, TOUCHING)]
+        };
+        if twist >= twist_most || dot(moved, moved).sqrt() + twist >= most {
             return None;
         }
         let shift = *offset - known.offset;

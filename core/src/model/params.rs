@@ -123,8 +123,7 @@ pub struct Params {
     pub push_out_speed: f32,
     /// A contact is made of bodies nearer than this, and of those that will touch within the step, in m (0.02).
     pub speculative_distance: f32,
-    /// A contact's manifold is kept until this much relative motion, in m (0.05). Zero computes every
-    /// manifold anew, and piles never quite come to rest.
+    /// A contact's manifold is kept until this much relative motion, in m (0.05), less of small bodies and narrow contacts. Zero computes every manifold anew, and piles never quite come to rest.
     pub recycle_distance: f32,
     /// Approach speed below which nothing bounces, in m/s (1).
     pub restitution_threshold: f32,
