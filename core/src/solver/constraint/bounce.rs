@@ -28,27 +28,32 @@ pub(crate) struct Parting {
 }
 
 impl Sides {
-    /// Gives the points of a contact that pressed what they are to have, and friction what it may have of that.
+    /// Gives the points of a contact that pressed what they are to have, and friction what it may have of that. Nothing happens where
+    /// that would change the speed at a point by less than `least`, in m/s. Whether something did.
     pub(crate) fn bounce(
         &self,
         points: &[PointRows],
         totals: &mut [Totals],
         lane: usize,
         answers: [Answer; 2],
+        least: f32,
         velocity: &mut [Quad],
-    ) {
+    ) -> bool {
         let pressed = [0, 1].map(|k| totals.get(k).is_some_and(|totals| totals.normal[lane] > 0.0));
-        self.bounce_along_normals(points, totals, lane, answers, velocity);
+        let mut acted = self.bounce_along_normals(points, totals, lane, answers, least, velocity);
         for (k, (point, totals)) in points.iter().zip(totals).enumerate() {
             match answers[k] {
-                Answer::Part(parting) if pressed[k] => self.rub(point, totals, lane, Some(parting), velocity),
+                Answer::Part(parting) if pressed[k] => {
+                    acted |= self.rub(point, totals, lane, Some(parting), least, velocity);
+                }
                 // What was not to bounce yet, and keeps its impulse, keeps its friction.
                 Answer::NotYet(_) if pressed[k] && totals.normal[lane] == 0.0 => {
-                    self.rub(point, totals, lane, None, velocity);
+                    acted |= self.rub(point, totals, lane, None, least, velocity);
                 }
                 _ => {}
             }
         }
+        acted
     }
 
     /// Two points that part do so at once: one after the other, the first would turn a box that falls flat, and the second not turn
@@ -59,19 +64,22 @@ impl Sides {
         totals: &mut [Totals],
         lane: usize,
         answers: [Answer; 2],
+        least: f32,
         velocity: &mut [Quad],
-    ) {
+    ) -> bool {
         if let ([one, two], [total_one, total_two], [Answer::Part(first), Answer::Part(second)]) =
             (points, &mut *totals, answers)
         {
             let totals = [&mut total_one.normal[lane], &mut total_two.normal[lane]];
+            let speeds = [first.speed, second.speed];
             if *totals[0] > 0.0
                 && *totals[1] > 0.0
-                && self.bounce_together([one, two], totals, lane, [first.speed, second.speed], velocity)
+                && let Some(acted) = self.bounce_together([one, two], totals, lane, speeds, least, velocity)
             {
-                return;
+                return acted;
             }
         }
+        let mut acted = false;
         for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
             let (pressed, rows) = (&mut totals.normal[lane], self.normal_rows(point, lane, velocity));
             let wanted = match answer {
@@ -81,8 +89,13 @@ impl Sides {
                 Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
                 _ => continue,
             };
-            self.add_impulse(rows, pressed, lane, max(wanted, -*pressed), velocity);
+            let impulse = max(wanted, -*pressed);
+            if impulse.abs() > least * point.normal_mass[lane] {
+                self.add_impulse(rows, pressed, lane, impulse, velocity);
+                acted = true;
+            }
         }
+        acted
     }
 
     /// Lets friction of the whole step be what the point's normal impulses of the whole step allow, as far as it slides yet.
@@ -96,8 +109,9 @@ impl Sides {
         totals: &mut Totals,
         lane: usize,
         parting: Option<Parting>,
+        least: f32,
         velocity: &mut [Quad],
-    ) {
+    ) -> bool {
         let rows = self.tangent_rows(point, lane, velocity);
         let slip = self.speed(rows, lane, velocity);
         let most = self.friction[lane] * totals.normal[lane];
@@ -110,18 +124,25 @@ impl Sides {
             let root = (half * half + mass * max(taken, 0.0)).sqrt();
             wanted = clamp(wanted, -half - root, root - half);
         }
-        self.add_impulse(rows, rubbed, lane, wanted - *rubbed, velocity);
+        let impulse = wanted - *rubbed;
+        let acts = impulse.abs() > least * mass;
+        if acts {
+            self.add_impulse(rows, rubbed, lane, impulse, velocity);
+        }
+        acts
     }
 
     /// Two points at once: both part as fast as they should; or one pulls for that, so it gives back what it pressed, and parts faster.
+    /// Whether that changes something, if the two can be told apart.
     fn bounce_together(
         &self,
         points: [&PointRows; 2],
         pressed: [&mut f32; 2],
         lane: usize,
         speeds: [f32; 2],
+        least: f32,
         velocity: &mut [Quad],
-    ) -> bool {
+    ) -> Option<bool> {
         let rows = points.map(|point| self.normal_rows(point, lane, velocity));
         let [[one_a, one_b], [two_a, two_b]] = rows;
         let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
@@ -147,11 +168,14 @@ impl Sides {
         } else if pushes(second) && parts(0, second) {
             second
         } else {
-            return false;
+            return None;
         };
+        if impulses.iter().zip(own).all(|(impulse, own)| impulse.abs() * own <= least) {
+            return Some(false);
+        }
         for ((rows, pressed), impulse) in rows.into_iter().zip(pressed).zip(impulses) {
             self.add_impulse(rows, pressed, lane, impulse, velocity);
         }
-        true
+        Some(true)
     }
 }

@@ -37,6 +37,10 @@ pub(crate) struct Groups {
 #[derive(Debug)]
 pub(crate) struct Bounce {
     pub(super) contact: u32,
+    /// Speed at which the faster of its points comes in, in m/s.
+    pub(super) closing: f32,
+    /// Whether one of the two never moves.
+    pub(super) off_static: bool,
     /// Of each point.
     pub(super) answers: [Answer; 2],
 }

@@ -12,6 +12,13 @@ use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use glam::Vec2;
 
+/// At most so many passes over contacts that bounce, and over those with statics after that.
+const PASSES: usize = 8;
+const PASSES_OFF_STATICS: usize = 200;
+
+/// The part of the speed at which a contact closed that a pass may leave wrong.
+const EXACT: f32 = 1e-5;
+
 impl Groups {
     /// Finds the contacts that may bounce, in the order in which they do in each batch.
     pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
@@ -20,15 +27,16 @@ impl Groups {
         self.bounces_at_once.clear();
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let sides = source.contacts.bodies[i];
-            let [a, b] =
-                sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]).material.restitution);
-            let restitution = max(a, b);
+            let kinds = sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]));
+            let restitution = max(kinds[0].material.restitution, kinds[1].material.restitution);
             if restitution > 0.0 && self.is_solved(i as u32) {
                 let threshold = source.setup.params.restitution_threshold;
                 let mut answers = [Answer::Rest; 2];
+                let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
                     let separation = source.contacts.separation[i][point];
                     let [closing, slip] = meeting_speeds(source, sides, contact, point, separation);
+                    fastest = max(fastest, closing);
                     if closing > threshold {
                         *answer = Answer::Part(Parting { closing, slip, speed: restitution * closing });
                     } else if closing < 0.0 && contact.points[point].normal_impulse == 0.0 {
@@ -36,9 +44,10 @@ impl Groups {
                     }
                 }
                 if answers != [Answer::Rest; 2] {
+                    let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
                     let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
                     let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-                    bounces.push(Bounce { contact: i as u32, answers });
+                    bounces.push(Bounce { contact: i as u32, closing: fastest, off_static, answers });
                 }
             }
         }
@@ -49,6 +58,10 @@ impl Groups {
             self.bounces.sort_by_cached_key(name);
             self.bounces_at_once.sort_by_cached_key(name);
         }
+        // Who comes in faster first: that may be all it takes, where several throw the same body back.
+        let first = |bounce: &Bounce, other: &Bounce| other.closing.total_cmp(&bounce.closing);
+        self.bounces.sort_by(first);
+        self.bounces_at_once.sort_by(first);
         let lanes = &self.lanes;
         self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
     }
@@ -74,17 +87,20 @@ impl Groups {
     }
 }
 
-/// Some passes over contacts that may bounce, in their order: who bounces off two others at once comes to the speeds that both want
-/// after several. An impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and
-/// after. So with restitution 1 nothing is lost or gained where each point parts as fast as it came.
+/// Passes over contacts that may bounce, in their order, while one changes anything: who bounces off two others at once comes to the
+/// speeds that both want after several, and off two statics with normals that are nearly one after many, which are few contacts. An
+/// impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and after. So with
+/// restitution 1 nothing is lost or gained where each point parts as fast as it came.
 fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mut SolverBodies) {
-    const PASSES: usize = 8;
-    for _ in 0..PASSES {
-        for bounce in bounces {
-            let at = lanes[bounce.contact as usize];
-            let (sides, points, totals, lane) = at.totals_mut(columns);
-            sides.bounce(points, totals, lane, bounce.answers, at.bodies_mut(&mut bodies.velocity));
-        }
+    let mut pass = |bounce: &Bounce| {
+        let at = lanes[bounce.contact as usize];
+        let (sides, points, totals, lane) = at.totals_mut(columns);
+        let least = EXACT * bounce.closing;
+        sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(&mut bodies.velocity))
+    };
+    let mut acts = |bounces: &mut dyn Iterator<Item = &Bounce>| bounces.fold(false, |acts, bounce| pass(bounce) | acts);
+    if (0..PASSES).all(|_| acts(&mut bounces.iter())) {
+        let _ = (0..PASSES_OFF_STATICS).all(|_| acts(&mut bounces.iter().filter(|bounce| bounce.off_static)));
     }
 }
 
