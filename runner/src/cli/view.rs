@@ -42,7 +42,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Exit, RunError> {
     }
     let open = |folder: &std::path::PathBuf| Ok::<_, RunError>((name(folder), Recorded::open(folder)?));
     let recorded = args.sources.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-    let desk = Arc::new(Desk::new(true, 1.0));
+    let desk = Arc::new(Desk::new(args.speed));
     let player = Player::new(recorded, Arc::clone(&desk))
         .ok_or_else(|| unsuitable("SOURCE", "there is no step that all of these have a record of; name others"))?;
     let server = serve(desk, args.port, args.bind)?;
@@ -74,9 +74,13 @@ impl Window {
         let source = args.config.as_deref().or(args.resume.as_deref()).unwrap_or(Path::new(""));
         let mut window = Self { _server: None, desk: None, lingers: args.lingers, name: name(source) };
         if speaks {
-            let desk = Arc::new(Desk::new(true, 0.0));
+            let desk = Arc::new(Desk::new(args.speed));
             let server = serve(Arc::clone(&desk), args.port, args.bind)?;
             tell(&server, args.bind, args.open);
+            if args.lingers {
+                let pace = if args.speed == 0.0 { "as fast as it can".to_owned() } else { format!("at {} x real time", args.speed) };
+                complain(&format!("the run waits for the first page, then goes on {pace}; --speed says how fast"));
+            }
             (window._server, window.desk) = (Some(server), Some(desk));
         }
         Ok(Some(window))

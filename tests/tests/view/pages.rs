@@ -179,8 +179,9 @@ fn borders_that_move_are_drawn() {
     let Some(program) = browser::find() else { return };
     let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/skewed.toml");
     let tiles = "--tiles bisected --set tile_count=12 --ranks 3";
-    let served = serve(&format!("{config} --bodies 3000 --steps 100000 {tiles}"));
+    let served = serve(&format!("{config} --bodies 3000 --steps 100000 --speed 3 {tiles}"));
     let mut browser = show(&program, &served);
+    assert_eq!(browser.evaluate("document.getElementById('speed').selectedOptions[0].text"), json!("3 ×"));
     browser.wait_for("atoll.state.step > 40");
     assert_eq!(number(&mut browser, "atoll.state.hello.sources[0].corners.length"), 12.0);
     // A line on two sides of each tile and around all, and more where ranks meet.
@@ -304,6 +305,7 @@ fn what_cannot_be_shown_is_refused_in_one_line() {
         (".", "holds no recording"),
         ("a --bind 192.0.2.1", "--bind 192.0.2.1: "),
         ("a b c", "see atoll view --help"),
+        ("world.toml --speed 0", "must be max, or seconds of the world in one, from 0.001 to 1e6"),
         ("", "the following required arguments were not provided"),
     ] {
         let ended = program::run(program::command().current_dir(DESK.path()).arg("view").args(line.split_whitespace()));

@@ -5,7 +5,7 @@ use atoll_tests::program::{self, run_to_summary};
 use atoll_tests::ways::Way;
 use serde_json::{Value, json};
 use std::net::TcpListener;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tempfile::tempdir;
 
 /// So many that a page is there before they are made.
@@ -62,9 +62,18 @@ fn what_is_viewed_waits_for_the_first_page_and_stays_until_it_is_interrupted() {
     std::thread::sleep(Duration::from_millis(300));
     let mut page = Page::open(&served);
     let hello = page.hello();
+    // Real time, though nobody looks for a while.
+    let Some(Heard::Said(pace)) = page.hear() else { panic!("it is told how fast time is to go on") };
+    assert_eq!(pace, json!({ "type": "pace", "playing": true, "times": 1.0 }));
     page.look(domain(&hello), [320, 240], "kind");
+    let begun = Instant::now();
     assert_eq!(page.frame().unwrap().0, 0, "it begins when somebody looks");
+    drop(page);
+    std::thread::sleep(Duration::from_millis(300));
+    let mut page = Page::open(&served);
+    page.look(domain(&hello), [320, 240], "kind");
     while page.frame().unwrap().0 < 120 {}
+    assert!(begun.elapsed() > Duration::from_millis(1900), "two seconds of the world in {:?}", begun.elapsed());
     // One who comes late sees the end.
     let mut late = Page::open(&served);
     late.look(domain(&hello), [320, 240], "speed");
@@ -74,6 +83,7 @@ fn what_is_viewed_waits_for_the_first_page_and_stays_until_it_is_interrupted() {
     let ended = served.end();
     assert_eq!(ended.code, Some(0), "{ended}");
     assert!(ended.stdout.contains("120 steps in "), "{ended}");
+    assert!(ended.stderr.contains("waits for the first page, then goes on at 1 x real time; --speed"), "{ended}");
     assert_eq!(page.frame(), None);
     TcpListener::bind(address).expect("the port is free again");
 }

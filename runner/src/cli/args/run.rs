@@ -82,6 +82,9 @@ pub struct RunArgs {
     /// Let pages look before the first step, and after the last one until somebody asks to stop.
     #[arg(skip)]
     pub lingers: bool,
+    /// Seconds of the world in a second at first, while a page can look; 0: as many as can be.
+    #[arg(skip)]
+    pub speed: f64,
     /// Show no progress, only the closing report.
     #[arg(long)]
     pub quiet: bool,

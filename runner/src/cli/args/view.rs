@@ -25,6 +25,9 @@ pub struct ViewArgs {
     /// Do what this file says while it runs, a line of JSON for each command; of a configuration.
     #[arg(long, value_name = "FILE")]
     pub commands: Option<PathBuf>,
+    /// How fast time goes on at first: so many seconds of the world in one, or max, as fast as can be.
+    #[arg(long, value_name = "X", default_value = "1", value_parser = speed)]
+    pub speed: f64,
     /// Serve the page at this port [default: any that is free].
     #[arg(long, value_name = "P")]
     pub port: Option<u16>,
@@ -39,7 +42,7 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// The same as options of a run that stays to be looked at.
     pub(crate) fn into_run(self) -> RunArgs {
-        let Self { mut sources, values, tiles, out, commands, port, bind, open } = self;
+        let Self { mut sources, values, tiles, out, commands, speed, port, bind, open } = self;
         RunArgs {
             config: sources.pop(),
             values,
@@ -47,6 +50,7 @@ impl ViewArgs {
             out,
             commands,
             view: true,
+            speed,
             port,
             bind,
             open,
@@ -54,4 +58,10 @@ impl ViewArgs {
             ..RunArgs::default()
         }
     }
+}
+
+/// 0 is as fast as can be.
+fn speed(text: &str) -> Result<f64, &'static str> {
+    let times = text.parse().ok().filter(|times: &f64| (1e-3..=1e6).contains(times));
+    if text == "max" { Ok(0.0) } else { times.ok_or("must be max, or seconds of the world in one, from 0.001 to 1e6") }
 }

@@ -126,9 +126,9 @@ pub(crate) enum Ready {
 }
 
 impl Desk {
-    /// One at which time goes on or stands still at first, at this speed.
-    pub(crate) fn new(playing: bool, times: f64) -> Self {
-        let pace = Pace { playing, times, by: 0, seek: None };
+    /// One at which time goes on at this speed at first.
+    pub(crate) fn new(times: f64) -> Self {
+        let pace = Pace { playing: true, times, by: 0, seek: None };
         let (pages, commands, greeting) = Default::default();
         let inner =
             Inner { pages, next: 0, pace, usual: pace, picked: None, wishes: 0, commands, greeting, closed: false };
@@ -149,7 +149,9 @@ impl Desk {
         }
         let id = inner.next;
         inner.next += 1;
-        let texts = inner.greeting.iter().map(text).collect();
+        let pace = inner.pace.say();
+        let pace = Some(&pace).filter(|_| !inner.greeting.is_empty());
+        let texts = inner.greeting.iter().chain(pace).map(text).collect();
         inner.pages.insert(id, Page { free: true, texts, ..Page::default() });
         self.wanted.store(true, Ordering::Relaxed);
         Some(id)
@@ -174,6 +176,7 @@ impl Desk {
         let mut inner = self.lock();
         let Inner { pages, pace, picked, wishes, commands, .. } = &mut *inner;
         *wishes += 1;
+        let was = *pace;
         let Some(page) = pages.get_mut(&page) else { return };
         match wish {
             Wish::Look { view, size, color } => {
@@ -193,6 +196,11 @@ impl Desk {
             Wish::Drop => *picked = None,
             Wish::Command { line } if commands.len() < MOST_COMMANDS => commands.push(line),
             Wish::Command { .. } => {}
+        }
+        let now = inner.pace.say();
+        if now != was.say() {
+            inner.tell(&now);
+            self.ready.notify_all();
         }
         drop(inner);
         self.wish.notify_all();
@@ -223,25 +231,22 @@ impl Desk {
     /// Tells each page that comes from now on, first of all, and those that are there. What was told of the same before no longer
     /// counts.
     pub(crate) fn greet(&self, greeting: Say) {
-        self.tell(&greeting);
         let mut inner = self.lock();
+        inner.tell(&greeting);
         if matches!(greeting, Say::Hello(_)) {
             inner.greeting.clear();
+            let pace = inner.pace.say();
+            inner.tell(&pace);
         }
         inner.greeting.retain(|earlier| discriminant(earlier) != discriminant(&greeting));
         inner.greeting.push(greeting);
+        drop(inner);
+        self.ready.notify_all();
     }
 
     /// Tells all pages.
     pub(crate) fn tell(&self, say: &Say) {
-        let mut inner = self.lock();
-        for page in inner.pages.values_mut() {
-            if page.texts.len() == MOST_TEXTS {
-                page.texts.remove(0);
-            }
-            page.texts.push(text(say));
-        }
-        drop(inner);
+        self.lock().tell(say);
         self.ready.notify_all();
     }
 
@@ -318,7 +323,12 @@ impl Desk {
 
     /// Lets time stand still.
     pub(crate) fn pause(&self) {
-        self.lock().pace.playing = false;
+        let mut inner = self.lock();
+        inner.pace.playing = false;
+        let pace = inner.pace.say();
+        inner.tell(&pace);
+        drop(inner);
+        self.ready.notify_all();
     }
 
     /// The body somebody wants to know about.
@@ -363,6 +373,24 @@ impl Desk {
     }
 }
 
+impl Inner {
+    fn tell(&mut self, say: &Say) {
+        for page in self.pages.values_mut() {
+            if page.texts.len() == MOST_TEXTS {
+                page.texts.remove(0);
+            }
+            page.texts.push(text(say));
+        }
+    }
+}
+
+impl Pace {
+    /// What pages are told of it.
+    fn say(&self) -> Say {
+        Say::Pace { playing: self.playing, times: self.times }
+    }
+}
+
 impl Page {
     /// Whether it has room for a frame with this to see, and has not seen it as well as can be.
     fn wants(&self, version: u64) -> bool {
@@ -397,7 +425,7 @@ mod tests {
 
     #[test]
     fn a_page_gets_a_frame_once_it_has_drawn_the_last_or_looks_elsewhere() {
-        let desk = Desk::new(true, 0.0);
+        let desk = Desk::new(0.0);
         assert!(!desk.is_wanted() && desk.due(0).is_empty());
         let page = desk.open().unwrap();
         assert!(desk.due(0).is_empty(), "it looks at nothing yet");
@@ -421,7 +449,7 @@ mod tests {
 
     #[test]
     fn what_a_page_has_seen_coarsely_it_gets_again() {
-        let desk = Desk::new(true, 0.0);
+        let desk = Desk::new(0.0);
         let page = desk.open().unwrap();
         desk.hear(page, look(0.0));
         let give = |coarseness: u32| {
@@ -439,7 +467,7 @@ mod tests {
 
     #[test]
     fn who_leaves_a_world_that_stands_still_lets_it_go_on() {
-        let desk = Desk::new(true, 0.0);
+        let desk = Desk::new(0.0);
         let (one, other) = (desk.open().unwrap(), desk.open().unwrap());
         desk.hear(one, Wish::Step { by: 2 });
         desk.hear(one, Wish::Speed { times: 0.5 });
@@ -455,7 +483,7 @@ mod tests {
 
     #[test]
     fn what_pages_want_done_is_a_line_each_though_it_cannot_be_read() {
-        let desk = Desk::new(true, 0.0);
+        let desk = Desk::new(0.0);
         let page = desk.open().unwrap();
         assert_eq!(desk.take_commands(7), None);
         for line in ["{\"remove\":\n3}", "{\"add\": {\"x\": 1e10,\n\"y\": 0}}", "{\"until\": 9}"] {
@@ -468,7 +496,7 @@ mod tests {
 
     #[test]
     fn there_is_room_for_so_many_pages_and_so_many_words() {
-        let desk = Desk::new(true, 0.0);
+        let desk = Desk::new(0.0);
         let pages: Vec<_> = std::iter::from_fn(|| desk.open()).collect();
         assert_eq!(pages.len(), MOST_PAGES);
         (0..1000).for_each(|i| desk.tell(&Say::Difference { step: Some(i) }));

@@ -56,7 +56,7 @@ pub(super) struct Course {
 
 impl Course {
     /// What pages are told once all ranks have told.
-    pub(super) fn say(&mut self, parts: Vec<Part>, playing: bool) -> Say {
+    pub(super) fn say(&mut self, parts: Vec<Part>) -> Say {
         let now = Instant::now();
         let sum = |figure: fn(&Part) -> u64| parts.iter().map(figure).sum::<u64>();
         let energy: f64 = parts.iter().map(|part| part.kinetic_energy).sum();
@@ -79,7 +79,7 @@ impl Course {
             }
         }
         self.last = Some((now, parts));
-        Say::Figures { playing, figures, phases, busy }
+        Say::Figures { figures, phases, busy }
     }
 }
 
@@ -133,13 +133,13 @@ mod tests {
             part.phase_nanos[0] = steps * 2_000_000;
             part
         };
-        let Say::Figures { figures, phases, busy, playing } = course.say(vec![part(3, 9), part(3, 5)], true) else {
+        let Say::Figures { figures, phases, busy } = course.say(vec![part(3, 9), part(3, 5)]) else {
             panic!("figures")
         };
         assert_eq!(figures[0], ("bodies", "2,000".to_owned()));
         assert_eq!(figures[2], ("kinetic energy", "3.00 kJ".to_owned()));
-        assert!(phases.is_empty() && busy.is_empty() && playing);
-        let Say::Figures { figures, busy, .. } = course.say(vec![part(5, 1_000_009), part(5, 5)], false) else {
+        assert!(phases.is_empty() && busy.is_empty());
+        let Say::Figures { figures, busy, .. } = course.say(vec![part(5, 1_000_009), part(5, 5)]) else {
             panic!("figures")
         };
         assert_eq!((figures[1].clone(), busy), (("a step takes", "2.00 ms".to_owned()), vec![0.75, 1.0]));

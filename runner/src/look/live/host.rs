@@ -68,9 +68,9 @@ struct State {
     /// As pages know them.
     tiles: Tiles,
     course: Course,
-    /// Nobody is asked how it goes before; and what it was like when somebody was.
+    /// Nobody is asked how it goes before; and after how many steps somebody was.
     next_course: Instant,
-    told: Option<(u64, bool)>,
+    told: Option<u64>,
     /// When the next step is to be made, if not as soon as can be.
     next_step: Instant,
 }
@@ -206,7 +206,7 @@ impl State {
                 let gaze = Gaze { coarseness, ..due.gaze };
                 (Asked::Look(Due { version: steps, gaze, ..due }), Question::Look { gaze, most })
             }
-            (None, None) if self.is_to_tell(desk, steps) => (Asked::Figures(steps), Question::Figures),
+            (None, None) if desk.is_wanted() && self.is_to_tell(steps) => (Asked::Figures(steps), Question::Figures),
             (None, None) => return None,
         };
         self.asked = Some((asked, now));
@@ -227,20 +227,23 @@ impl State {
     }
 
     /// Whether pages are to be told how it goes, and have not been told just that.
-    fn is_to_tell(&self, desk: &Desk, steps: u64) -> bool {
-        Instant::now() >= self.next_course && self.told != Some((steps, desk.pace().playing))
+    fn is_to_tell(&self, steps: u64) -> bool {
+        Instant::now() >= self.next_course && self.told != Some(steps)
     }
 }
 
 impl Host for Viewer {
     fn calls(&self, steps: u64) -> bool {
-        let Some(desk) = self.desk.as_ref().filter(|desk| desk.is_wanted()) else { return false };
+        let Some(desk) = &self.desk else { return false };
+        if !desk.is_wanted() {
+            return desk.pace().times > 0.0;
+        }
         let (pace, state) = (desk.pace(), lock(&self.state));
         desk.has_commands()
             || !pace.playing
             || pace.times > 0.0
             || pace.by != 0
-            || state.is_to_tell(desk, steps)
+            || state.is_to_tell(steps)
             || desk.picked() != state.found.map(|(pick, ..)| pick)
             || Instant::now() >= state.next_frame && desk.rests(steps).is_some_and(|rest| rest.is_zero())
     }
@@ -284,7 +287,7 @@ impl Host for Viewer {
             }
         };
         let course =
-            (state.told != Some((steps, pace.playing))).then(|| state.next_course.saturating_duration_since(now));
+            (state.told != Some(steps) && desk.is_wanted()).then(|| state.next_course.saturating_duration_since(now));
         drop(state);
         let waits = [until, desk.rests(steps), course].into_iter().flatten();
         desk.wait(wishes, waits.fold(patience, Duration::min).max(Duration::from_micros(200)));
@@ -325,10 +328,9 @@ impl Host for Viewer {
                 state.found = found.map(|found| (known, steps, found));
             }
             Asked::Figures(steps) => {
-                let playing = desk.pace().playing;
-                let said = state.course.say(all::<figures::Part>(&answers), playing);
+                let said = state.course.say(all::<figures::Part>(&answers));
                 desk.tell(&said);
-                state.told = Some((steps, playing));
+                state.told = Some(steps);
                 state.next_course = Instant::now() + TELL.max(TELL_SHARE * since.elapsed());
             }
         }

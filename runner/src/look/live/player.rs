@@ -104,7 +104,7 @@ impl Player {
     }
 
     fn go_on(&mut self, stop: &StopFlag) -> Result<(), RecordingError> {
-        let (mut last, mut was_playing) = (Instant::now(), None);
+        let mut last = Instant::now();
         while !stop.is_requested() {
             let (wishes, pace, now) = (self.desk.wishes(), self.desk.take_pace(), Instant::now());
             let patience = self.advance(&pace, now - last);
@@ -114,9 +114,8 @@ impl Player {
                 self.show(&due)?;
             }
             self.look_for_picked()?;
-            if was_playing != Some(pace.playing) || !due.is_empty() {
-                self.tell(pace.playing);
-                was_playing = Some(pace.playing);
+            if !due.is_empty() {
+                self.tell();
             }
             let waits = [patience, self.desk.rests(self.step())].into_iter().flatten();
             self.desk.wait(wishes, waits.fold(PATIENCE, Duration::min));
@@ -249,7 +248,7 @@ impl Player {
     }
 
     /// Tells pages how it goes.
-    fn tell(&self, playing: bool) {
+    fn tell(&self) {
         let hertz = self.tracks[0].recorded.setting().hertz;
         let mut all = vec![("record", format!("{} of {}", self.index() + 1, self.steps.len()))];
         if let (Some(first), Some(last)) = (self.steps.first(), self.steps.last()) {
@@ -258,7 +257,7 @@ impl Player {
         let bodies = |track: &Track| track.frame.bodies.len();
         let counts: Vec<_> = self.tracks.iter().map(|track| crate::look::picture::grouped(bodies(track))).collect();
         all.push(("bodies", counts.join(", ")));
-        self.desk.tell(&Say::Figures { playing, figures: all, phases: Vec::new(), busy: Vec::new() });
+        self.desk.tell(&Say::Figures { figures: all, phases: Vec::new(), busy: Vec::new() });
     }
 }
 

@@ -121,10 +121,15 @@ pub(crate) struct Gaze {
 pub(crate) enum Say {
     /// What is shown, first of all.
     Hello(Hello),
+    /// How time goes on from now on.
+    Pace {
+        /// Whether it does.
+        playing: bool,
+        /// Seconds in a second; 0: as many as can be.
+        times: f64,
+    },
     /// How it goes.
     Figures {
-        /// Whether time goes on.
-        playing: bool,
         /// Names and values.
         figures: Vec<(&'static str, String)>,
         /// Milliseconds of a step in each phase.

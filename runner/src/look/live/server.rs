@@ -315,7 +315,7 @@ pub(super) fn overhear(bytes: &[u8]) -> (bool, Option<Gaze>) {
     let mut request = httparse::Request::new(&mut headers);
     let is_whole = matches!(request.parse(bytes), Ok(httparse::Status::Complete(_)));
     let is_request = is_whole && understand(&request).is_some();
-    let desk = Desk::new(true, 0.0);
+    let desk = Desk::new(0.0);
     let page = desk.open().expect("it is the first");
     let sent = io::Cursor::new(bytes.to_vec());
     listen(WebSocket::from_raw_socket(sent, Role::Server, Some(limits())), &desk, page);

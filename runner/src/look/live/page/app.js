@@ -45,7 +45,7 @@ socket.onclose = () => say(state.hello ? "The run is over; this is what was seen
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, figures, body, difference, tiles, shapes })[type]?.(message);
+    ({ hello, pace, figures, body, difference, tiles, shapes })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -65,9 +65,7 @@ function hello(message) {
     return place;
   }));
   options(at("color"), COLORS.filter((color) => message.colors.includes(color)).map((color) => [color, color]));
-  const times = [0.1, 0.25, 0.5, 1, 2, 4, 8].map((times) => [times, `${times} ×`]);
-  options(at("speed"), message.recorded ? times : [[0, "as fast as can be"], ...times]);
-  at("speed").value = message.recorded ? 1 : 0;
+  options(at("speed"), [[0, "as fast as can be"], ...[0.1, 0.25, 0.5, 1, 2, 4, 8].map(speed)]);
   for (const id of ["track", "back"]) at(id).hidden = !message.recorded;
   at("hand").hidden = message.recorded;
   name_shapes();
@@ -166,9 +164,19 @@ function clock() {
   }
 }
 
-function figures({ playing, figures, phases, busy }) {
+/// Somebody has changed how time goes on.
+function pace({ playing, times }) {
   state.playing = playing;
   at("play").textContent = playing ? "Pause" : "Play";
+  const select = at("speed");
+  if (![...select.options].some(({ value }) => Number(value) === times)) select.add(new Option(...speed(times).reverse()));
+  select.value = times;
+}
+
+/// A speed that can be chosen.
+const speed = (times) => [times, `${times} ×`];
+
+function figures({ figures, phases, busy }) {
   list(at("figures"), figures);
   at("time").hidden = !phases.length;
   list(at("phases"), phases.map(([name, ms]) => [name.replaceAll("_", " "), `${short(ms)} ms`]));
