@@ -169,8 +169,18 @@ impl RankProcess {
         let end = on_own_thread(rank, || take_part(plan, &observer));
         let exit = match &end {
             Ok(RankEnd { result: Ok(_), .. }) => Exit::Done,
-            Ok(RankEnd { result: Err(RankError::Told { exit, .. }), .. }) => *exit,
-            _ => Exit::PeerLost,
+            Ok(RankEnd { result: Err(RankError::Told { exit, text }), .. }) => {
+                observer.fail(text);
+                *exit
+            }
+            Ok(RankEnd { result: Err(error), .. }) => {
+                error.transport().inspect(|error| observer.fail(error));
+                Exit::PeerLost
+            }
+            Err(failure) => {
+                observer.fail(failure);
+                Exit::PeerLost
+            }
         };
         let line = rank_report::write(&end, observer.complete.load(Ordering::Relaxed));
         let written = io::stdout().write_all(line.as_bytes()).and_then(|()| io::stdout().flush());

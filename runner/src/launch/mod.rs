@@ -36,5 +36,5 @@ pub fn run(plan: &Plan, observer: &Observer) -> Result<Summary, RunError> {
             return Err(RunError::NeedsProcesses { transport: plan.transport.name() });
         }
     };
-    outcome(plan, ends, observer.complete.load(Ordering::Relaxed))
+    outcome(plan, ends, observer.complete.load(Ordering::Relaxed)).inspect_err(|error| observer.fail(error))
 }

@@ -138,15 +138,20 @@ impl Job {
             let rank = self.endpoint.rank();
             let (complete, steps) = (observer.complete.load(Ordering::Relaxed), run.steps);
             let reason = RankFailure::from_panic(rank, payload).to_string();
-            self.fail(&RunError::PeerLost { rank, complete, steps, reason }, Exit::PeerLost)
+            let error = RunError::PeerLost { rank, complete, steps, reason };
+            observer.fail(&error);
+            self.fail(&error, Exit::PeerLost)
         });
         match end.result {
             Ok(gathered) => Ok(gathered.map(|gathered| Summary::new(plan, gathered))),
             Err(error @ (RankError::Step(StepError::NonFinite { .. }) | RankError::Agreed { .. })) => {
-                Err(self.common(&told(error, end.complete, run.steps)))
+                let error = told(error, end.complete, run.steps);
+                observer.fail(&error);
+                Err(self.common(&error))
             }
             Err(error) => {
                 let error = told(error, end.complete, run.steps);
+                observer.fail(&error);
                 self.fail(&error, error.exit())
             }
         }

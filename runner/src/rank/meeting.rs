@@ -50,6 +50,10 @@ pub trait Host: Debug + Send + Sync {
     fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8>;
     /// On rank 0: the answers to its last question, by rank.
     fn hear(&self, answers: Vec<Vec<u8>>);
+    /// What whoever looks may want to know, a sentence, such as that a command is refused.
+    fn note(&self, _text: &str) {}
+    /// Why the run failed.
+    fn fail(&self, _why: &str) {}
     /// On every rank alike: whether to meet before the first step as well, and when all are made, then until the run is asked to
     /// stop.
     fn lingers(&self) -> bool;

@@ -4,7 +4,7 @@ use super::meeting::Host;
 use super::trace::TraceSteps;
 use atoll_core::World;
 use atoll_transport::Rank;
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
 use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -53,6 +53,16 @@ impl Observer {
     pub(super) fn note(&self, text: &str) {
         if let Some(listener) = &self.listener {
             listener.note(text);
+        }
+        if let Some(host) = &self.host {
+            host.note(text);
+        }
+    }
+
+    /// Lets whoever has ranks meet know why the run failed.
+    pub(crate) fn fail(&self, why: &dyn Display) {
+        if let Some(host) = &self.host {
+            host.fail(&why.to_string());
         }
     }
 

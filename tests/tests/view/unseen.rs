@@ -16,6 +16,17 @@ fn small(steps: u32) -> Vec<String> {
     format!("--bodies 3000 --tiles 4x4 --steps {steps}").split(' ').map(str::to_owned).collect()
 }
 
+/// What a page is told next of a sort.
+fn heard(page: &mut Page, of: &str) -> Value {
+    loop {
+        match page.hear().expect("it is said before the end") {
+            Heard::Said(said) if said["type"] == of => break said,
+            Heard::Said(_) => {}
+            Heard::Frame(number, ..) => page.wish(&json!({ "do": "ack", "frame": number })),
+        }
+    }
+}
+
 fn hashes(summary: &Value) -> [&Value; 3] {
     ["state_hash", "contact_hash", "steps"].map(|key| &summary[key])
 }
@@ -89,6 +100,34 @@ fn what_is_viewed_waits_for_the_first_page_and_stays_until_it_is_interrupted() {
 }
 
 #[test]
+fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
+    let folder = tempdir().unwrap();
+    let acts = folder.path().join("acts.jsonl");
+    std::fs::write(&acts, "{\"step\": 3, \"remove\": 777777}\n").unwrap();
+    for way in Way::all() {
+        let mut command = way.command(if way == Way::Local { 1 } else { 2 }, "configs/quickstart.toml");
+        let served = Served::start(command.args(small(4_000_000_000)).args(["--view", "--skip-refused"]));
+        let mut page = Page::open(&served);
+        page.wish(&json!({ "do": "command", "line": "{\"remove\": 999999}" }));
+        let note = heard(&mut page, "note")["text"].as_str().unwrap().to_owned();
+        assert!(note.starts_with("a hand on the page: step ") && note.ends_with("there is no body 999999; left out"), "{note}");
+        served.interrupt();
+        heard(&mut page, "over");
+        assert_eq!(served.end().code, Some(130));
+    }
+    let mut command = program::command();
+    command.args(["view", "configs/quickstart.toml", "--ranks", "2", "--commands"]).arg(&acts);
+    let served = Served::start(command.args(["--bodies", "500", "--tiles", "4x4"]));
+    let mut page = Page::open(&served);
+    let hello = page.hello();
+    page.look(domain(&hello), [320, 240], "kind");
+    let why = heard(&mut page, "failed")["why"].as_str().unwrap().to_owned();
+    assert!(why.contains("line 1: step 3: there is no body 777777"), "{why}");
+    let ended = served.end();
+    assert_eq!((ended.code, ended.stderr.contains(&why)), (Some(2), true), "{ended}");
+}
+
+#[test]
 fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let folder = tempdir().unwrap();
     let out = folder.path().join("out");
@@ -106,13 +145,7 @@ fn who_interrupts_a_run_that_stands_still_gets_its_snapshot_and_summary() {
     let (step, _) = page.frame().unwrap();
     page.wish(&json!({ "do": "step", "by": 3 }));
     // Tiles are cut, and go to other ranks, between any two steps, and the page hears what they are and who holds them.
-    let tiles = loop {
-        match page.hear().expect("the run waits") {
-            Heard::Said(said) if said["type"] == "tiles" => break said["worlds"][0].clone(),
-            Heard::Said(_) => {}
-            Heard::Frame(number, ..) => page.wish(&json!({ "do": "ack", "frame": number })),
-        }
-    };
+    let tiles = heard(&mut page, "tiles")["worlds"][0].clone();
     let levels = tiles["levels"].as_str().unwrap();
     assert!(levels.len() > 16 && levels.contains('b'), "{tiles}");
     assert_eq!(tiles["rank_of_tile"].as_array().map(Vec::len), Some(levels.len()), "{tiles}");

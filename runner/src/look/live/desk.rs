@@ -195,7 +195,10 @@ impl Desk {
             }
             Wish::Drop => *picked = None,
             Wish::Command { line } if commands.len() < MOST_COMMANDS => commands.push(line),
-            Wish::Command { .. } => {}
+            Wish::Command { .. } => {
+                let full = "a hand on the page: too much waits to be done; this is left out".to_owned();
+                page.texts.push(text(&Say::Note { text: full }));
+            }
         }
         let now = inner.pace.say();
         if now != was.say() {
@@ -367,7 +370,10 @@ impl Desk {
 
     /// Nothing more will be shown. Who waits for it is told.
     pub(crate) fn end(&self) {
-        self.lock().closed = true;
+        let mut inner = self.lock();
+        inner.tell(&Say::Over);
+        inner.closed = true;
+        drop(inner);
         self.wish.notify_all();
         self.ready.notify_all();
     }
@@ -503,6 +509,7 @@ mod tests {
         let Ready::Texts(texts) = desk.next(pages[0], NOW) else { panic!("much was said") };
         assert_eq!((texts.len(), texts.last().unwrap().as_str()), (MOST_TEXTS, r#"{"type":"difference","step":999}"#));
         desk.end();
+        assert_eq!(desk.next(pages[0], NOW), Ready::Texts(vec![r#"{"type":"over"}"#.to_owned()]));
         assert_eq!(desk.next(pages[0], NOW), Ready::Closed);
         assert!(matches!(desk.next(pages[1], NOW), Ready::Texts(_)), "what was said before is");
         desk.close(pages[1]);

@@ -336,6 +336,18 @@ impl Host for Viewer {
         }
     }
 
+    fn note(&self, text: &str) {
+        if let Some(desk) = &self.desk {
+            desk.tell(&Say::Note { text: text.to_owned() });
+        }
+    }
+
+    fn fail(&self, why: &str) {
+        if let Some(desk) = &self.desk {
+            desk.greet(Say::Failed { why: why.to_owned() });
+        }
+    }
+
     fn lingers(&self) -> bool {
         self.lingers
     }

@@ -152,6 +152,18 @@ pub(crate) enum Say {
         /// As [`Source::shapes`].
         shapes: Vec<Outline>,
     },
+    /// What whoever looks may want to know: that a command is refused, and why.
+    Note {
+        /// A sentence.
+        text: String,
+    },
+    /// The run has failed.
+    Failed {
+        /// Why.
+        why: String,
+    },
+    /// Nothing more will be shown.
+    Over,
     /// The first record in which two worlds differ, or that there is none.
     Difference {
         /// Its step.

@@ -57,6 +57,11 @@ pub(super) struct Commander {
 /// What the words of whoever drives a run are called in errors.
 const LIVE: &str = "what was said";
 
+/// Where a line stands. What pages say has no numbers.
+fn place(source: &str, number: u64) -> String {
+    if number == 0 { "a hand on the page".to_owned() } else { format!("{source}: line {number}") }
+}
+
 impl Commander {
     /// For a rank that begins, or goes on from the snapshot of the step `resumed`, which had this `state`.
     ///
@@ -199,8 +204,11 @@ impl Commander {
             });
             match line {
                 Ok(line) if step >= self.steps && !matches!(line.action, Action::Ask(_)) => {
-                    let text = format!("{source}: line {number}: all steps are made, and nothing can be done any more");
+                    let text = format!("{}: all steps are made, and nothing can be done any more", place(source, number));
                     self.tell(step, None, Answer::Refused(&text));
+                    if self.is_page && self.rank == Rank(0) {
+                        observer.note(&text);
+                    }
                 }
                 Ok(line) => {
                     self.write_down(text);
@@ -332,7 +340,7 @@ impl Commander {
         reason: &str,
         observer: &Observer,
     ) -> Result<(), RankError> {
-        let text = format!("{source}: line {number}: step {step}: {}", OneLine(reason));
+        let text = format!("{}: step {step}: {}", place(source, number), OneLine(reason));
         self.tell(step, None, Answer::Refused(&text));
         if self.skips || self.is_page && source == LIVE {
             if self.rank == Rank(0) {

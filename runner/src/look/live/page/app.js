@@ -33,6 +33,8 @@ const state = {
   legend: "",
   due: false,
   asked: "",
+  failure: null,
+  over: false,
 };
 
 const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket?token=${encodeURIComponent(token)}`);
@@ -41,11 +43,17 @@ const tell = (message) => socket.readyState === WebSocket.OPEN && socket.send(JS
 const say = (text) => { at("message").textContent = text; };
 
 socket.onopen = () => say("Waiting for the first picture…");
-socket.onclose = () => say(state.hello ? "The run is over; this is what was seen last." : "There is no run here, or this is not its address.");
+socket.onclose = () => {
+  const end = state.failure ? `The run has failed: ${state.failure}`
+    : state.over ? "The run is over; this is what was seen last."
+      : state.hello ? "The program has ended without a word, or cannot be reached; this is what was seen last."
+        : "There is no run here, or this is not its address.";
+  say(end);
+};
 socket.onmessage = ({ data }) => {
   if (typeof data === "string") {
     const { type, ...message } = JSON.parse(data);
-    ({ hello, pace, figures, body, difference, tiles, shapes })[type]?.(message);
+    ({ hello, pace, figures, body, difference, tiles, shapes, note, failed, over })[type]?.(message);
   } else {
     show(decode(data));
   }
@@ -55,6 +63,7 @@ socket.onmessage = ({ data }) => {
 
 function hello(message) {
   state.hello = message;
+  state.failure = null;
   start_drawing();
   at("source").textContent = message.sources.map(({ name }) => name).join(" and ");
   document.title = `${message.sources[0].name} · Atoll`;
@@ -220,8 +229,22 @@ function body({ body }) {
   redraw();
 }
 
+/// Something was refused, which is to be read before it goes.
 function note({ text }) {
-  say(text);
+  const place = at("note");
+  place.textContent = text;
+  place.hidden = false;
+  clearTimeout(state.fading);
+  state.fading = setTimeout(() => { place.hidden = true; }, 10000);
+}
+
+function failed({ why }) {
+  state.failure = why;
+  say(`The run has failed: ${why}`);
+}
+
+function over() {
+  state.over = true;
 }
 
 function legend({ title, scale, rows }) {
