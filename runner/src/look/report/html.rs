@@ -27,13 +27,23 @@ impl Display for Text<'_> {
     }
 }
 
-/// A number with a suffix for its thousands: `12.3k`, `4.5m` for thousandths.
+/// A number with a suffix for its thousands, `12.3k`. A small one has none, as `4.5m` would be read as meters.
 pub(super) struct Short(pub f64);
 
 impl Display for Short {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (number, suffix) = self.parts(f.precision().unwrap_or(3));
-        write!(f, "{number}{suffix}")
+        let (digits, size) = (f.precision().unwrap_or(3), self.0.abs());
+        if size >= 1.0 || size == 0.0 {
+            let (number, suffix) = self.parts(digits);
+            return write!(f, "{number}{suffix}");
+        }
+        let text = if size < 1e-3 {
+            format!("{:.2e}", self.0)
+        } else {
+            let places = digits.saturating_sub(1) + (-size.log10()).ceil() as usize;
+            format!("{:.places$}", self.0).trim_end_matches('0').to_owned()
+        };
+        f.write_str(&text.replace('-', "\u{2212}"))
     }
 }
 
@@ -127,8 +137,10 @@ mod tests {
             (12345.0, "12.3k"),
             (1000.0, "1k"),
             (999.0, "999"),
-            (-0.00452, "\u{2212}4.52m"),
-            (1e-6, "1\u{b5}"),
+            (-0.00452, "\u{2212}0.00452"),
+            (0.0711349, "0.0711"),
+            (0.1, "0.1"),
+            (1e-6, "1.00e\u{2212}6"),
             (2.5e12, "2.5T"),
             (1e30, "1.00e30"),
         ] {
