@@ -97,10 +97,15 @@ fn a_film_has_as_many_pictures_as_asked_for() {
     let recorded = [recorded.to_str().unwrap()];
     let out = folder.path().join("film.gif");
     for (source, options, expected) in [
-        (&recorded[..], &[][..], (4, "4 pictures of 320 x 200, steps 0 to 12, every 4")),
-        (&recorded, &["--every", "8"], (2, "2 pictures of 320 x 200, steps 0 to 8, every 8")),
-        (&WORLD, &["--every", "5"], (3, "3 pictures of 320 x 200, steps 0 to 10, every 5")),
-        (&WORLD, &["--fps", "15"], (4, "4 pictures of 320 x 200, steps 0 to 12, every 4")),
+        (&recorded[..], &[][..], (4, "4 pictures of 320 x 200, steps 0 to 12, every 4; 15 a second, real time")),
+        (&recorded, &["--every", "8"], (2, "2 pictures of 320 x 200, steps 0 to 8, every 8; 7.5 a second, real time")),
+        (
+            &recorded,
+            &["--speed", "4"],
+            (2, "2 pictures of 320 x 200, steps 0 to 8, every 8; 30 a second, 4 x real time"),
+        ),
+        (&WORLD, &["--every", "5"], (3, "3 pictures of 320 x 200, steps 0 to 10, every 5; 12 a second, real time")),
+        (&WORLD, &["--fps", "15"], (4, "4 pictures of 320 x 200, steps 0 to 12, every 4; 15 a second, real time")),
         (&WORLD, &["--every", "99"], (1, "1 picture of 320 x 200, step 0")),
     ] {
         let ended = render(source, &out, options);

@@ -7,7 +7,7 @@ use super::output::{self, Kept};
 use super::progress::Show;
 use crate::config::{Config, OutputConfig};
 use crate::error::{Exit, RunError};
-use crate::look::film::{Film, FilmKind, remove_unfinished};
+use crate::look::film::{Film, FilmKind, Rate, remove_unfinished};
 use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
 use crate::look::recorded::Recorded;
@@ -18,8 +18,12 @@ use atoll_core::GlobalId;
 use glam::DVec2;
 use std::sync::Arc;
 
-/// Pictures in a second of a film, where nobody says.
+/// Pictures in a second of a film of a configuration, where nobody says.
 const FPS: u32 = 30;
+/// Pictures in a second that a film shows at least, be some alike: of fewer players make strange things.
+const LEAST_SHOWN: f64 = 10.0;
+/// A picture of a film stands for so many seconds at most.
+const LONGEST: f64 = 100.0;
 /// How many times as wide as a body that is followed is what is shown around it.
 const AROUND: f64 = 20.0;
 
@@ -34,12 +38,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
     let kind = FilmKind::of(&args.out)?;
     check_out(args, kind)?;
     let mut source = if args.source.is_dir() { open(args)? } else { plan(args)? };
-    let (setting, shown) = (source.setting().clone(), source.shown(args, kind)?);
+    let setting = source.setting().clone();
+    let (shown, rate) = paced(source.shown(args, kind)?, setting.hertz, args, kind)?;
     if let Some(id) = args.follow {
         source.check_followed(GlobalId(id), &setting)?;
     }
 
-    let mut film = Film::create(&args.out, args.size, args.fps.unwrap_or(FPS))?;
+    let mut film = Film::create(&args.out, args.size, rate)?;
     let layers = Layers { tiles: args.tiles, ghosts: args.ghosts, contacts: args.contacts };
     let look = Look { size: args.size, color: args.color, layers };
     let mut painter = Painter::new(&setting, look);
@@ -82,7 +87,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
     } else {
         format!("steps {} to {}, every {}", shown.first, shown.last, shown.every)
     };
-    output::show(&format!("{}: {frames} of {width} x {height}, {steps}\n", args.out.display()))?;
+    let pace = if kind.most_per_second().is_some() && shown.count() > 1 {
+        let speed = args.speed.filter(|speed| *speed != 1.0).map_or("real time".to_owned(), |x| format!("{x} x real time"));
+        format!("; {} a second, {speed}", (100.0 * rate.added).round() / 100.0)
+    } else {
+        String::new()
+    };
+    output::show(&format!("{}: {frames} of {width} x {height}, {steps}{pace}\n", args.out.display()))?;
     Ok(Exit::Done)
 }
 
@@ -98,7 +109,11 @@ fn unsuitable(option: impl ToString, reason: impl ToString) -> RunError {
 
 /// Refuses options that do not suit what is to be made.
 fn check_out(args: &RenderArgs, kind: FilmKind) -> Result<(), RunError> {
-    let film = [args.every.map(|every| ("--every", every)), args.fps.map(|fps| ("--fps", fps.into()))];
+    let film = [
+        args.every.map(|every| ("--every", every.to_string())),
+        args.fps.map(|fps| ("--fps", fps.to_string())),
+        args.speed.map(|speed| ("--speed", speed.to_string())),
+    ];
     match (kind.is_film(), args.step, film.into_iter().flatten().next()) {
         (false, _, Some((option, value))) => Err(unsuitable(
             format!("{option} {value}"),
@@ -166,7 +181,7 @@ impl Source {
         match self {
             Self::Recorded(recorded) => records(recorded, args.every),
             Self::Live(live) => {
-                let real_time = live.setting().hertz / f64::from(args.fps.unwrap_or(FPS));
+                let real_time = live.setting().hertz * args.speed.unwrap_or(1.0) / f64::from(args.fps.unwrap_or(FPS));
                 let every = args.every.unwrap_or(real_time.round().max(1.0) as u64);
                 let last = live.plan().config.run.steps;
                 Ok(Shown { first: 0, every, last: last - last % every })
@@ -215,6 +230,24 @@ impl Source {
         };
         if known { Ok(()) } else { refused("there is no body of that name; give the id of another") }
     }
+}
+
+/// As many of some pictures as a film can show in the time that it is to last, and how many are in a second then.
+fn paced(shown: Shown, hertz: f64, args: &RenderArgs, kind: FilmKind) -> Result<(Shown, Rate), RunError> {
+    let Some(most) = kind.most_per_second() else { return Ok((shown, Rate { added: 1.0, shown: 1.0 })) };
+    let most = args.fps.map_or(most, |fps| most.min(fps.into()));
+    let rate = |every: u64| args.speed.unwrap_or(1.0) * hertz / every as f64;
+    let of = (rate(shown.every) / most - 1e-9).ceil().max(1.0) as u64;
+    let every = shown.every.saturating_mul(of);
+    let shown = Shown { every, last: shown.first + (shown.last - shown.first) / every * every, ..shown };
+    let added = if shown.count() > 1 { rate(every) } else { 1.0 };
+    if added * LONGEST < 1.0 {
+        let (seconds, speed) = ((1.0 / added).ceil(), (every as f64 / hertz).ceil());
+        let reason = format!("each picture would stand for {seconds} seconds; try --speed {speed}, which shows one a second");
+        return Err(unsuitable("--speed", reason));
+    }
+    let repeated = added * (LEAST_SHOWN / added).ceil().max(1.0);
+    Ok((shown, Rate { added, shown: args.fps.map_or(repeated, f64::from) }))
 }
 
 /// The part of the world that a frame shows.

@@ -305,7 +305,7 @@ fn what_cannot_be_shown_is_refused_in_one_line() {
         (".", "holds no recording"),
         ("a --bind 192.0.2.1", "--bind 192.0.2.1: "),
         ("a b c", "see atoll view --help"),
-        ("world.toml --speed 0", "must be max, or seconds of the world in one, from 0.001 to 1e6"),
+        ("world.toml --speed 0", "must be seconds of the world in one, from 0.001 to 1e6, or max"),
         ("", "the following required arguments were not provided"),
     ] {
         let ended = program::run(program::command().current_dir(DESK.path()).arg("view").args(line.split_whitespace()));

@@ -1,6 +1,6 @@
 //! Options of `atoll render`.
 
-use super::values::ValueArgs;
+use super::values::{ValueArgs, times};
 use crate::look::picture::{ColorBy, View};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -32,7 +32,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Show what is there after so many steps; for a picture [default: the last].
-    #[arg(long, value_name = "N", conflicts_with_all = ["every", "fps"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["every", "fps", "speed"])]
     pub step: Option<u64>,
     /// Width and height of a picture, in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
@@ -62,9 +62,13 @@ pub struct RenderArgs {
     /// real time].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u64).range(1..))]
     pub every: Option<u64>,
-    /// Pictures in a second of a film [default: 30].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
+    /// Pictures in a second of a film: some are left out, or shown several times, so that it lasts as long [default: as many
+    /// as there are, or 30 of a configuration].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=60))]
     pub fps: Option<u32>,
+    /// Seconds of the world in a second of a film [default: 1, real time].
+    #[arg(long, value_name = "X", value_parser = times)]
+    pub speed: Option<f64>,
     /// What wins over the values of a configuration.
     #[command(flatten)]
     pub values: ValueArgs,
@@ -154,7 +158,8 @@ mod tests {
             ("--follow 3 --width 0", "must be a width in m, from 0.001 to 1e9; see"),
             ("--follow -3", "invalid digit found in string; see"),
             ("--every 0", "0 is not in 1..18446744073709551615; see"),
-            ("--fps 0", "0 is not in 1..=240; see"),
+            ("--fps 0", "0 is not in 1..=60; see"),
+            ("--speed 0", "must be seconds of the world in one, from 0.001 to 1e6; see"),
             ("--step 3 --every 3", "'--step <N>' cannot be used with '--every <K>'; see"),
             (
                 "--color pink",

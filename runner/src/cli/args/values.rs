@@ -69,3 +69,9 @@ pub(super) type Given<'a> = (&'static str, &'static str, &'a Option<String>);
 pub(super) fn given(options: &[Given<'_>]) -> impl Iterator<Item = Override> {
     options.iter().filter_map(|(option, key, value)| Some(Override::option(option, key, value.as_ref()?)))
 }
+
+/// How many times as fast as real time.
+pub(super) fn times(text: &str) -> Result<f64, &'static str> {
+    let times = text.parse().ok().filter(|times: &f64| (1e-3..=1e6).contains(times));
+    times.ok_or("must be seconds of the world in one, from 0.001 to 1e6")
+}

@@ -1,7 +1,7 @@
 //! Options of `atoll view`, and of every verb that lets pages look.
 
 use super::run::RunArgs;
-use super::values::ValueArgs;
+use super::values::{ValueArgs, times};
 use clap::Args;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -61,7 +61,6 @@ impl ViewArgs {
 }
 
 /// 0 is as fast as can be.
-fn speed(text: &str) -> Result<f64, &'static str> {
-    let times = text.parse().ok().filter(|times: &f64| (1e-3..=1e6).contains(times));
-    if text == "max" { Ok(0.0) } else { times.ok_or("must be max, or seconds of the world in one, from 0.001 to 1e6") }
+fn speed(text: &str) -> Result<f64, String> {
+    if text == "max" { Ok(0.0) } else { times(text).map_err(|reason| format!("{reason}, or max")) }
 }

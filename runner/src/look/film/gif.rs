@@ -16,7 +16,8 @@ const SHORTEST: u64 = 2;
 pub(super) struct Gif {
     unfinished: Unfinished,
     encoder: Encoder<BufWriter<File>>,
-    fps: u32,
+    /// Pictures in a second.
+    rate: f64,
     added: u64,
     /// What the film shows so far.
     shown: Vec<u8>,
@@ -31,7 +32,7 @@ impl std::fmt::Debug for Gif {
 }
 
 impl Gif {
-    pub(super) fn create(path: &Path, size: [u32; 2], fps: u32) -> io::Result<Self> {
+    pub(super) fn create(path: &Path, size: [u32; 2], rate: f64) -> io::Result<Self> {
         let [Ok(width), Ok(height)] = size.map(u16::try_from) else {
             return Err(io::Error::other("a GIF is at most 65,535 pixels wide and high"));
         };
@@ -39,7 +40,7 @@ impl Gif {
         let mut encoder = Encoder::new(BufWriter::with_capacity(1 << 16, file), width, height, &[]).map_err(plain)?;
         encoder.set_repeat(Repeat::Infinite).map_err(plain)?;
         let shown = Vec::new();
-        Ok(Self { unfinished, encoder, fps, added: 0, shown, palette: Palette::default(), indices: Vec::new() })
+        Ok(Self { unfinished, encoder, rate, added: 0, shown, palette: Palette::default(), indices: Vec::new() })
     }
 
     pub(super) fn add(&mut self, image: &Image) -> io::Result<()> {
@@ -60,7 +61,7 @@ impl Gif {
                 ),
             }
         }
-        let moment = |picture: u64| (100 * picture + u64::from(self.fps) / 2) / u64::from(self.fps);
+        let moment = |picture: u64| (100.0 * picture as f64 / self.rate).round() as u64;
         let delay = (moment(self.added + 1) - moment(self.added)).max(SHORTEST);
         self.encoder
             .write_frame(&Frame {

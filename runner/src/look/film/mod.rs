@@ -53,10 +53,29 @@ impl FilmKind {
         }
     }
 
+    /// Pictures in a second, at most, of what shows them one after the other.
+    pub(crate) fn most_per_second(self) -> Option<f64> {
+        match self {
+            Self::Png | Self::Folder => None,
+            // Programs show what lasts shorter much longer.
+            Self::Gif => Some(50.0),
+            Self::Mp4 | Self::Webm => Some(60.0),
+        }
+    }
+
     /// Whether it is of several pictures.
     pub(crate) fn is_film(self) -> bool {
         self != Self::Png
     }
+}
+
+/// How many pictures make a second of a film.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Rate {
+    /// Of those that are added.
+    pub added: f64,
+    /// Of those that a program shows, which repeats some where there are more.
+    pub shown: f64,
 }
 
 /// A file, or a folder, of pictures that is being written.
@@ -84,22 +103,22 @@ pub(crate) fn to_png(image: &Image) -> Vec<u8> {
 }
 
 impl Film {
-    /// Begins what the path's ending asks for: pictures of that size, so many a second. Nothing is at the path before
+    /// Begins what the path's ending asks for: pictures of that size, at that rate. Nothing is at the path before
     /// [`finish`](Self::finish).
     ///
     /// # Errors
     /// If the ending is unknown, there is no ffmpeg, or the path cannot be written to.
-    pub(crate) fn create(path: &Path, size: [u32; 2], fps: u32) -> Result<Self, RunError> {
+    pub(crate) fn create(path: &Path, size: [u32; 2], rate: Rate) -> Result<Self, RunError> {
         let kind = FilmKind::of(path)?;
         let sink = match kind {
             FilmKind::Png => png::Single::create(path).map(Sink::Png),
             FilmKind::Folder => png::Folder::create(path).map(Sink::Folder),
-            FilmKind::Gif => gif::Gif::create(path, size, fps).map(|gif| Sink::Gif(Box::new(gif))),
+            FilmKind::Gif => gif::Gif::create(path, size, rate.added).map(|gif| Sink::Gif(Box::new(gif))),
             FilmKind::Mp4 | FilmKind::Webm => {
                 return Ok(Self {
                     path: path.to_owned(),
                     size,
-                    sink: Sink::Video(video::Video::create(path, kind, size, fps)?),
+                    sink: Sink::Video(video::Video::create(path, kind, size, rate)?),
                 });
             }
         };

@@ -20,8 +20,12 @@ fn picture(step: u64) -> Image {
     Image { size: SIZE, step: 120 * step, pixels }
 }
 
+fn rate(rate: f64) -> Rate {
+    Rate { added: rate, shown: rate }
+}
+
 fn write(path: &Path, steps: std::ops::Range<u64>) {
-    let mut film = Film::create(path, SIZE, 30).unwrap();
+    let mut film = Film::create(path, SIZE, rate(30.0)).unwrap();
     steps.for_each(|step| film.add(&picture(step)).unwrap());
     assert!(!path.exists(), "nothing has its name before it is whole");
     film.finish().unwrap();
@@ -58,10 +62,10 @@ fn a_folder_has_a_picture_for_each_step() {
     assert_eq!(names(&path), ["frame-0000000000.png", "frame-0000000120.png"]);
     assert_eq!(read_png(&path.join("frame-0000000120.png")), picture(1).pixels);
     // What is there stays, and an empty folder is as good as none.
-    let error = Film::create(&path, SIZE, 30).unwrap_err();
+    let error = Film::create(&path, SIZE, rate(30.0)).unwrap_err();
     assert!(error.to_string().contains("it is a folder that is not empty"), "{error}");
     fs::create_dir(folder.path().join("empty")).unwrap();
-    let film = Film::create(&folder.path().join("empty"), SIZE, 30).unwrap();
+    let film = Film::create(&folder.path().join("empty"), SIZE, rate(30.0)).unwrap();
     drop(film);
     assert_eq!(names(folder.path()), ["empty", "frames"]);
 }
@@ -70,7 +74,7 @@ fn a_folder_has_a_picture_for_each_step() {
 fn a_gif_has_every_picture_in_its_time() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("film.gif");
-    let mut film = Film::create(&path, SIZE, 30).unwrap();
+    let mut film = Film::create(&path, SIZE, rate(30.0)).unwrap();
     for step in [0, 1, 1, 2, 3, 4] {
         film.add(&picture(step)).unwrap();
     }
@@ -112,11 +116,11 @@ fn few_colors_stay_as_they_are() {
 fn what_is_not_finished_leaves_nothing() {
     let folder = tempdir().unwrap();
     for name in ["a.png", "a.gif", "frames"] {
-        let mut film = Film::create(&folder.path().join(name), SIZE, 10).unwrap();
+        let mut film = Film::create(&folder.path().join(name), SIZE, rate(10.0)).unwrap();
         film.add(&picture(0)).unwrap();
         drop(film);
         // Nor what has no picture.
-        let error = Film::create(&folder.path().join(name), SIZE, 10).unwrap().finish().unwrap_err();
+        let error = Film::create(&folder.path().join(name), SIZE, rate(10.0)).unwrap().finish().unwrap_err();
         assert_eq!(error.exit(), Exit::Output);
     }
     assert_eq!(names(folder.path()), [""; 0]);
@@ -132,7 +136,7 @@ fn bad_paths_are_told_at_once() {
         ("no/film.gif", "No such file"),
         ("no/frames", "No such file"),
     ] {
-        let error = Film::create(&folder.path().join(name), SIZE, 30).unwrap_err();
+        let error = Film::create(&folder.path().join(name), SIZE, rate(30.0)).unwrap_err();
         assert!(error.to_string().contains(expected) && error.exit() == Exit::Usage, "{error}");
         assert!(!error.to_string().contains('\n'));
     }
@@ -143,7 +147,7 @@ fn bad_paths_are_told_at_once() {
 fn without_ffmpeg_one_line_says_what_to_do() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("film.mp4");
-    let error = Video::create_by("no-such-ffmpeg", &path, FilmKind::Mp4, SIZE, 30).unwrap_err();
+    let error = Video::create_by("no-such-ffmpeg", &path, FilmKind::Mp4, SIZE, rate(30.0)).unwrap_err();
     assert!(error.to_string().contains("the program ffmpeg, which is not on the PATH"), "{error}");
     assert_eq!((error.exit(), names(folder.path()).len()), (Exit::Usage, 0));
 }
@@ -163,7 +167,7 @@ fn a_program_that_fails_is_heard_and_never_waited_for() {
         fs::write(&program, script).unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         let path = folder.path().join("film.mp4");
-        let mut film = Video::create_by(program.to_str().unwrap(), &path, FilmKind::Mp4, SIZE, 30).unwrap();
+        let mut film = Video::create_by(program.to_str().unwrap(), &path, FilmKind::Mp4, SIZE, rate(30.0)).unwrap();
         let added = (0..60).try_for_each(|step| film.add(&picture(step % 10)));
         let error = added.and_then(|()| film.finish()).unwrap_err().to_string();
         assert!(error.starts_with("ffmpeg failed") && error.contains(expected), "{error}");

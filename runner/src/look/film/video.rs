@@ -1,7 +1,7 @@
 //! Films by ffmpeg: it is given pictures as they are, and writes the file.
 
 use super::unfinished::{Unfinished, nothing_added};
-use super::{FilmKind, refusal};
+use super::{FilmKind, Rate, refusal};
 use crate::error::RunError;
 use crate::look::picture::Image;
 use std::ffi::OsString;
@@ -39,8 +39,8 @@ struct Process {
 }
 
 impl Video {
-    pub(super) fn create(path: &Path, kind: FilmKind, size: [u32; 2], fps: u32) -> Result<Self, RunError> {
-        Self::create_by("ffmpeg", path, kind, size, fps)
+    pub(super) fn create(path: &Path, kind: FilmKind, size: [u32; 2], rate: Rate) -> Result<Self, RunError> {
+        Self::create_by("ffmpeg", path, kind, size, rate)
     }
 
     /// As [`create`](Self::create), by the program of that name.
@@ -49,7 +49,7 @@ impl Video {
         path: &Path,
         kind: FilmKind,
         size: [u32; 2],
-        fps: u32,
+        rate: Rate,
     ) -> Result<Self, RunError> {
         if size.iter().any(|length| *length < 2) {
             return Err(refusal(path, "a film by ffmpeg is at least two pixels wide and high; give a larger --size"));
@@ -64,8 +64,9 @@ impl Video {
         output.push(unfinished.at());
         let child = Command::new(program)
             .args("-hide_banner -loglevel error -nostdin -y -f rawvideo -pixel_format rgb24".split_ascii_whitespace())
-            .args(["-video_size", &format!("{}x{}", size[0], size[1]), "-framerate", &fps.to_string(), "-i", "pipe:0"])
-            .args(["-vf", FILTER])
+            .args(["-video_size", &format!("{}x{}", size[0], size[1])])
+            .args(["-framerate", &rate.added.to_string(), "-i", "pipe:0"])
+            .args(["-vf", &format!("fps={},{FILTER}", rate.shown)])
             .args(BOTH.split_ascii_whitespace())
             .args(if kind == FilmKind::Webm { WEBM } else { MP4 }.split_ascii_whitespace())
             .arg(output)
