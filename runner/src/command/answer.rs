@@ -151,8 +151,8 @@ impl Hit {
 /// What is written for whoever asked.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Answer<'a> {
-    /// To a question.
-    To(&'a Question, &'a Part),
+    /// To a question, with the names that the first kinds may have.
+    To(&'a Question, &'a Part, &'a [Option<String>]),
     /// Names that were given to bodies which had none.
     Added(&'a [u64]),
     /// What began and ended in the last step: contacts, or that a body is inside a sensor.
@@ -168,7 +168,7 @@ impl Answer<'_> {
     pub(crate) fn to_line(self, step: u64, name: Option<&str>) -> String {
         let name = name.map_or(String::new(), |name| format!("\"name\":{},", json(&name)));
         let rest = match self {
-            Self::To(question, part) => format!("\"{}\":{}", key(question), value(question, part)),
+            Self::To(question, part, names) => format!("\"{}\":{}", key(question), value(question, part, names)),
             Self::Added(ids) => format!("\"added\":{}", json(&ids)),
             Self::Events { event, began, ended } => {
                 let [first, last] = match event {
@@ -200,21 +200,34 @@ fn key(question: &Question) -> &'static str {
     }
 }
 
-fn value(question: &Question, part: &Part) -> String {
+/// A body as whoever asked is told of it.
+#[derive(Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    state: &'a State,
+    /// What the scene calls its kind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind_name: Option<&'a str>,
+}
+
+fn value(question: &Question, part: &Part, names: &[Option<String>]) -> String {
+    let name = |state: &State| names.get(state.kind as usize)?.as_deref();
+    let told = |body: &'_ Option<State>| body.as_ref().map(|state| json(&Told { state, kind_name: name(state) })).unwrap_or("null".to_owned());
     match part {
         Part::Ray(hit) => json(hit),
         Part::Names(ids) => json(ids),
         Part::Inside(ids) => json(ids),
         Part::Touching(contacts) => json(contacts),
         // Who asked for one is given one, and who asked by a list a list.
-        Part::Bodies(bodies) if matches!(question, Question::Body(_)) => json(&bodies[0]),
-        Part::Bodies(bodies) => json(bodies),
+        Part::Bodies(bodies) if matches!(question, Question::Body(_)) => told(&bodies[0]),
+        Part::Bodies(bodies) => format!("[{}]", bodies.iter().map(told).collect::<Vec<_>>().join(",")),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use atoll_core::KindId;
     use glam::DVec2;
 
     #[test]
@@ -232,9 +245,16 @@ mod tests {
         assert_eq!(inside, Part::Inside(Some(vec![4])));
         let question = Question::Ray { from: DVec2::ZERO, to: DVec2::ONE };
         let expected = "{\"step\":7,\"name\":\"up\",\"ray\":{\"id\":3,\"fraction\":0.5,\"point\":[0.5,1.0],\"normal\":[0.0,1.0]}}\n";
-        assert_eq!(Answer::To(&question, &parts[2]).to_line(7, Some("up")), expected);
-        let nobody = |question| Answer::To(&question, &Part::Bodies(vec![None])).to_line(0, None);
+        assert_eq!(Answer::To(&question, &parts[2], &[]).to_line(7, Some("up")), expected);
+        let nobody = |question| Answer::To(&question, &Part::Bodies(vec![None]), &[]).to_line(0, None);
         assert_eq!(nobody(Question::Body(GlobalId(3))), "{\"step\":0,\"body\":null}\n");
         assert_eq!(nobody(Question::Bodies(vec![GlobalId(3)])), "{\"step\":0,\"body\":[null]}\n");
+        // What the scene calls its kind is told as well.
+        let one = Part::Bodies(vec![Some(State::new(&Body::at_rest(GlobalId(3), KindId(1), DVec2::ZERO)))]);
+        let told = |names| Answer::To(&Question::Body(GlobalId(3)), &one, names).to_line(0, None);
+        let rest = "\"kind\":1,\"x\":0.0,\"y\":0.0,\"angle\":0.0,\"vx\":0.0,\"vy\":0.0,\"omega\":0.0";
+        assert_eq!(told(&[None, None]), format!("{{\"step\":0,\"body\":{{\"id\":3,{rest}}}}}\n"));
+        let expected = format!("{{\"step\":0,\"body\":{{\"id\":3,{rest},\"kind_name\":\"crate\"}}}}\n");
+        assert_eq!(told(&[None, Some("crate".to_owned())]), expected);
     }
 }

@@ -2,6 +2,7 @@
 //! a run under way, pictures and files for other programs are made of this.
 
 use crate::folder::recording::Row;
+use crate::wording;
 use atoll_core::{Kind, Partition, StaticBody};
 use glam::DVec2;
 use std::borrow::Cow;
@@ -14,6 +15,8 @@ pub(crate) struct Setting {
     pub partition: Partition,
     /// Shapes and materials, which bodies refer to by number.
     pub kinds: Vec<Kind>,
+    /// What the scene calls the first of them, where it does.
+    pub names: Vec<Option<String>>,
     /// What never moves, or as its path has it.
     pub statics: Vec<StaticBody>,
     /// Steps in a second.
@@ -21,6 +24,12 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
+    /// What the scene calls a kind, or else its shape.
+    pub(crate) fn name_of(&self, kind: usize) -> String {
+        let name = self.names.get(kind).cloned().flatten();
+        name.unwrap_or_else(|| self.kinds.get(kind).map_or(String::new(), |kind| wording::shape(&kind.shape)))
+    }
+
     /// Statics where they are after so many steps, for those that have a path move.
     pub(crate) fn statics_at(&self, step: u64) -> impl Iterator<Item = Cow<'_, StaticBody>> {
         let dt = (1.0 / self.hertz) as f32;

@@ -31,11 +31,11 @@ impl Recorded {
             Some(stage) => (stage.clone(), None),
             None => {
                 let scene = scene_of(&recording)?;
-                (Stage { kinds: scene.kinds(), statics: scene.statics().to_vec() }, Some(scene))
+                (Stage { kinds: scene.kinds(), names: Vec::new(), statics: scene.statics().to_vec() }, Some(scene))
             }
         };
-        let Stage { kinds, statics } = stage;
-        Ok(Self { recording, setting: Setting { partition, kinds, statics, hertz }, scene })
+        let Stage { kinds, names, statics } = stage;
+        Ok(Self { recording, setting: Setting { partition, kinds, names, statics, hertz }, scene })
     }
 
     /// The recording itself.
@@ -111,7 +111,7 @@ mod tests {
         let recorded = Recorded::open(folder.path()).unwrap();
         let (kinds, statics) = stage();
         let partition = Partition::uniform(facts(5).domain[0], facts(5).domain[1], 4, 2).unwrap();
-        assert_eq!(recorded.setting(), &Setting { partition, kinds, statics, hertz: 50.0 });
+        assert_eq!(recorded.setting(), &Setting { partition, names: vec![None; kinds.len()], kinds, statics, hertz: 50.0 });
         let mut frame = Frame { ranks: vec![(9, 9)], ..Frame::default() };
         recorded.read(0, &mut frame).unwrap();
         assert_eq!((frame.step, frame.bodies.len(), frame.ranks), (0, 20, vec![(0, 7), (1, 14), (2, 20)]));

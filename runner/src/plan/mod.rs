@@ -144,6 +144,11 @@ impl Plan {
         folder.into_iter().chain(self.log.clone()).collect()
     }
 
+    /// What the scene calls its kinds, where it does.
+    pub(crate) fn kind_names(&self) -> &[Option<String>] {
+        self.scene.file().map_or(&[], SceneFile::kind_names)
+    }
+
     /// Whether all that was recorded before the snapshot from which the run goes on is there, and of this run, by what every
     /// file says about itself. For one process of a run to ask.
     ///
@@ -154,7 +159,7 @@ impl Plan {
         let Some((output, newest)) = self.output.as_ref().zip(newest) else { return Ok(()) };
         let Some(every) = output.every.record_every else { return Ok(()) };
         let facts = RunFacts::new(&self.config, self.scene.domain(), self.tiles, every);
-        let stage = Some(StageText::new(&self.blueprint.kinds, &self.blueprint.statics));
+        let stage = Some(StageText::named(&self.blueprint.kinds, self.kind_names(), &self.blueprint.statics));
         let run = OfRun { path: output.folder.configuration(), facts, stage };
         Recording::check_until(output.folder.path(), run, newest)
             .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())

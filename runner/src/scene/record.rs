@@ -33,6 +33,9 @@ pub(crate) struct KindText {
     filter: Option<FilterText>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     sensor: bool,
+    /// What a scene calls it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) name: Option<String>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

@@ -14,6 +14,8 @@ use std::collections::HashMap;
 pub struct Stage {
     /// Shapes and materials, which bodies refer to by number.
     pub kinds: Vec<Kind>,
+    /// What the scene calls each of them, where it does.
+    pub names: Vec<Option<String>>,
     /// What never moves.
     pub statics: Vec<StaticBody>,
 }
@@ -49,7 +51,13 @@ struct StaticsText {
 impl StageText {
     /// That of a run with these.
     pub fn new(kinds: &[Kind], statics: &[StaticBody]) -> Self {
-        let kinds: Vec<KindText> = kinds.iter().map(KindText::new).collect();
+        Self::named(kinds, &[], statics)
+    }
+
+    /// The same where the first kinds may have names.
+    pub(crate) fn named(kinds: &[Kind], names: &[Option<String>], statics: &[StaticBody]) -> Self {
+        let mut kinds: Vec<KindText> = kinds.iter().map(KindText::new).collect();
+        kinds.iter_mut().zip(names).for_each(|(kind, name)| kind.name.clone_from(name));
         Self { kinds: to_json(&kinds), statics: to_json(&StaticsText::new(statics)) }
     }
 
@@ -71,9 +79,10 @@ impl StageText {
     /// Reads both, and trusts nothing in them. The error is what is wrong.
     pub(super) fn read(&self) -> Result<Stage, String> {
         let kinds: Vec<KindText> = from_json("atoll.kinds", &self.kinds)?;
+        let names = kinds.iter().map(|kind| kind.name.clone()).collect();
         let kinds = read_kinds("atoll.kinds", &kinds)?;
         let statics: StaticsText = from_json("atoll.statics", &self.statics)?;
-        Ok(Stage { kinds, statics: statics.read()? })
+        Ok(Stage { kinds, names, statics: statics.read()? })
     }
 }
 
@@ -213,6 +222,9 @@ mod tests {
             (format!("{:?}", read.kinds), format!("{:?}", read.statics)),
             (format!("{kinds:?}"), format!("{statics:?}"))
         );
+        let names = [None, Some("crate".to_owned())];
+        let named = StageText::named(&kinds, &names, &statics).read().unwrap();
+        assert_eq!((&named.names[..2], named.names.len()), (&names[..], kinds.len()));
         let text = StageText::new(&kinds, &statics);
         for (from, to, expected) in [
             ("\"period\":-4.0", "\"period\":0.0", "atoll.statics has a path that cannot be"),

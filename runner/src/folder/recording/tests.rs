@@ -85,7 +85,7 @@ fn states_come_back_bit_for_bit_in_their_order() {
     }
     assert_eq!(recording.facts(), &facts(1));
     let (kinds, statics) = stage();
-    assert_eq!(recording.stage(), Some(&Stage { kinds, statics }));
+    assert_eq!(recording.stage(), Some(&Stage { names: vec![None; kinds.len()], kinds, statics }));
 }
 
 #[test]

@@ -91,7 +91,8 @@ impl Viewer {
         let hertz = facts.hertz().expect("every configuration has a frequency");
         let (partition, kinds, statics) = (blueprint.partition, blueprint.kinds, blueprint.statics);
         let ranks_of_tiles = plan.assignment.ranks_of_tiles().to_vec();
-        let setting = Setting { partition, kinds, statics, hertz };
+        let names = plan.kind_names().to_vec();
+        let setting = Setting { partition, kinds, names, statics, hertz };
         let last_step = plan.config.run.steps;
         if let Some(desk) = &desk {
             let source = scenery::source(name.to_owned(), &setting, ranks_of_tiles.clone());

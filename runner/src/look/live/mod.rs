@@ -31,7 +31,7 @@ pub fn overhear(bytes: &[u8]) -> [bool; 2] {
         let shapes = [Shape::Circle { radius: 0.5 }, Shape::Box { half: Vec2::new(0.01, 3.0) }];
         let kinds = shapes.map(|shape| Kind::new(shape, Material::default())).to_vec();
         let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 2, 2).expect("it is one");
-        let setting = Setting { partition, kinds, statics: Vec::new(), hertz: 60.0 };
+        let setting = Setting { partition, kinds, names: Vec::new(), statics: Vec::new(), hertz: 60.0 };
         let row =
             |i: u32| Row { id: i.into(), x: f64::from(i), y: 5.0, kind: i % 3, angle: i as f32, ..Row::default() };
         let frame = Frame { bodies: (0..10).map(row).collect(), ranks: vec![(0, 4), (1, 10)], ..Frame::default() };

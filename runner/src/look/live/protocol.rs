@@ -213,7 +213,7 @@ pub(crate) struct Source {
 /// The outline of a kind, in m.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct Outline {
-    /// What it is, and how large.
+    /// What the scene calls it, or else what it is, and how large.
     pub name: String,
     /// Half width, half height and radius: of a circle the last, of a box the first two; of any other how far it reaches along its axes,
     /// and half of how wide it is where it is narrowest.

@@ -44,7 +44,9 @@ pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) ->
 
 /// The outline of each kind of bodies.
 pub(super) fn shapes(setting: &Setting) -> Vec<Outline> {
-    outlines(&setting.kinds)
+    let mut outlines = outlines(&setting.kinds);
+    outlines.iter_mut().enumerate().for_each(|(kind, outline)| outline.name = setting.name_of(kind));
+    outlines
 }
 
 fn outlines(kinds: &[Kind]) -> Vec<Outline> {
@@ -89,6 +91,7 @@ pub(super) fn picked(found: &Found, source: u32, setting: &Setting, rank: u32, i
     let [x, y] = found.place;
     let [vx, vy] = found.velocity.map(f64::from);
     let mut figures = vec![
+        ("kind", setting.names.get(found.kind as usize).cloned().flatten().unwrap_or(found.kind.to_string())),
         ("shape", shape.unwrap_or_default()),
         ("x", format!("{x:.3} m")),
         ("y", format!("{y:.3} m")),
@@ -120,13 +123,14 @@ mod tests {
         let setting = Setting {
             partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1).unwrap(),
             kinds: [kinds.to_vec(), every_kind()].concat(),
+            names: vec![None, Some("ball".to_owned())],
             statics: every_static(),
             hertz: 60.0,
         };
         let source = source("a world".to_owned(), &setting, vec![0]);
         let text = serde_json::to_value(&source).unwrap();
         assert_eq!(text["shapes"][0], json!({ "name": "box, 2 × 1 m", "size": [1.0, 0.5, 0.0] }));
-        assert_eq!(text["shapes"][1], json!({ "name": "circle, 1 m", "size": [0.0, 0.0, 0.5] }));
+        assert_eq!(text["shapes"][1], json!({ "name": "ball", "size": [0.0, 0.0, 0.5] }));
         for (shape, kind) in source.shapes.iter().zip(&setting.kinds).skip(2) {
             // No part reaches further than the square that the page draws in.
             let reach = shape.parts.iter().flat_map(|(corners, radius)| {

@@ -267,6 +267,7 @@ mod tests {
         let setting = Setting {
             partition: atoll_core::Partition::uniform(DVec2::ZERO, DVec2::splat(100.0), 1, 1).unwrap(),
             kinds: vec![atoll_core::Kind::new(atoll_core::Shape::circle(0.05), atoll_core::Material::default())],
+            names: Vec::new(),
             statics: Vec::new(),
             hertz: 60.0,
         };

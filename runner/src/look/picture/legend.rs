@@ -5,7 +5,7 @@ use super::colors::{self, Scale};
 use super::paint::{self, ColorBy, MOST_CONTACTS};
 use super::{Layers, bodies};
 use crate::look::frame::Setting;
-use crate::wording::{self, short};
+use crate::wording::short;
 use atoll_core::Shape;
 
 /// The meaning of one color or sign.
@@ -35,7 +35,7 @@ impl Legend {
     pub(crate) fn new(by: ColorBy, layers: &Layers, setting: &Setting, ranks: u32, most: f32) -> Self {
         let square = |color, text: &str| (Sign::Square(color), text.to_owned());
         let (title, scale, mut rows) = match by {
-            ColorBy::Kind => ("kind", None, (0..).zip(&setting.kinds).map(|(i, kind)| shape(i, &kind.shape)).collect()),
+            ColorBy::Kind => ("kind", None, (0..setting.kinds.len()).map(|kind| shape(kind, setting)).collect()),
             ColorBy::Speed => {
                 let labels = ["0".to_owned(), short(0.5 * f64::from(most)), format!("{}+", short(f64::from(most)))];
                 ("speed, m/s", Some((Scale::Amount, labels)), Vec::new())
@@ -90,12 +90,14 @@ impl Legend {
     }
 }
 
-/// A kind, told by its shape.
-fn shape(number: u32, shape: &Shape) -> (Sign, String) {
-    let color = colors::distinct(number);
-    match shape {
-        Shape::Circle { .. } => (Sign::Disc(color), format!("{} wide", wording::shape(shape))),
-        _ => (Sign::Square(color), wording::shape(shape)),
+/// A kind, told by its name or its shape.
+fn shape(kind: usize, setting: &Setting) -> (Sign, String) {
+    let (color, name) = (colors::distinct(kind as u32), setting.name_of(kind));
+    let is_named = setting.names.get(kind).is_some_and(Option::is_some);
+    match setting.kinds[kind].shape {
+        Shape::Circle { .. } if is_named => (Sign::Disc(color), name),
+        Shape::Circle { .. } => (Sign::Disc(color), format!("{name} wide")),
+        _ => (Sign::Square(color), name),
     }
 }
 

@@ -25,6 +25,7 @@ fn setting(kinds: &[Shape], statics: &[(Shape, f32, DVec2)]) -> Setting {
     Setting {
         partition: Partition::uniform(DVec2::ZERO, DVec2::splat(f64::from(SIZE)), 4, 4).unwrap(),
         kinds: kinds.iter().map(|shape| kind(shape.clone())).collect(),
+        names: Vec::new(),
         statics: (0..).zip(statics).map(fixed).collect(),
         hertz: 60.0,
     }

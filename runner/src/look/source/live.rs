@@ -45,7 +45,8 @@ impl Live {
         // As a recording of it would tell.
         let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, 1);
         let hertz = facts.hertz().expect("every configuration has a frequency");
-        Self { setting: Setting { partition, kinds, statics, hertz }, plan }
+        let names = plan.kind_names().to_vec();
+        Self { setting: Setting { partition, kinds, names, statics, hertz }, plan }
     }
 
     /// The plan.

@@ -162,6 +162,7 @@ fn every_shape_is_polygons_and_what_moves_is_where_it_is() {
     let mut setting = Setting {
         partition: Partition::uniform(DVec2::ZERO, DVec2::splat(10.0), 1, 1).unwrap(),
         kinds: Vec::new(),
+        names: Vec::new(),
         statics: (0..).zip(&shapes).map(fixed).collect(),
         hertz: 50.0,
     };

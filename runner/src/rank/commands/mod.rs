@@ -45,6 +45,8 @@ pub(super) struct Commander {
     record: Option<File>,
     /// What there was after the last step of what is told.
     followed: Followed,
+    /// What the scene calls its kinds.
+    names: Vec<Option<String>>,
     crowds: Crowds,
     failure: Option<RunError>,
     /// After how many steps it was last said that the run waits.
@@ -97,6 +99,7 @@ impl Commander {
             kept_in: plan.output.as_ref().map(|output| output.folder.commands()).filter(|_| rank == Rank(0)),
             record: None,
             followed: Followed::default(),
+            names: plan.kind_names().to_vec(),
             crowds: Crowds::default(),
             failure: None,
             waits_after: None,
@@ -375,9 +378,11 @@ impl Commander {
                 None => parts,
             });
         }
+        let names = std::mem::take(&mut self.names);
         for ((line, question), part) in asked.iter().zip(joined.unwrap_or_default()) {
-            self.tell(world.step_count(), line.name.as_deref(), Answer::To(question, &part));
+            self.tell(world.step_count(), line.name.as_deref(), Answer::To(question, &part, &names));
         }
+        self.names = names;
         Ok(())
     }
 

@@ -39,6 +39,7 @@ pub(super) struct Recorder<'a> {
     /// How many kinds the next record may speak of.
     kinds: usize,
     statics: &'a [StaticBody],
+    names: &'a [Option<String>],
     records: Buffers<Record>,
     saves: Buffers<Saved>,
     /// Steps of the last snapshot and of the one before.
@@ -79,6 +80,7 @@ impl<'a> Recorder<'a> {
             jobs: Some(jobs),
             kinds: plan.blueprint.kinds.len(),
             statics: &plan.blueprint.statics,
+            names: plan.kind_names(),
             records,
             saves,
             last_snapshot: resumed,
@@ -109,7 +111,8 @@ impl<'a> Recorder<'a> {
             && let Some(mut record) = self.records.take()
         {
             if world.kinds().len() != std::mem::replace(&mut self.kinds, world.kinds().len()) {
-                self.ask(Job::Kinds(StageText::new(&world.kinds().collect::<Vec<_>>(), self.statics)));
+                let kinds: Vec<_> = world.kinds().collect();
+                self.ask(Job::Kinds(StageText::named(&kinds, self.names, self.statics)));
             }
             record.fill(step, world.bodies());
             self.ask(Job::Record(record));

@@ -71,7 +71,7 @@ impl Writer {
         let (ranks, identity) = (plan.config.run.ranks as u32, plan.config.identity(plan.tiles));
         let recording = |every| {
             let facts = RunFacts::new(&plan.config, plan.scene.domain(), plan.tiles, every);
-            let stage = StageText::new(&plan.blueprint.kinds, &plan.blueprint.statics);
+            let stage = StageText::named(&plan.blueprint.kinds, plan.kind_names(), &plan.blueprint.statics);
             RecordingWriter::new(output.folder.rank(rank.0), rank.0, ranks, &facts, &stage)
         };
         let recording = output.every.record_every.map(recording).transpose()?;
