@@ -51,6 +51,8 @@ type Known = (Pick, u64, (u32, Found));
 struct State {
     /// What was asked last, and when.
     asked: Option<(Asked, Instant)>,
+    /// How many bodies there are at the start.
+    bodies: u64,
     /// Frames to be made.
     due: VecDeque<Due>,
     /// No frame is made before.
@@ -101,6 +103,7 @@ impl Viewer {
         let now = Instant::now();
         let state = State {
             asked: None,
+            bodies: plan.scene.bodies(),
             due: VecDeque::new(),
             next_frame: now,
             coarseness: 1,
@@ -205,7 +208,7 @@ impl State {
                 let most = self.range(due.gaze.color).most;
                 let coarseness = if is_still || due.glimpsed { 1 } else { self.coarseness };
                 let gaze = Gaze { coarseness, ..due.gaze };
-                (Asked::Look(Due { version: steps, gaze, ..due }), Question::Look { gaze, most })
+                (Asked::Look(Due { version: steps, gaze, ..due }), Question::Look { gaze, most, bodies: self.bodies })
             }
             (None, None) if desk.is_wanted() && self.is_to_tell(steps) => (Asked::Figures(steps), Question::Figures),
             (None, None) => return None,

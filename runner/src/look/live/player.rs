@@ -269,7 +269,7 @@ pub(super) fn draw_once(setting: &Setting, frame: &Frame, gaze: Gaze) {
 
 /// Draws a record.
 fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range: Range) -> Portion {
-    let mut sketch = Sketch::new(paper, setting, gaze, None::<Empty<Region>>);
+    let mut sketch = Sketch::new(paper, setting, gaze, frame.bodies.len(), None::<Empty<Region>>);
     let (by, tint) = (gaze.color, Tint::new(gaze.color, range));
     let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
     let (mut from, partition) = (0, frame.partition(setting));

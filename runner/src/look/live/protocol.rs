@@ -218,6 +218,9 @@ pub(crate) struct Outline {
     /// Half width, half height and radius: of a circle the last, of a box the first two; of any other how far it reaches along its axes,
     /// and half of how wide it is where it is narrowest.
     pub size: [f32; 3],
+    /// Whether what is inside shows through.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub sensor: bool,
     /// Of any other its convex parts: x and y of each corner, counter-clockwise, and how far it reaches around them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<(Vec<[f32; 2]>, f32)>,

@@ -27,6 +27,8 @@ pub(super) enum Question {
         gaze: Gaze,
         /// What has the last color of the scale.
         most: f32,
+        /// How many bodies there are, about.
+        bodies: u64,
     },
     /// The body of that name, or else the nearest to a place, at most so far from it, in m.
     Find(Option<u64>, [f64; 2], f64),
@@ -69,7 +71,7 @@ struct Head {
 pub(super) fn answer(question: &Question, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
     match *question {
         Question::Measure(by) => bytemuck::cast_slice(&measure(by, held.world)).to_vec(),
-        Question::Look { gaze, most } => look(&gaze, most, setting, held, paper),
+        Question::Look { gaze, most, bodies } => look(&gaze, (most, bodies), setting, held, paper),
         Question::Find(id, place, reach) => {
             let found = find(id, DVec2::from(place), reach, setting, held.world);
             found.map_or(Vec::new(), |found| bytemuck::bytes_of(&found).to_vec())
@@ -86,10 +88,10 @@ fn measure(by: ColorBy, world: &World) -> Vec<f32> {
     sample.map(|body| by.measure(body.velocity.x, body.velocity.y, body.angular_velocity)).collect()
 }
 
-fn look(gaze: &Gaze, most: f32, setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
+fn look(gaze: &Gaze, (most, bodies): (f32, u64), setting: &Setting, held: &Held<'_>, paper: &mut Paper) -> Vec<u8> {
     let begun = Instant::now();
     let regions = held.world.views().map(|tile| held.world.partition().region(tile.id()));
-    let mut sketch = Sketch::new(paper, setting, gaze, Some(regions));
+    let mut sketch = Sketch::new(paper, setting, gaze, bodies as usize, Some(regions));
     let tint = Tint::new(gaze.color, Range { most });
     let kinds: Vec<Rgb> = (0..setting.kinds.len() as u32).map(Tint::numbered).collect();
     let rank = Tint::numbered(held.rank.0);

@@ -50,10 +50,11 @@ pub(super) fn shapes(setting: &Setting) -> Vec<Outline> {
 }
 
 fn outlines(kinds: &[Kind]) -> Vec<Outline> {
-    kinds.iter().map(|kind| outline(&kind.shape)).collect()
+    kinds.iter().map(outline).collect()
 }
 
-fn outline(shape: &Shape) -> Outline {
+fn outline(kind: &Kind) -> Outline {
+    let shape = &kind.shape;
     let (size, parts) = match shape {
         Shape::Circle { radius } => ([0.0, 0.0, *radius], Vec::new()),
         Shape::Box { half } => ([half.x, half.y, 0.0], Vec::new()),
@@ -64,7 +65,7 @@ fn outline(shape: &Shape) -> Outline {
     };
     let part =
         |(corners, radius): (Vec<Vec2>, f32)| (corners.into_iter().map(|corner| corner.to_array()).collect(), radius);
-    Outline { name: wording::shape(shape), size, parts: parts.into_iter().map(part).collect() }
+    Outline { name: wording::shape(shape), size, sensor: kind.sensor, parts: parts.into_iter().map(part).collect() }
 }
 
 /// What colors mean, as JSON: a title, a scale with its marks, and signs with what they stand for.
@@ -142,7 +143,7 @@ mod tests {
             assert_eq!(shape.parts.len(), kind.shape.outlines().len());
         }
         for (fixed, given) in setting.statics.iter().zip(&source.statics) {
-            assert_eq!(outline(&fixed.kind.shape), source.static_shapes[given.shape as usize]);
+            assert_eq!(outline(&fixed.kind), source.static_shapes[given.shape as usize]);
             assert_eq!((fixed.position.x, fixed.path.is_some()), (given.at[0], given.path.is_some()));
         }
         assert_eq!(text["statics"][2]["path"]["line"][1], json!(-2.0));

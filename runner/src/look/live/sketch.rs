@@ -3,8 +3,8 @@
 
 use super::protocol::{Dot, Gaze};
 use crate::look::frame::Setting;
-use crate::look::picture::{DRAWN, Field, Rgb, Tone, View};
-use atoll_core::{Region, Rot};
+use crate::look::picture::{DRAWN, Field, Rgb, SHEER, Tone, View, least_area};
+use atoll_core::{Kind, Region, Rot};
 use glam::DVec2;
 
 /// Columns and rows of an image: from, and up to but without.
@@ -86,26 +86,30 @@ impl Gaze {
 }
 
 impl<'a> Sketch<'a> {
-    /// Of what lies in some regions, or anywhere.
+    /// Of what lies in some regions, or anywhere, of so many bodies in all.
     pub(super) fn new(
         paper: &'a mut Paper,
         setting: &Setting,
         gaze: &Gaze,
+        bodies: usize,
         regions: Option<impl Iterator<Item = Region>>,
     ) -> Self {
         let scale = scale(gaze) / f64::from(gaze.coarseness);
         let drawn = DRAWN / f64::from(gaze.coarseness);
         let width = |radius: f32| f64::from(radius) * 2.0 * scale;
         let mut widest = 0.0_f64;
-        let mut size = |shape: &atoll_core::Shape| {
+        let image = gaze.size.map(|length| f64::from(length) / f64::from(gaze.coarseness)).iter().product();
+        let least = least_area(image, bodies);
+        let size = |kind: &Kind| {
+            let shape = &kind.shape;
             let longest = width(shape.half_extents(Rot::IDENTITY).max_element());
             if longest > drawn {
                 return Size::Large;
             }
             widest = widest.max(longest);
-            Size::Small(f64::from(shape.area()) * scale * scale)
+            Size::Small((f64::from(shape.area()) * scale * scale).max(least) * if kind.sensor { SHEER } else { 1.0 })
         };
-        let sizes: Vec<_> = setting.kinds.iter().map(|kind| size(&kind.shape)).collect();
+        let sizes: Vec<_> = setting.kinds.iter().map(size).collect();
         let rectangle = rectangle(setting, gaze);
         let has_small = sizes.iter().any(|size| matches!(size, Size::Small(_)));
         let pixels = if has_small { pixels(gaze, scale, regions) } else { [[0; 2]; 2] };
@@ -277,7 +281,7 @@ mod tests {
             // Not to be divided by four.
             let gaze = Gaze { view, size: [71, 47], color: crate::look::picture::ColorBy::Kind, coarseness };
             let mut paper = Paper::default();
-            let mut sketch = Sketch::new(&mut paper, &setting, &gaze, None::<std::iter::Empty<Region>>);
+            let mut sketch = Sketch::new(&mut paper, &setting, &gaze, 1, None::<std::iter::Empty<Region>>);
             sketch.add(place, 0, || 0, || Rgb([255, 0, 0]));
             let portion = sketch.finish();
             let ([columns, rows], covered) = gaze.part(portion.pixels);

@@ -5,15 +5,23 @@ use super::colors;
 use super::view::Fit;
 use crate::folder::recording::Row;
 use crate::look::frame::Live;
-use atoll_core::{MOST_CORNERS, Rot, Shape, StaticBody};
+use atoll_core::{Kind, MOST_CORNERS, Rot, Shape, StaticBody};
 use glam::{DVec2, Vec2};
 
 /// What is wider than this, in pixels, is drawn as what it is.
 pub(crate) const DRAWN: f64 = 2.0;
 /// From this width on, in pixels, outlines and marks begin to show, and from twice as much they show fully.
 const DETAILED: f64 = 5.0;
-/// A static is never drawn thinner, in pixels.
+/// What is drawn as what it is, is never thinner, in pixels.
 const THINNEST: f64 = 1.0;
+/// How much of its color a sensor has: what is inside shows through.
+pub(crate) const SHEER: f64 = 0.35;
+
+/// What a body covers at least that is too small to be drawn, in pixels, so that it is seen: nearly a pixel, or where there are
+/// many, as much as leaves nine tenths of the image free.
+pub(crate) fn least_area(pixels: f64, bodies: usize) -> f64 {
+    (0.1 * pixels / bodies.max(1) as f64).min(0.8)
+}
 
 /// How bodies come upon an image at some scale.
 #[derive(Debug)]
@@ -31,8 +39,10 @@ struct Drawn {
     width: f64,
     /// How wide it is where it is narrowest, in pixels.
     narrowest: f64,
-    /// In pixels.
+    /// What it covers where it is too small to be drawn, in pixels.
     area: f64,
+    /// How much of its color it has.
+    part: f64,
     /// Of a circle around it, in pixels.
     reach: f64,
     /// Its parts, unless it is a circle or a box.
@@ -40,7 +50,8 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn new(shape: &Shape, scale: f64) -> Self {
+    fn new(kind: &Kind, scale: f64, least_area: f64) -> Self {
+        let (shape, part) = (&kind.shape, if kind.sensor { SHEER } else { 1.0 });
         let narrowest = match shape {
             Shape::Circle { radius } => 2.0 * radius,
             Shape::Box { half } => 2.0 * half.min_element(),
@@ -50,7 +61,8 @@ impl Drawn {
             shape: shape.clone(),
             width: f64::from(2.0 * shape.half_extents(Rot::IDENTITY).max_element()) * scale,
             narrowest: f64::from(narrowest) * scale,
-            area: f64::from(shape.area()) * scale * scale,
+            area: (f64::from(shape.area()) * scale * scale).max(least_area) * part,
+            part,
             reach: f64::from(shape.bounding_radius()) * scale,
             outlines: outlines(shape),
         }
@@ -58,8 +70,10 @@ impl Drawn {
 }
 
 impl Bodies {
-    pub(super) fn new<'a>(fit: Fit, shapes: impl Iterator<Item = &'a Shape>) -> Self {
-        Self { fit, kinds: shapes.map(|shape| Drawn::new(shape, fit.scale)).collect() }
+    /// Of these kinds, on an image of so many pixels on which there are so many bodies.
+    pub(super) fn new(fit: Fit, kinds: &[Kind], pixels: f64, bodies: usize) -> Self {
+        let least = least_area(pixels, bodies);
+        Self { fit, kinds: kinds.iter().map(|kind| Drawn::new(kind, fit.scale, least)).collect() }
     }
 
     /// How wide the widest kind is, in pixels.
@@ -102,8 +116,9 @@ impl Bodies {
         let edge = color.mix(color.darker(), detail as f32);
         let border = (0.05 * width).clamp(0.8, 3.0);
         match &forms[..] {
-            forms if detail == 0.0 => return forms.iter().for_each(|form| canvas.draw(form, color, 1.0)),
-            [form] => canvas.draw_edged(form, color, edge, border),
+            forms if detail == 0.0 => return forms.iter().for_each(|form| canvas.draw(form, color, kind.part)),
+            [form] => canvas.draw_edged(form, color, kind.part, edge, border),
+            forms if kind.part < 1.0 => forms.iter().for_each(|form| canvas.draw(form, color, kind.part)),
             // What is within another part has no edge there.
             forms => {
                 forms.iter().for_each(|form| canvas.draw(form, edge, 1.0));
@@ -159,7 +174,7 @@ fn outlines(shape: &Shape) -> Vec<(Vec<Vec2>, f32)> {
     }
 }
 
-/// The parts of a shape on the image, and the direction of its first axis.
+/// The parts of a shape on the image, wide enough to be seen, and the direction of its first axis.
 fn forms(
     shape: &Shape,
     outlines: &[(Vec<Vec2>, f32)],
@@ -176,32 +191,23 @@ fn forms(
             let turned = [axis[0] * from.x + axis[1] * from.y, axis[1] * from.x - axis[0] * from.y];
             *to = DVec2::from(center) + DVec2::from(turned);
         }
-        Form::Hull { corners, count: outline.len(), radius: f64::from(*radius) * scale }
+        let least = if outline.len() < 3 { 0.5 * THINNEST } else { 0.0 };
+        Form::Hull { corners, count: outline.len(), radius: (f64::from(*radius) * scale).max(least) }
     };
     let forms = match *shape {
-        Shape::Circle { radius } => vec![Form::Disc { center, radius: f64::from(radius) * scale }],
+        Shape::Circle { radius } => vec![Form::Disc { center, radius: (f64::from(radius) * scale).max(THINNEST) }],
         Shape::Box { half } => {
-            vec![Form::Box { center, axis, half: half.to_array().map(|half| f64::from(half) * scale) }]
+            vec![Form::Box { center, axis, half: half.to_array().map(|half| (f64::from(half) * scale).max(0.5 * THINNEST)) }]
         }
         _ => outlines.iter().map(hull).collect(),
     };
     (forms, axis)
 }
 
-/// Adds what never moves to the densities, wide enough to be seen: so there is no seam between what adjoins.
+/// Adds what never moves to the densities: so there is no seam between what adjoins.
 pub(super) fn draw_static(canvas: &Canvas, field: &mut Field, fit: &Fit, fixed: &StaticBody) {
     let shape = &fixed.kind.shape;
     for form in forms(shape, &outlines(shape), fit.place(fixed.position), fixed.rotation, fit.scale).0 {
-        let form = match form {
-            Form::Disc { center, radius } => Form::Disc { center, radius: radius.max(THINNEST) },
-            Form::Box { center, axis, half } => {
-                Form::Box { center, axis, half: half.map(|half| half.max(0.5 * THINNEST)) }
-            }
-            Form::Hull { corners, count, radius } if count < 3 => {
-                Form::Hull { corners, count, radius: radius.max(0.5 * THINNEST) }
-            }
-            other => other,
-        };
         field.cover(canvas, &form, colors::STATIC);
     }
 }
@@ -219,7 +225,7 @@ pub(super) fn draw_contacts(canvas: &mut Canvas, field: &mut Field, fit: &Fit, b
             field.splat(center, std::f64::consts::PI * radius * radius, color);
         } else {
             let radius = radius.min(12.0);
-            canvas.draw_edged(&Form::Disc { center, radius: radius + 0.8 }, color, colors::PAPER, 0.8);
+            canvas.draw_edged(&Form::Disc { center, radius: radius + 0.8 }, color, 1.0, colors::PAPER, 0.8);
         }
     }
 }

@@ -13,7 +13,7 @@ mod tests;
 mod tiles;
 mod view;
 
-pub(crate) use bodies::DRAWN;
+pub(crate) use bodies::{DRAWN, SHEER, least_area};
 pub(crate) use canvas::{Field, Image, Rgb, Tone};
 pub(crate) use colors::STATIC;
 pub(crate) use legend::{Legend, Sign, grouped};
@@ -104,15 +104,18 @@ impl Painter {
 
     fn draw_statics(&mut self, step: u64, fit: &Fit) {
         let Self { setting, canvas, field, .. } = self;
-        field.reset(canvas.image.size);
-        setting.statics_at(step).for_each(|fixed| bodies::draw_static(canvas, field, fit, &fixed));
-        field.draw(canvas, &Tone::new(1.0));
+        for (is_sensor, part) in [(false, 1.0), (true, SHEER)] {
+            field.reset(canvas.image.size);
+            let some = setting.statics_at(step).filter(|fixed| fixed.kind.sensor == is_sensor);
+            some.for_each(|fixed| bodies::draw_static(canvas, field, fit, &fixed));
+            field.draw(canvas, &Tone::new(1.0).times(part));
+        }
     }
 
     /// Draws bodies, then ghosts, then contacts.
     fn draw_bodies(&mut self, frame: &Frame, fit: Fit) {
         let Self { setting, look, canvas, field, order, .. } = self;
-        let bodies = Bodies::new(fit, setting.kinds.iter().map(|kind| &kind.shape));
+        let bodies = Bodies::new(fit, &setting.kinds, canvas.size().iter().product(), frame.bodies.len());
         let [has_small, has_large] = bodies.has();
         let tone = bodies.tone();
         if has_small {

@@ -194,7 +194,7 @@ fn densities_are_what_bodies_cover() {
     let places = (0..SIZE * SIZE).map(|i| (f64::from(i % SIZE) + 0.37, f64::from(i / SIZE) + 0.81));
     let bodies: Vec<Row> = places.map(|(x, y)| row(0, x, y, 0.3)).collect();
     let fit = Fit::new(&view(), [f64::from(SIZE); 2]);
-    let drawn = Bodies::new(fit, [&shape].into_iter());
+    let drawn = Bodies::new(fit, &world.kinds, f64::from(SIZE * SIZE), bodies.len());
     let mut field = Field::default();
     field.reset([SIZE; 2]);
     bodies.iter().for_each(|row| drawn.splat(&mut field, row, || Rgb::hex(0)));

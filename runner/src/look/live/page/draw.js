@@ -280,8 +280,9 @@ export class Drawing {
       const [px, py] = [(x - camera.x) * zoom, (y - camera.y) * zoom];
       const reach = (Math.hypot(half_x, half_y) + radius) * zoom + 2;
       if (Math.abs(px) > half[0] + reach || Math.abs(py) > half[1] + reach) continue;
-      const least = first || radius ? 0 : 0.5;
-      const round = first ? radius * zoom : radius && Math.max(1, radius * zoom);
+      const has_parts = first >= 1;
+      const least = has_parts || radius ? 0 : 0.5;
+      const round = has_parts ? radius * zoom : radius && Math.max(1, radius * zoom);
       fixed.values.set([px, py, c, s, Math.max(least, half_x * zoom), Math.max(least, half_y * zoom), round, first], 8 * count++);
     }
     if (!count) return;

@@ -3,6 +3,9 @@
 /// Texels in a row of a texture that is a list.
 export const ROW = 2048;
 
+/// How much of its color has what is drawn: through a sensor shows what is inside.
+const SHEER = "(fract(outline.w) > 0.25 ? 0.35 : 1.0)";
+
 /// From a point to the outline of a shape, negative within; all in pixels. A box or a circle is quick; of any other the parts are
 /// looked through, as `shapes.js` lays them out.
 const DISTANCE = `
@@ -10,7 +13,7 @@ uniform highp sampler2D parts;
 uniform float zoom;
 vec2 texel(int i) { return texelFetch(parts, ivec2(i % ${ROW}, i / ${ROW}), 0).xy; }
 float to_outline(vec2 at, vec4 outline) {
-  if (outline.w == 0.0) {
+  if (outline.w < 1.0) {
     vec2 beyond = abs(at) - outline.xy;
     return length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - outline.z;
   }
@@ -54,8 +57,12 @@ void main() {
   float angle = float(word.y & 0xffffu) / 65536.0 * 6.283185307179586;
   int kind = int(word.y >> 16) | int(word.z >> 24) << 16;
   outline = texelFetch(shapes, ivec2(kind % ${ROW}, kind / ${ROW}), 0) * vec4(zoom, zoom, zoom, 1.0);
+  bool is_plain = outline.w < 1.0;
+  // A box is never thinner than a pixel.
+  if (is_plain && outline.z == 0.0) outline.xy = max(outline.xy, 0.5);
   color = vec4(float(word.z & 0xffu), float((word.z >> 8) & 0xffu), float((word.z >> 16) & 0xffu), 255.0) / 255.0;
-  at = CORNERS[gl_VertexID % 6] * (outline.xy + (outline.w == 0.0 ? outline.z : 0.0) + 1.0);
+  color.a = ${SHEER};
+  at = CORNERS[gl_VertexID % 6] * (outline.xy + (is_plain ? outline.z : 0.0) + 1.0);
   float c = cos(angle), s = sin(angle);
   vec2 turned = vec2(c * at.x - s * at.y, s * at.x + c * at.y);
   gl_Position = vec4(position * place.xy + place.zw + turned / pixels, 0.0, 1.0);
@@ -73,8 +80,8 @@ out vec2 at;
 const vec2 CORNERS[6] = vec2[](vec2(-1,-1), vec2(1,-1), vec2(1,1), vec2(-1,-1), vec2(1,1), vec2(-1,1));
 void main() {
   outline = shape;
-  color = vec4(ink, 1.0);
-  at = CORNERS[gl_VertexID] * (shape.xy + (shape.w == 0.0 ? shape.z : 0.0) + 1.5);
+  color = vec4(ink, 1.0) * ${SHEER};
+  at = CORNERS[gl_VertexID] * (shape.xy + (shape.w < 1.0 ? shape.z : 0.0) + 1.5);
   vec2 turned = vec2(middle.z * at.x - middle.w * at.y, middle.w * at.x + middle.z * at.y);
   gl_Position = vec4((middle.xy + turned) / pixels, 0.0, 1.0);
 }`;
@@ -102,14 +109,14 @@ void main() {
   float distance = to_outline(at, outline);
   float cover = clamp(0.5 - distance, 0.0, 1.0);
   if (cover == 0.0) discard;
-  bool is_plain = outline.w == 0.0;
+  bool is_plain = outline.w < 1.0;
   float size = outline.z + (is_plain ? min(outline.x, outline.y) : 0.0);
   float rim = clamp(distance + 1.5, 0.0, 1.0) * smoothstep(3.0, 6.0, size);
   // A line from the center outwards shows how the body is turned.
   float reach = outline.z + (is_plain ? outline.x : 0.0);
   float mark = clamp(1.1 - abs(at.y), 0.0, 1.0) * step(0.0, at.x) * step(at.x, 0.7 * reach) * smoothstep(5.0, 9.0, size);
   vec3 ink = mix(color.rgb, color.rgb * 0.55, max(rim, mark));
-  pixel = vec4(ink, 1.0) * (cover * color.a);
+  pixel = vec4(ink, 1.0) * (cover * mix(color.a, 1.0, rim));
 }`;
 
 export const IMAGE_VERTEX = `#version 300 es

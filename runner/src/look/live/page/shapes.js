@@ -1,19 +1,20 @@
 // Shapes as textures, and where statics are that move.
 
 /// Shapes with parts and their parts as texels, from which the shaders read them: for each shape its size, and the place of the first
-/// texel of its parts, which is 0 if it has none. There stands how many parts it has, then for each part how many corners it has and
+/// texel of its parts, which is 0 if it has none, and half of one more if what is inside shows through. There stands how many parts it has, then for each part how many corners it has and
 /// how far it reaches around them, and its corners. `lists` are lists of shapes.
 export function laid_out(lists) {
   const parts = [0, 0, 0, 0];
-  const lay = ({ size, parts: of }) => {
-    if (!of) return [...size, 0];
+  const lay = ({ size, sensor, parts: of }) => {
+    const sheer = sensor ? 0.5 : 0;
+    if (!of) return [...size, sheer];
     const first = parts.length / 4;
     parts.push(of.length, 0, 0, 0);
     for (const [corners, radius] of of) {
       parts.push(corners.length, radius, 0, 0);
       for (const [x, y] of corners) parts.push(x, y, 0, 0);
     }
-    return [...size, first];
+    return [...size, first + sheer];
   };
   return { shapes: lists.map((list) => list.map(lay)), parts };
 }

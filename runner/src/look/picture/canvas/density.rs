@@ -188,6 +188,12 @@ impl Tone {
         Self { table: (0..=Self::STEPS).map(of).collect() }
     }
 
+    /// The same, with a part of the strength.
+    pub(crate) fn times(mut self, part: f64) -> Self {
+        self.table.iter_mut().for_each(|strength| *strength *= part as f32);
+        self
+    }
+
     /// For so much of a pixel.
     #[inline]
     pub(crate) fn of(&self, area: f32) -> f32 {

@@ -78,12 +78,12 @@ impl Canvas {
         self.draw_each(form, |coverage, _, _| (color, coverage * part));
     }
 
-    /// Draws a form with an edge of its own color, within the form and so wide.
-    pub(super) fn draw_edged(&mut self, form: &Form, color: Rgb, edge: Rgb, width: f64) {
+    /// Draws a form, as much of its color as given, with an edge of its own color, within the form and so wide.
+    pub(super) fn draw_edged(&mut self, form: &Form, color: Rgb, part: f64, edge: Rgb, width: f64) {
         let inner = form.grown(-width);
         self.draw_each(form, |coverage, x, y| {
-            let part = inner.coverage(x, y).min(coverage) / coverage;
-            (edge.mix(color, part as f32), coverage)
+            let within = inner.coverage(x, y).min(coverage) / coverage;
+            (edge.mix(color, within as f32), coverage * (1.0 - within * (1.0 - part)))
         });
     }
 
