@@ -46,7 +46,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
 
     let mut film = Film::create(&args.out, args.size, rate)?;
     let layers = Layers { tiles: args.tiles, ghosts: args.ghosts, contacts: args.contacts };
-    let look = Look { size: args.size, color: args.color, layers };
+    let look = Look { size: args.size, color: args.color, layers, bare: args.bare };
     let mut painter = Painter::new(&setting, look);
     let mut draw = |frame: &Frame| {
         let view = view(args, &setting, frame)?;

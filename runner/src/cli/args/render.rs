@@ -58,6 +58,9 @@ pub struct RenderArgs {
     /// Show where bodies touch, and how hard; of a configuration.
     #[arg(long)]
     pub contacts: bool,
+    /// Draw nothing but the world: no legend, no time, no scale.
+    #[arg(long)]
+    pub bare: bool,
     /// A picture every so many steps of a film [default: each that was recorded; of a configuration as many as let it play in
     /// real time].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u64).range(1..))]

@@ -1,10 +1,12 @@
 //! What is written upon a picture: the legend in the upper left corner; time, number of bodies and a scale bar in the lower
-//! left one. Both on plates through which a little shines.
+//! left one. The world is drawn beside them, or above both; only where that would leave little of it, it lies beneath. They are on
+//! plates through which a little shines.
 
 use super::canvas::{Canvas, Form, Letters};
 use super::colors;
 use super::legend::{Legend, Sign, grouped, length};
 use super::paint::round_up;
+use super::view::{Fit, View};
 use crate::look::frame::Frame;
 
 /// Letters are this part of the image's height.
@@ -19,6 +21,8 @@ const EDGE: f64 = 0.7;
 const BAR: f64 = 9.0;
 /// A scale of colors, with its numbers, is as high as so many lines.
 const SCALE_LINES: f64 = 1.9;
+/// The world is never drawn smaller than this part of what the image has room for, so that nothing lies upon it.
+const LEAST: f64 = 0.6;
 
 /// Where both plates lie: upper left and lower right corners.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +35,49 @@ pub(super) struct Layout {
     pub facts: [[f64; 2]; 2],
 }
 
+/// Where the world and what is written have their room.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    /// Whether both plates lie side by side beneath the world.
+    pub beneath: bool,
+    /// Where the world is: an upper left and a lower right corner.
+    pub world: [[f64; 2]; 2],
+}
+
+impl Layout {
+    /// Where a view is drawn largest of the places that the plates leave free.
+    pub(super) fn room(&self, view: &View, [width, height]: [f64; 2]) -> Room {
+        let whole = Room { beneath: false, world: [[0.0; 2], [width, height]] };
+        let scale = |room: &Room| Fit::within(view, room.world, height).scale;
+        let fit = Fit::within(view, whole.world, height);
+        let ([left, bottom], [right, top]) = (fit.place(view.low), fit.place(view.high));
+        let hides = |[low, high]: [[f64; 2]; 2]| low[0] < right && high[0] > left && low[1] < bottom && high[1] > top;
+        if !hides(self.legend) && !hides(self.facts) {
+            return whole;
+        }
+        let edge = EDGE * self.size;
+        let beside = self.legend[1][0].max(self.facts[1][0]) + edge;
+        let high = |[low, high]: [[f64; 2]; 2]| high[1] - low[1];
+        let above = height - high(self.legend).max(high(self.facts)) - 2.0 * edge;
+        let mut rooms = vec![whole];
+        if beside < width {
+            rooms.push(Room { beneath: false, world: [[beside, 0.0], [width, height]] });
+        }
+        if above > 0.0 && self.legend[1][0] + self.facts[1][0] + edge < width {
+            rooms.push(Room { beneath: true, world: [[0.0; 2], [width, above]] });
+        }
+        let best = rooms[1..].iter().max_by(|a, b| scale(a).total_cmp(&scale(b)));
+        *best.filter(|room| scale(room) >= LEAST * scale(&whole)).unwrap_or(&whole)
+    }
+
+    /// With the legend right of the facts, at the bottom.
+    fn side_by_side(self) -> Self {
+        let (edge, [low, high]) = (EDGE * self.size, self.legend);
+        let [x, y] = [self.facts[1][0] + edge, self.facts[1][1]];
+        Self { legend: [[x, y - (high[1] - low[1])], [x + high[0] - low[0], y]], ..self }
+    }
+}
+
 /// What is written upon a picture.
 #[derive(Debug)]
 pub(super) struct Labels<'a> {
@@ -39,12 +86,10 @@ pub(super) struct Labels<'a> {
     time: String,
     step: String,
     bodies: String,
-    /// Pixels of a meter.
-    scale: f64,
 }
 
 impl<'a> Labels<'a> {
-    pub(super) fn new(letters: &'a Letters, legend: Legend, frame: &Frame, hertz: f64, scale: f64) -> Self {
+    pub(super) fn new(letters: &'a Letters, legend: Legend, frame: &Frame, hertz: f64) -> Self {
         let plural = if frame.bodies.len() == 1 { "body" } else { "bodies" };
         Self {
             letters,
@@ -52,7 +97,6 @@ impl<'a> Labels<'a> {
             time: format!("{:.*} s", if hertz > 100.0 { 3 } else { 2 }, frame.step as f64 / hertz),
             step: format!("step {}", frame.step),
             bodies: format!("{} {plural}", grouped(frame.bodies.len())),
-            scale,
         }
     }
 
@@ -88,16 +132,17 @@ impl<'a> Labels<'a> {
         [around(legend, lines), around(facts, 3.6)]
     }
 
-    /// Writes all.
-    pub(super) fn draw(mut self, canvas: &mut Canvas) {
+    /// Writes all, upon a world of which a meter is so many pixels.
+    pub(super) fn draw(mut self, canvas: &mut Canvas, room: Room, scale: f64) {
         let layout = self.fit(canvas.size());
+        let layout = if room.beneath { layout.side_by_side() } else { layout };
         for [low, high] in [layout.legend, layout.facts] {
             let plate = Form::Plate { low, high, radius: 0.45 * layout.size };
             canvas.draw(&plate, colors::PAPER, 0.86);
             canvas.draw_ring(&plate, (0.06 * layout.size).max(1.0), colors::INK, 0.16);
         }
         self.draw_legend(canvas, &layout);
-        self.draw_facts(canvas, &layout);
+        self.draw_facts(canvas, &layout, scale);
     }
 
     fn draw_legend(&self, canvas: &mut Canvas, layout: &Layout) {
@@ -141,7 +186,7 @@ impl<'a> Labels<'a> {
         }
     }
 
-    fn draw_facts(&self, canvas: &mut Canvas, layout: &Layout) {
+    fn draw_facts(&self, canvas: &mut Canvas, layout: &Layout, scale: f64) {
         let size = layout.size;
         let x = layout.facts[0][0] + PAD * size;
         let mut y = layout.facts[0][1] + 1.5 * size;
@@ -151,7 +196,7 @@ impl<'a> Labels<'a> {
         y += LINE * size;
         write(canvas, &self.bodies, [x, y], colors::INK);
         y += LINE * size;
-        let (meters, pixels) = scale_bar(self.scale, BAR * size);
+        let (meters, pixels) = scale_bar(scale, BAR * size);
         write(canvas, &length(meters), [x, y], colors::INK);
         let (half, end) = ((0.06 * size).round().max(1.0) * 0.5, (x + pixels).round());
         let (x, y) = (x.round(), (y + 0.75 * size).round());

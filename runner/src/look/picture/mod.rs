@@ -23,7 +23,7 @@ pub(crate) use view::{View, whole_view};
 use crate::look::frame::{Frame, Setting};
 use bodies::Bodies;
 use canvas::{Canvas, Letters};
-use labels::Labels;
+use labels::{Labels, Room};
 use paint::Paint;
 use std::mem::take;
 use tiles::Edges;
@@ -49,6 +49,8 @@ pub(crate) struct Look {
     pub color: ColorBy,
     /// What else is drawn.
     pub layers: Layers,
+    /// Whether nothing is written beside it.
+    pub bare: bool,
 }
 
 /// Draws one picture after another. Used again, it allocates little.
@@ -63,6 +65,8 @@ pub(crate) struct Painter {
     ranks: Vec<Option<u32>>,
     /// Names and places of the bodies that are drawn.
     order: Vec<(u64, usize)>,
+    /// Where what is written has room: as at first, so that a film stands still.
+    room: Option<Room>,
 }
 
 impl Painter {
@@ -77,13 +81,23 @@ impl Painter {
             range: Range::default(),
             ranks: Vec::new(),
             order: Vec::new(),
+            room: None,
         }
     }
 
     /// Draws a frame, as much of it as is in view.
     pub(crate) fn draw(&mut self, frame: &Frame, view: &View) -> &Image {
-        let fit = Fit::new(view, self.canvas.size());
         self.range.grow(self.look.color, frame);
+        let ranks = frame.ranks.last().map_or(1, |(rank, _)| rank + 1);
+        let legend = Legend::new(self.look.color, &self.look.layers, &self.setting, ranks, self.range.most);
+        let size = self.canvas.size();
+        let room = match self.room {
+            Some(room) => room,
+            None if self.look.bare => Room { beneath: false, world: [[0.0; 2], size] },
+            None => Labels::new(&self.letters, legend.clone(), frame, self.setting.hertz).fit(size).room(view, size),
+        };
+        self.room = Some(room);
+        let fit = Fit::within(view, room.world, size[1]);
         self.canvas.image.step = frame.step;
         self.canvas.unclip();
         self.canvas.fill(colors::MARGIN);
@@ -96,9 +110,10 @@ impl Painter {
             self.draw_tiles(frame, &fit);
         }
         self.canvas.unclip();
-        let ranks = frame.ranks.last().map_or(1, |(rank, _)| rank + 1);
-        let legend = Legend::new(self.look.color, &self.look.layers, &self.setting, ranks, self.range.most);
-        Labels::new(&self.letters, legend, frame, self.setting.hertz, fit.scale).draw(&mut self.canvas);
+        if !self.look.bare {
+            let labels = Labels::new(&self.letters, legend, frame, self.setting.hertz);
+            labels.draw(&mut self.canvas, room, fit.scale);
+        }
         &self.canvas.image
     }
 

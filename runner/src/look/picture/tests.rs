@@ -40,7 +40,7 @@ fn row(kind: u32, x: f64, y: f64, angle: f32) -> Row {
 }
 
 fn look(color: ColorBy) -> Look {
-    Look { size: [SIZE; 2], color, layers: Layers::default() }
+    Look { size: [SIZE; 2], color, layers: Layers::default(), bare: true }
 }
 
 fn view() -> View {
@@ -193,7 +193,7 @@ fn densities_are_what_bodies_cover() {
     let world = setting(std::slice::from_ref(&shape), &[]);
     let places = (0..SIZE * SIZE).map(|i| (f64::from(i % SIZE) + 0.37, f64::from(i / SIZE) + 0.81));
     let bodies: Vec<Row> = places.map(|(x, y)| row(0, x, y, 0.3)).collect();
-    let fit = Fit::new(&view(), [f64::from(SIZE); 2]);
+    let fit = Fit::within(&view(), [[0.0; 2], [f64::from(SIZE); 2]], f64::from(SIZE));
     let drawn = Bodies::new(fit, &world.kinds, f64::from(SIZE * SIZE), bodies.len());
     let mut field = Field::default();
     field.reset([SIZE; 2]);
@@ -222,6 +222,18 @@ fn densities_are_what_bodies_cover() {
     field.cover(&Canvas::new([SIZE; 2]), &beyond, Rgb::hex(0));
     field.reset([SIZE; 2]);
     assert_eq!(field.area(), 0.0);
+}
+
+#[test]
+fn one_sees_through_sensors_and_what_is_tiny_or_thin_is_seen() {
+    let mut world = setting(&[Shape::rectangle(40.0, 40.0), Shape::circle(0.01), Shape::rectangle(100.0, 0.01)], &[]);
+    world.kinds[0].sensor = true;
+    let drawn = |kind| right_of_labels(&world, &frame(vec![row(kind, 280.0, 200.0, 0.0)]), look(ColorBy::Rank));
+    let ink = colors::distinct(0);
+    let sheer = area(&drawn(0), ink);
+    assert!((SHEER * 1600.0..0.6 * 1600.0).contains(&sheer), "{sheer} of 1600");
+    let [tiny, thin] = [1, 2].map(|kind| area(&drawn(kind), ink));
+    assert!((0.7..2.0).contains(&tiny) && (99.0..102.0).contains(&thin), "{tiny} {thin}");
 }
 
 #[test]
@@ -291,6 +303,22 @@ fn ranks_are_found_by_where_their_bodies_are() {
 }
 
 #[test]
+fn what_is_written_hides_no_body() {
+    let world = setting(&[Shape::rectangle(20.0, 20.0)], &[]);
+    for size in [[400, 400], [900, 400], [400, 900], [640, 360]] {
+        let mut painter = Painter::new(&world, Look { size, bare: false, ..look(ColorBy::Rank) });
+        let mut drawn = |x, y| {
+            let image = painter.draw(&frame(vec![row(0, x, y, 0.0)]), &view());
+            image.pixels.as_chunks::<3>().0.iter().filter(|pixel| **pixel == colors::distinct(0).0).count()
+        };
+        let middle = drawn(200.0, 200.0);
+        for (x, y) in [(12.0, 388.0), (12.0, 12.0), (388.0, 12.0), (388.0, 388.0)] {
+            assert!(drawn(x, y).abs_diff(middle) < middle / 5, "{size:?}: {} of {middle} at {x}, {y}", drawn(x, y));
+        }
+    }
+}
+
+#[test]
 fn labels_have_room_of_their_own() {
     let kinds = vec![Shape::circle(1.0); 40];
     let world = setting(&kinds, &[]);
@@ -299,7 +327,7 @@ fn labels_have_room_of_their_own() {
         for by in [ColorBy::Kind, ColorBy::Speed, ColorBy::Spin, ColorBy::Tile, ColorBy::Rank, ColorBy::Contacts] {
             let layers = Layers { tiles: true, ghosts: true, contacts: true };
             let legend = Legend::new(by, &layers, &world, 64, 50.0);
-            let layout = Labels::new(&letters, legend, &frame(Vec::new()), 60.0, 0.7).fit(size.map(f64::from));
+            let layout = Labels::new(&letters, legend, &frame(Vec::new()), 60.0).fit(size.map(f64::from));
             let ([legend, facts], what) = ([layout.legend, layout.facts], format!("{size:?} {by:?} {layout:?}"));
             assert!(legend[1][1] < facts[0][1], "{what}");
             for [low, high] in [legend, facts] {
@@ -346,7 +374,7 @@ fn the_order_of_bodies_shows_nowhere() {
 
 #[test]
 fn a_view_keeps_its_proportions() {
-    let fit = Fit::new(&View { low: DVec2::new(2.0, 1.0), high: DVec2::new(4.0, 2.0) }, [100.0, 100.0]);
+    let fit = Fit::within(&View { low: DVec2::new(2.0, 1.0), high: DVec2::new(4.0, 2.0) }, [[0.0; 2], [100.0; 2]], 100.0);
     assert_eq!(fit.scale, 50.0);
     assert_eq!((fit.place(DVec2::new(2.0, 1.0)), fit.place(DVec2::new(4.0, 2.0))), ([0.0, 75.0], [100.0, 25.0]));
     // Walls that rise high are cut.

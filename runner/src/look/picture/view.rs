@@ -60,7 +60,7 @@ fn extent(fixed: &StaticBody) -> (DVec2, DVec2) {
     (fixed.position - half, fixed.position + half)
 }
 
-/// A view upon an image: as large as both its sides allow, in the middle.
+/// A view upon an image: as large as there is room for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     /// Pixels of a meter.
@@ -72,10 +72,12 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    pub(super) fn new(view: &View, [width, height]: [f64; 2]) -> Self {
-        let size = view.high - view.low;
-        let scale = (width / size.x).min(height / size.y);
-        let origin = 0.5 * (view.low + view.high) - 0.5 * DVec2::new(width, height) / scale;
+    /// In the middle of a rectangle of an image of that height, from its upper left to its lower right corner.
+    pub(super) fn within(view: &View, [low, high]: [[f64; 2]; 2], height: f64) -> Self {
+        let (size, low, high) = (view.high - view.low, DVec2::from(low), DVec2::from(high));
+        let scale = ((high - low) / size).min_element();
+        let middle = 0.5 * (low + high);
+        let origin = 0.5 * (view.low + view.high) - DVec2::new(middle.x, height - middle.y) / scale;
         Self { scale, origin, height }
     }
 

@@ -34,7 +34,7 @@ pub(super) fn draw(source: &Source) -> Result<Option<Pictures>, RunError> {
     let mut steps = vec![recording.steps()[0]];
     steps.extend(recording.steps().last().filter(|last| **last != steps[0]));
     let (setting, view) = (recorded.setting(), whole_view(recorded.setting()));
-    let look = Look { size: size(view.high - view.low), color: ColorBy::Kind, layers: Layers::default() };
+    let look = Look { size: size(view.high - view.low), color: ColorBy::Kind, layers: Layers::default(), bare: false };
     let mut painter = Painter::new(setting, look);
     let (mut frame, mut all) = (Frame::default(), Vec::with_capacity(steps.len()));
     for step in steps {

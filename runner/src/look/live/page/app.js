@@ -355,8 +355,8 @@ function fit() {
   const width = canvas.clientWidth * ratio() / state.sources.length, height = canvas.clientHeight * ratio();
   state.camera = {
     x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2,
-    // Beside it is room for the scale and the legend.
-    zoom: Math.min(0.94 * width / (high[0] - low[0]), Math.max(0.5 * height, height - 120 * ratio()) / (high[1] - low[1])),
+    // Beneath it is room for the scale.
+    zoom: Math.min(0.94 * width / (high[0] - low[0]), Math.max(0.5 * height, height - 72 * ratio()) / (high[1] - low[1])),
   };
   state.following = false;
   at("follow").setAttribute("aria-pressed", false);
