@@ -254,6 +254,20 @@ fn a_run_is_paused_stepped_and_its_bodies_followed() {
         browser.wait_for(&format!("atoll.state.legend.includes('{color}')"));
     }
     browser.wait_for("document.querySelectorAll('.strip').length === 2");
+    // Keys are the world's again once something was clicked beside it.
+    for control in ["tiles", "figures", "follow"] {
+        let middle = browser.evaluate(&format!(
+            "(() => {{ const r = document.getElementById('{control}').getBoundingClientRect(); \
+             return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+        ));
+        browser.click([0, 1].map(|i| middle[i].as_f64().unwrap()));
+        for expected in ["Pause", "Play"] {
+            browser.press(" ");
+            browser.wait_for(&format!("document.getElementById('play').textContent === '{expected}'"));
+        }
+    }
+    browser.evaluate("document.getElementById('color').focus(), document.getElementById('color').dispatchEvent(new Event('change', { bubbles: true }))");
+    assert_eq!(browser.evaluate("document.activeElement.id"), json!("canvas"));
     browser.press("f");
     browser.screenshot("live_followed");
     assert_well(&browser, &served);

@@ -486,16 +486,26 @@ at("back").onclick = () => step(-1);
 at("fit").onclick = fit;
 at("follow").onclick = () => follow(!state.following);
 at("let-go").onclick = () => tell({ do: "drop" });
-at("tool").onchange = ({ target }) => { tool(target.value); target.blur(); };
+at("tool").onchange = ({ target }) => tool(target.value);
 at("tiles").onchange = redraw;
 at("color").onchange = redraw;
 at("speed").onchange = ({ target }) => tell({ do: "speed", times: Number(target.value) });
 at("scrub").oninput = ({ target }) => tell({ do: "seek", step: state.hello.steps[Number(target.value)] });
-at("scrub").onchange = ({ target }) => target.blur();
 at("difference").onclick = to_difference;
 
+// Whoever points at a control has the keys back afterwards; whoever goes there by keys has its own.
+let pointed = false;
+addEventListener("pointerdown", () => { pointed = true; }, true);
+for (const controls of [at("panel"), at("bar")]) {
+  controls.addEventListener("change", () => pointed && canvas.focus());
+  controls.addEventListener("click", ({ target, detail }) => detail && target.tagName !== "SELECT" && canvas.focus());
+}
+
 addEventListener("keydown", (event) => {
-  if (!state.hello || event.ctrlKey || event.metaKey || event.altKey || ["SELECT", "INPUT"].includes(event.target.tagName)) return;
+  if (event.key === "Tab") pointed = false;
+  if (event.key === "Escape") canvas.focus();
+  const has_keys = event.target.tagName === "SELECT" || event.target.tagName === "INPUT" && !pointed;
+  if (!state.hello || event.ctrlKey || event.metaKey || event.altKey || has_keys) return;
   const { camera } = state;
   const move = (x, y) => {
     camera.x += x * 80 * ratio() / camera.zoom;
