@@ -198,6 +198,8 @@ fn a_run_is_paused_stepped_and_its_bodies_followed() {
     let Some(program) = browser::find() else { return };
     let served = serve("world.toml --steps 100000");
     let mut browser = show(&program, &served);
+    // Tiles are cut by then.
+    browser.wait_for("atoll.state.step > 12");
     browser.press(" ");
     browser.wait_for("document.getElementById('play').textContent === 'Play'");
     let mut last = step(&mut browser);

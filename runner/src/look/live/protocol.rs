@@ -29,7 +29,7 @@ const MAGIC: u32 = u32::from_le_bytes(*b"ATOL");
 
 /// The most pixels that a page may ask for on one side.
 const MOST_SIDE: u32 = 8192;
-/// The most pixels that a page may ask for. `page/app.js` asks for no more.
+/// The most pixels that a page may ask for. `page/view.js` asks for no more.
 const MOST_PIXELS: u32 = 1 << 24;
 
 /// What a page wants.

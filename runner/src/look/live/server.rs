@@ -33,10 +33,17 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(50);
 
 /// What there is to get, with its type.
-const FILES: [(&str, &str, &str); 7] = [
+const FILES: [(&str, &str, &str); 14] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("page/app.js")),
+    ("/state.js", "text/javascript; charset=utf-8", include_str!("page/state.js")),
+    ("/words.js", "text/javascript; charset=utf-8", include_str!("page/words.js")),
+    ("/link.js", "text/javascript; charset=utf-8", include_str!("page/link.js")),
+    ("/view.js", "text/javascript; charset=utf-8", include_str!("page/view.js")),
+    ("/panel.js", "text/javascript; charset=utf-8", include_str!("page/panel.js")),
+    ("/hand.js", "text/javascript; charset=utf-8", include_str!("page/hand.js")),
+    ("/controls.js", "text/javascript; charset=utf-8", include_str!("page/controls.js")),
     ("/draw.js", "text/javascript; charset=utf-8", include_str!("page/draw.js")),
     ("/shaders.js", "text/javascript; charset=utf-8", include_str!("page/shaders.js")),
     ("/shapes.js", "text/javascript; charset=utf-8", include_str!("page/shapes.js")),

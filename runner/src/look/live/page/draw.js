@@ -33,7 +33,6 @@ function texture(gl, filter) {
   return made;
 }
 
-/// What a canvas is drawn with. Lost with its context: then make another.
 /// Tiles that were cut from columns x rows of squares, `levels` giving how often each was, a letter for each: the corner and the
 /// side of each in squares, and `find_at`, which tells the tile at a place, or -1.
 function leaves(columns, rows, levels) {
@@ -61,6 +60,7 @@ function leaves(columns, rows, levels) {
   return all;
 }
 
+/// What a canvas is drawn with. Lost with its context: then make another.
 export class Drawing {
   constructor(canvas) {
     this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
