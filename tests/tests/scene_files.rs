@@ -304,10 +304,16 @@ fn every_fault_is_told_in_a_line_of_its_own() {
     rows[8] = rows[7].clone();
     rows[9] = "700000,3,1,1,0".to_owned();
     let (_folder, path) = files(&world(["", ""], ""), &rows);
+    // The text is wrong in several places as well.
+    let text = fs::read_to_string(&path).unwrap().replace("[24, 12]", "[-24, 12]").replace("radius = 0.25", "radius = -1");
+    fs::write(&path, text.replace("angle = 0.1", "angel = 0.1")).unwrap();
     let ended = program::run(program::command().args(["scene", "check"]).arg(&path));
     let told = ended.complaints();
-    assert_eq!((ended.code, told.len()), (Some(2), 4), "{ended}");
+    assert_eq!((ended.code, told.len()), (Some(2), 7), "{ended}");
     let expected = [
+        "domain = [...]: the high corner must lie above and right of the low one",
+        "[[kinds]] 1, radius = -1",
+        "[[statics]] 1, angel = 0.1: unknown key; did you mean angle?",
         "row 4 (line 5), x = NaN: must be a finite number",
         "row 6 (line 7): 3 values where the first line names 5 columns",
         "row 10 (line 11), kind = 3: there are kinds 0 to 1",

@@ -29,11 +29,11 @@ pub(super) fn run(args: &SceneCheckArgs) -> Result<Exit, RunError> {
             complain(&fault);
         }
     });
-    let (scene, found) = checked?;
-    if found.faults > TOLD {
-        complain(&format!("and {} more", found.faults - TOLD));
+    if faults > TOLD {
+        complain(&format!("and {} more", faults - TOLD));
     }
-    if found.faults > 0 {
+    let (scene, found) = checked?;
+    if faults > 0 {
         return Ok(Exit::Usage);
     }
     // Says what is wrong with the physics.

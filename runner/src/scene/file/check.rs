@@ -22,14 +22,18 @@ pub(crate) struct Found {
 }
 
 impl SceneFile {
-    /// Looks at all of a scene. Tells of each fault in its rows; of ids that are there twice and of crowds at one place once all are
+    /// Looks at all of a scene. Tells of a fault in each of its tables and rows; of ids that are there twice and of crowds at one place once all are
     /// known, and of those only one. Takes 24 bytes for each body.
     ///
     /// # Errors
     /// If there is something wrong that keeps the rows from being read.
     pub(crate) fn check(path: &Path, mut tell: impl FnMut(SceneError)) -> Result<(Self, Found), SceneError> {
-        let (mut scene, told) = Self::begin(path)?;
-        let mut found = Found { by_kind: vec![0; scene.kinds().len()], extent: None, ids: None, outside: 0, faults: 0 };
+        let mut of_text = Vec::new();
+        let begun = Self::begin(path, &mut of_text);
+        let faults = of_text.len() as u64;
+        of_text.into_iter().for_each(&mut tell);
+        let (mut scene, told) = begun?;
+        let mut found = Found { by_kind: vec![0; scene.kinds().len()], extent: None, ids: None, outside: 0, faults };
         let (low, high) = scene.domain();
         let (mut ids, mut places) = (Vec::new(), Vec::new());
         let mut rows = 0;

@@ -1,7 +1,7 @@
 //! What the text of a scene says, and where its bodies are.
 
 use super::super::{Place, SceneError};
-use super::entries::{Entries, place};
+use super::entries::{Entries, keep, place};
 use super::kinds::kinds;
 use super::row::FARTHEST;
 use super::statics::{Statics, statics};
@@ -55,11 +55,11 @@ pub(crate) fn is_scene(text: &str) -> bool {
 }
 
 impl Description {
-    /// Reads the text of a file.
+    /// Reads the text of a file, as far as it can be; whatever cannot is a fault.
     ///
     /// # Errors
-    /// If there is anything in it that cannot be.
-    pub(super) fn read(file: &Path, text: &str) -> Result<Self, SceneError> {
+    /// If it is not the text of a scene.
+    pub(super) fn read(file: &Path, text: &str, faults: &mut Vec<SceneError>) -> Result<Self, SceneError> {
         let table: Table = text.parse().map_err(|error| syntax_error(file, text, &error))?;
         let mut entries = Entries::new(file, String::new(), &table);
         let must = format!("\"{FORMAT}\"");
@@ -68,23 +68,26 @@ impl Description {
             Some(_) => return Err(entries.refuse("format", format!("must be {must}, which this program reads"))),
             None => return Err(entries.missing("format", &format!("{must}, which says that this is a scene"))),
         }
-        let name = entries.text("name", "a text")?.map(str::to_owned);
-        let domain = domain(&mut entries)?;
-        let physics = entries.table("physics")?.cloned().unwrap_or_default();
-        let (kinds, names) = kinds(file, &entries.tables("kinds")?)?;
-        let statics = statics(file, &entries.tables("statics")?)?;
-        let in_file = entries.table("bodies")?;
-        let inline: Vec<Table> = entries.tables("body")?.into_iter().cloned().collect();
-        entries.finish()?;
+        let name = keep(faults, entries.text("name", "a text")).flatten().map(str::to_owned);
+        let domain = keep(faults, domain(&mut entries)).unwrap_or((DVec2::ZERO, DVec2::ONE));
+        let physics = keep(faults, entries.table("physics")).flatten().cloned().unwrap_or_default();
+        let of_kinds = keep(faults, entries.tables("kinds")).unwrap_or_default();
+        let (kinds, names) = kinds(file, &of_kinds, faults);
+        let of_statics = keep(faults, entries.tables("statics")).unwrap_or_default();
+        let statics = statics(file, &of_statics, faults);
+        let in_file = keep(faults, entries.table("bodies")).flatten();
+        let inline = keep(faults, entries.tables("body")).unwrap_or_default();
+        keep(faults, entries.finish());
         let bodies = match in_file {
             Some(_) if !inline.is_empty() => {
-                return Err(
-                    entries.refuse("body", "bodies stand either in [[body]] or in the file of [bodies]; leave one out")
-                );
+                const BOTH: &str = "bodies stand either in [[body]] or in the file of [bodies]; leave one out";
+                faults.push(entries.refuse("body", BOTH));
+                None
             }
-            Some(table) => self::in_file(file, table)?,
-            None => Bodies::Inline(inline),
+            Some(table) => keep(faults, self::in_file(file, table)),
+            None => None,
         };
+        let bodies = bodies.unwrap_or_else(|| Bodies::Inline(inline.into_iter().cloned().collect()));
         Ok(Self { name, domain, physics, kinds, names, statics, bodies })
     }
 }

@@ -118,6 +118,11 @@ impl<'a> Entries<'a> {
     }
 }
 
+/// What was read, or none if that is a fault, which is told later.
+pub(super) fn keep<T>(faults: &mut Vec<SceneError>, read: Result<T, SceneError>) -> Option<T> {
+    read.map_err(|fault| faults.push(fault)).ok()
+}
+
 /// A number as TOML has it, whole or not.
 pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))

@@ -1,20 +1,21 @@
 //! Bodies that stand in the scene's own file.
 
 use super::super::SceneError;
-use super::entries::Entries;
+use super::entries::{Entries, keep};
 use super::row::{Column, Scenery, Values};
 use atoll_core::Body;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Reads them all, and whether they have ids of their own.
-///
-/// # Errors
-/// If one of them cannot be.
-pub(super) fn read(file: &Path, tables: &[Table], scenery: &Scenery<'_>) -> Result<(Vec<Body>, bool), SceneError> {
+/// Reads all that can be; others are faults.
+pub(super) fn read(
+    file: &Path,
+    tables: &[Table],
+    scenery: &Scenery<'_>,
+    faults: &mut Vec<SceneError>,
+) -> Vec<Body> {
     let are_named = tables.first().is_some_and(|first| first.contains_key(Column::Id.name()));
-    let mut bodies = Vec::with_capacity(tables.len());
-    for (row, table) in (0_u64..).zip(tables) {
+    let body = |(row, table): (u64, &Table)| {
         let mut entries = Entries::new(file, format!("[[body]] {row}"), table);
         let id = entries.whole("id")?;
         if id.is_some() != are_named {
@@ -51,7 +52,7 @@ pub(super) fn read(file: &Path, tables: &[Table], scenery: &Scenery<'_>) -> Resu
             omega: float(Column::Omega)?,
         };
         entries.finish()?;
-        bodies.push(scenery.body(row, None, cos, &values)?);
-    }
-    Ok((bodies, are_named))
+        scenery.body(row, None, cos, &values)
+    };
+    (0..).zip(tables).filter_map(|one| keep(faults, body(one))).collect()
 }

@@ -1,7 +1,7 @@
 //! Kinds as scenes and commands say them: a shape, what it is made of, how it moves, and whom it touches.
 
 use super::super::SceneError;
-use super::entries::{Entries, float, number, pair};
+use super::entries::{Entries, float, keep, number, pair};
 use super::row::is_turn;
 use atoll_core::{Dynamics, Filter, Kind, Material, Part, Rot, Shape};
 use glam::Vec2;
@@ -24,29 +24,29 @@ const POINTS: &str = "points in meters, such as [[0.0, 0.0], [1.0, 0.0], [0.0, 1
 /// The shapes of statics alone.
 pub(super) const OF_STATICS: [&str; 2] = ["segment", "chain"];
 
-/// Reads all kinds, and what they are called.
-///
-/// # Errors
-/// If one of them cannot be.
-pub(super) fn kinds(file: &Path, tables: &[&Table]) -> Result<(Vec<Kind>, Vec<Option<String>>), SceneError> {
-    let mut kinds = Vec::with_capacity(tables.len());
-    let mut names = Vec::with_capacity(tables.len());
+/// Reads all kinds, and what they are called. In the place of one that cannot be, which is a fault, stands any.
+pub(super) fn kinds(
+    file: &Path,
+    tables: &[&Table],
+    faults: &mut Vec<SceneError>,
+) -> (Vec<Kind>, Vec<Option<String>>) {
     let mut taken = BTreeSet::new();
-    for (number, table) in tables.iter().enumerate() {
+    let mut kind = |(number, table): (usize, &&Table)| {
         let mut entries = Entries::new(file, format!("[[kinds]] {number}"), table);
-        let name = entries.text("name", "a text")?;
-        if let Some(name) = name {
-            if !taken.insert(name) {
+        if let Some(name) = entries.text("name", "a text")? {
+            if !taken.insert(name.to_owned()) {
                 return Err(entries.refuse("name", "another kind has this name; give each its own"));
             }
             if name.trim() != name || name.is_empty() || name.parse::<u64>().is_ok() {
                 return Err(entries.refuse("name", "must be a word that is no number, without spaces around it"));
             }
         }
-        kinds.push(of_bodies(&mut entries)?);
-        names.push(name.map(str::to_owned));
-    }
-    Ok((kinds, names))
+        of_bodies(&mut entries)
+    };
+    let any = || Kind::new(Shape::circle(1.0), Material::default());
+    let kinds = tables.iter().enumerate().map(|one| keep(faults, kind(one)).unwrap_or_else(any)).collect();
+    let name = |table: &&Table| table.get("name").and_then(Value::as_str).map(str::to_owned);
+    (kinds, tables.iter().map(name).collect())
 }
 
 /// Reads a kind that comes while a run goes on. The error is what is wrong with it.

@@ -90,17 +90,23 @@ impl SceneFile {
     /// # Errors
     /// If a file cannot be read, or holds what cannot be.
     pub fn open(path: &Path) -> Result<Self, SceneError> {
-        let (mut scene, told) = Self::begin(path)?;
+        let mut faults = Vec::new();
+        let begun = Self::begin(path, &mut faults);
+        let (mut scene, told) = match faults.into_iter().next() {
+            Some(first) => return Err(first),
+            None => begun?,
+        };
         let last = scene.look_through()?;
         scene.check_count(told)?;
         scene.name_statics(last)?;
         Ok(scene)
     }
 
-    /// Opens a scene without a look at its rows. Gives also how many there are to be, if its text says so.
-    fn begin(path: &Path) -> Result<(Self, Option<u64>), SceneError> {
+    /// Opens a scene without a look at its rows. Gives also how many there are to be, if its text says so. What is wrong with that
+    /// are `faults`, after which the rest can be looked at, and nothing more.
+    fn begin(path: &Path, faults: &mut Vec<SceneError>) -> Result<(Self, Option<u64>), SceneError> {
         let text = read_text(path)?;
-        let description = Description::read(path, &text)?;
+        let description = Description::read(path, &text, faults)?;
         let mut told = None;
         let mut static_ids: Vec<GlobalId> = Vec::new();
         let Statics { all: statics, are_named, tables: places } = &description.statics;
@@ -112,7 +118,7 @@ impl SceneFile {
             Scenery { file: path, kinds: &description.kinds, names: &description.names, static_ids: &static_ids };
         let (rows, digest) = match &description.bodies {
             Bodies::Inline(tables) => {
-                let (bodies, _) = inline::read(path, tables, &scenery)?;
+                let bodies = inline::read(path, tables, &scenery, faults);
                 (Rows::Inline(bodies), digest::of_scene(&text, places, None)?)
             }
             Bodies::File { path: bodies, xxh3, count } => {

@@ -1,7 +1,7 @@
 //! Statics as scenes say them: kinds at a place or at those of a table, pieces of ground, and what moves as its path has it.
 
 use super::super::SceneError;
-use super::entries::{Entries, pair, place};
+use super::entries::{Entries, keep, pair, place};
 use super::kinds::{check_one, of_shape, shape, turn};
 use super::row::{Column, FARTHEST, Scenery};
 use super::table::TableFile;
@@ -25,14 +25,11 @@ pub(super) struct Statics {
     pub(super) tables: Vec<PathBuf>,
 }
 
-/// Reads all statics. Those of a chain have ids that follow each other.
-///
-/// # Errors
-/// If one of them cannot be.
-pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<Statics, SceneError> {
+/// Reads all statics that can be; others are faults. Those of a chain have ids that follow each other.
+pub(super) fn statics(file: &Path, tables: &[&Table], faults: &mut Vec<SceneError>) -> Statics {
     let mut statics = Statics { all: Vec::with_capacity(tables.len()), ..Statics::default() };
-    let mut taken = BTreeSet::new();
-    for (number, table) in tables.iter().enumerate() {
+    let (mut taken, mut named) = (BTreeSet::new(), None);
+    let mut add = |(number, table): (usize, &&Table)| -> Result<(), SceneError> {
         let mut entries = Entries::new(file, format!("[[statics]] {number}"), table);
         let id = entries.whole("id")?;
         check_one(&entries)?;
@@ -51,7 +48,7 @@ pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<Statics, SceneEr
             vec![alone(&mut entries)?]
         };
         let is_named = id.is_some() || ids.is_some();
-        if number > 0 && is_named != statics.are_named {
+        if *named.get_or_insert(is_named) != is_named {
             return Err(
                 entries.refuse("id", "either every static has an id or none; give all of them one, or leave all out")
             );
@@ -79,8 +76,12 @@ pub(super) fn statics(file: &Path, tables: &[&Table]) -> Result<Statics, SceneEr
             statics.all.push(StaticBody { rotation, path, ..StaticBody::new(GlobalId(id), kind, position) });
         }
         statics.tables.extend(path_of_table);
+        Ok(())
+    };
+    for one in tables.iter().enumerate() {
+        keep(faults, add(one));
     }
-    Ok(statics)
+    statics
 }
 
 /// A shape, where its center is, and how it is turned.
