@@ -114,7 +114,12 @@ impl<'a> Meetings<'a> {
         halo: &mut RankHalo<Counting<T>>,
         commander: &mut Commander,
     ) -> Result<(), RankError> {
-        if self.host().is_some_and(Host::lingers) { self.hold(world, last, halo, commander) } else { Ok(()) }
+        if !self.host().is_some_and(Host::lingers) {
+            return Ok(());
+        }
+        // Before the first step there is something to see as well.
+        world.settle();
+        self.hold(world, last, halo, commander)
     }
 
     /// Meets, until rank 0 lets time go on, or somebody asks the run to stop.

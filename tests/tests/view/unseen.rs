@@ -79,6 +79,8 @@ fn what_is_viewed_waits_for_the_first_page_and_stays_until_it_is_interrupted() {
     page.look(domain(&hello), [320, 240], "kind");
     let begun = Instant::now();
     assert_eq!(page.frame().unwrap().0, 0, "it begins when somebody looks");
+    let figures = heard(&mut page, "figures")["figures"].clone();
+    assert!(figures.as_array().unwrap().contains(&json!(["bodies", "3,000"])), "all are there already: {figures}");
     drop(page);
     std::thread::sleep(Duration::from_millis(300));
     let mut page = Page::open(&served);
@@ -110,7 +112,10 @@ fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
         let mut page = Page::open(&served);
         page.wish(&json!({ "do": "command", "line": "{\"remove\": 999999}" }));
         let note = heard(&mut page, "note")["text"].as_str().unwrap().to_owned();
-        assert!(note.starts_with("a hand on the page: step ") && note.ends_with("there is no body 999999; left out"), "{note}");
+        assert!(
+            note.starts_with("a hand on the page: step ") && note.ends_with("there is no body 999999; left out"),
+            "{note}"
+        );
         served.interrupt();
         heard(&mut page, "over");
         assert_eq!(served.end().code, Some(130));
