@@ -305,7 +305,8 @@ fn every_fault_is_told_in_a_line_of_its_own() {
     rows[9] = "700000,3,1,1,0".to_owned();
     let (_folder, path) = files(&world(["", ""], ""), &rows);
     // The text is wrong in several places as well.
-    let text = fs::read_to_string(&path).unwrap().replace("[24, 12]", "[-24, 12]").replace("radius = 0.25", "radius = -1");
+    let text =
+        fs::read_to_string(&path).unwrap().replace("[24, 12]", "[-24, 12]").replace("radius = 0.25", "radius = -1");
     fs::write(&path, text.replace("angle = 0.1", "angel = 0.1")).unwrap();
     let ended = program::run(program::command().args(["scene", "check"]).arg(&path));
     let told = ended.complaints();

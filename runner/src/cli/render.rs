@@ -88,7 +88,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
         format!("steps {} to {}, every {}", shown.first, shown.last, shown.every)
     };
     let pace = if kind.most_per_second().is_some() && shown.count() > 1 {
-        let speed = args.speed.filter(|speed| *speed != 1.0).map_or("real time".to_owned(), |x| format!("{x} x real time"));
+        let speed =
+            args.speed.filter(|speed| *speed != 1.0).map_or("real time".to_owned(), |x| format!("{x} x real time"));
         format!("; {} a second, {speed}", (100.0 * rate.added).round() / 100.0)
     } else {
         String::new()
@@ -243,7 +244,8 @@ fn paced(shown: Shown, hertz: f64, args: &RenderArgs, kind: FilmKind) -> Result<
     let added = if shown.count() > 1 { rate(every) } else { 1.0 };
     if added * LONGEST < 1.0 {
         let (seconds, speed) = ((1.0 / added).ceil(), (every as f64 / hertz).ceil());
-        let reason = format!("each picture would stand for {seconds} seconds; try --speed {speed}, which shows one a second");
+        let reason =
+            format!("each picture would stand for {seconds} seconds; try --speed {speed}, which shows one a second");
         return Err(unsuitable("--speed", reason));
     }
     let repeated = added * (LEAST_SHOWN / added).ceil().max(1.0);

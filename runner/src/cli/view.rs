@@ -78,7 +78,11 @@ impl Window {
             let server = serve(Arc::clone(&desk), args.port, args.bind)?;
             tell(&server, args.bind, args.open);
             if args.lingers {
-                let pace = if args.speed == 0.0 { "as fast as it can".to_owned() } else { format!("at {} x real time", args.speed) };
+                let pace = if args.speed == 0.0 {
+                    "as fast as it can".to_owned()
+                } else {
+                    format!("at {} x real time", args.speed)
+                };
                 complain(&format!("the run waits for the first page, then goes on {pace}; --speed says how fast"));
             }
             (window._server, window.desk) = (Some(server), Some(desk));

@@ -212,7 +212,9 @@ struct Told<'a> {
 
 fn value(question: &Question, part: &Part, names: &[Option<String>]) -> String {
     let name = |state: &State| names.get(state.kind as usize)?.as_deref();
-    let told = |body: &'_ Option<State>| body.as_ref().map(|state| json(&Told { state, kind_name: name(state) })).unwrap_or("null".to_owned());
+    let told = |body: &'_ Option<State>| {
+        body.as_ref().map(|state| json(&Told { state, kind_name: name(state) })).unwrap_or("null".to_owned())
+    };
     match part {
         Part::Ray(hit) => json(hit),
         Part::Names(ids) => json(ids),

@@ -174,7 +174,9 @@ impl RankProcess {
                 *exit
             }
             Ok(RankEnd { result: Err(error), .. }) => {
-                error.transport().inspect(|error| observer.fail(error));
+                if let Some(error) = error.transport() {
+                    observer.fail(error);
+                }
                 Exit::PeerLost
             }
             Err(failure) => {

@@ -111,7 +111,10 @@ mod tests {
         let recorded = Recorded::open(folder.path()).unwrap();
         let (kinds, statics) = stage();
         let partition = Partition::uniform(facts(5).domain[0], facts(5).domain[1], 4, 2).unwrap();
-        assert_eq!(recorded.setting(), &Setting { partition, names: vec![None; kinds.len()], kinds, statics, hertz: 50.0 });
+        assert_eq!(
+            recorded.setting(),
+            &Setting { partition, names: vec![None; kinds.len()], kinds, statics, hertz: 50.0 }
+        );
         let mut frame = Frame { ranks: vec![(9, 9)], ..Frame::default() };
         recorded.read(0, &mut frame).unwrap();
         assert_eq!((frame.step, frame.bodies.len(), frame.ranks), (0, 20, vec![(0, 7), (1, 14), (2, 20)]));

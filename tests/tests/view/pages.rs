@@ -83,7 +83,16 @@ fn drawn(browser: &mut Browser, source: &str, step: u64, color: &str) -> [f64; 2
     let view: Vec<String> = view.as_array().unwrap().iter().map(Value::to_string).collect();
     let out = DESK.path().join(format!("{}.png", std::process::id()));
     let mut command = program::command();
-    command.current_dir(DESK.path()).args(["render", source, "--quiet", "--bare", "--color", color, "--step", &step.to_string()]);
+    command.current_dir(DESK.path()).args([
+        "render",
+        source,
+        "--quiet",
+        "--bare",
+        "--color",
+        color,
+        "--step",
+        &step.to_string(),
+    ]);
     command.arg("--size").arg(format!("{}x{}", view[0], view[1])).arg("--view").arg(view[2..].join(","));
     let ended = program::run(command.arg("--out").arg(&out));
     assert_eq!(ended.code, Some(0), "{ended}");

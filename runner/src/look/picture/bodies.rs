@@ -197,7 +197,11 @@ fn forms(
     let forms = match *shape {
         Shape::Circle { radius } => vec![Form::Disc { center, radius: (f64::from(radius) * scale).max(THINNEST) }],
         Shape::Box { half } => {
-            vec![Form::Box { center, axis, half: half.to_array().map(|half| (f64::from(half) * scale).max(0.5 * THINNEST)) }]
+            vec![Form::Box {
+                center,
+                axis,
+                half: half.to_array().map(|half| (f64::from(half) * scale).max(0.5 * THINNEST)),
+            }]
         }
         _ => outlines.iter().map(hull).collect(),
     };

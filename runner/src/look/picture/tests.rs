@@ -374,7 +374,8 @@ fn the_order_of_bodies_shows_nowhere() {
 
 #[test]
 fn a_view_keeps_its_proportions() {
-    let fit = Fit::within(&View { low: DVec2::new(2.0, 1.0), high: DVec2::new(4.0, 2.0) }, [[0.0; 2], [100.0; 2]], 100.0);
+    let fit =
+        Fit::within(&View { low: DVec2::new(2.0, 1.0), high: DVec2::new(4.0, 2.0) }, [[0.0; 2], [100.0; 2]], 100.0);
     assert_eq!(fit.scale, 50.0);
     assert_eq!((fit.place(DVec2::new(2.0, 1.0)), fit.place(DVec2::new(4.0, 2.0))), ([0.0, 75.0], [100.0, 25.0]));
     // Walls that rise high are cut.

@@ -207,7 +207,8 @@ impl Commander {
             });
             match line {
                 Ok(line) if step >= self.steps && !matches!(line.action, Action::Ask(_)) => {
-                    let text = format!("{}: all steps are made, and nothing can be done any more", place(source, number));
+                    let text =
+                        format!("{}: all steps are made, and nothing can be done any more", place(source, number));
                     self.tell(step, None, Answer::Refused(&text));
                     if self.is_page && self.rank == Rank(0) {
                         observer.note(&text);

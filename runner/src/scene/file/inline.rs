@@ -8,12 +8,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// Reads all that can be; others are faults.
-pub(super) fn read(
-    file: &Path,
-    tables: &[Table],
-    scenery: &Scenery<'_>,
-    faults: &mut Vec<SceneError>,
-) -> Vec<Body> {
+pub(super) fn read(file: &Path, tables: &[Table], scenery: &Scenery<'_>, faults: &mut Vec<SceneError>) -> Vec<Body> {
     let are_named = tables.first().is_some_and(|first| first.contains_key(Column::Id.name()));
     let body = |(row, table): (u64, &Table)| {
         let mut entries = Entries::new(file, format!("[[body]] {row}"), table);

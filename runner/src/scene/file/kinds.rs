@@ -25,11 +25,7 @@ const POINTS: &str = "points in meters, such as [[0.0, 0.0], [1.0, 0.0], [0.0, 1
 pub(super) const OF_STATICS: [&str; 2] = ["segment", "chain"];
 
 /// Reads all kinds, and what they are called. In the place of one that cannot be, which is a fault, stands any.
-pub(super) fn kinds(
-    file: &Path,
-    tables: &[&Table],
-    faults: &mut Vec<SceneError>,
-) -> (Vec<Kind>, Vec<Option<String>>) {
+pub(super) fn kinds(file: &Path, tables: &[&Table], faults: &mut Vec<SceneError>) -> (Vec<Kind>, Vec<Option<String>>) {
     let mut taken = BTreeSet::new();
     let mut kind = |(number, table): (usize, &&Table)| {
         let mut entries = Entries::new(file, format!("[[kinds]] {number}"), table);
