@@ -316,6 +316,24 @@ fn two_recordings_are_side_by_side_and_where_they_part_is_marked() {
     assert_well(&browser, &served);
 }
 
+#[test]
+fn a_page_shows_what_is_refused_and_why_a_run_failed() {
+    let Some(program) = browser::find() else { return };
+    std::fs::write(folder("acts.jsonl"), "{\"step\": 120, \"remove\": 777777}\n").unwrap();
+    let served = serve("world.toml --steps 100000 --commands acts.jsonl");
+    let mut browser = show(&program, &served);
+    // As another page would ask for it.
+    browser.evaluate(
+        "(() => { const other = new WebSocket(location.href.replace('http', 'ws').replace('/?', '/socket?')); \
+         other.onopen = () => other.send(JSON.stringify({ do: 'command', line: '{\"remove\":999999}' })); })()",
+    );
+    browser.wait_for("document.getElementById('note').textContent.endsWith('there is no body 999999; left out')");
+    browser.wait_for("/The run has failed: .*no body 777777/.test(document.getElementById('message').textContent)");
+    browser.screenshot("failed");
+    assert_well(&browser, &served);
+    assert_eq!(served.end().code, Some(2));
+}
+
 fn folder(name: &str) -> PathBuf {
     DESK.path().join(name)
 }

@@ -18,7 +18,9 @@ fn small(steps: u32) -> Vec<String> {
 
 /// What a page is told next of a sort.
 fn heard(page: &mut Page, of: &str) -> Value {
+    let begun = Instant::now();
     loop {
+        assert!(begun.elapsed() < program::LIMIT, "nothing is said of {of}");
         match page.hear().expect("it is said before the end") {
             Heard::Said(said) if said["type"] == of => break said,
             Heard::Said(_) => {}
