@@ -180,8 +180,8 @@ fn a_recording_of_format_1_is_read_compared_and_exported() {
     let ended = program::run(command.arg("run").arg(old.join("run.toml")).args(["--quiet", "--out"]).arg(&today));
     assert_eq!(ended.code, Some(0), "{ended}");
     for [a, b] in [[&old, &today], [&today, &old]] {
-        let ended = diff(a, b, &["--tolerance", "0.5"]);
-        let expected = "the same within 0.5: 3 records of 12 bodies, steps 0 to 20,";
+        let ended = diff(a, b, &["--tolerance", "1"]);
+        let expected = "the same within 1: 3 records of 12 bodies, steps 0 to 20,";
         assert!(ended.code == Some(0) && ended.stdout.starts_with(expected), "{ended}");
     }
     // What the one leaves to its configuration, and the other says, is the same.
