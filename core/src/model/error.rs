@@ -49,7 +49,9 @@ pub enum SetupError {
         kind: KindId,
     },
     /// What is to be done to a body.
-    #[error("body {id}: velocities, impulses and forces must be finite numbers")]
+    #[error(
+        "body {id}: velocities, impulses and forces must be finite numbers, and what they lead to as well; give smaller ones"
+    )]
     NotFinite {
         /// Its name.
         id: GlobalId,

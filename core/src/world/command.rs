@@ -81,26 +81,28 @@ impl World {
     /// depend on how many they are.
     ///
     /// # Errors
-    /// As [`check`](Self::check); and if a body is added whose name is taken. The world is left as it was.
+    /// As [`check`](Self::check); as [`outcome`](Self::outcome), of a body of this world; and if a body is added whose name is taken.
+    /// The world is left as it was.
     pub fn command(&mut self, command: &Command) -> Result<bool, SetupError> {
         self.check(command)?;
         match *command {
             Command::Add(body) => self.add(body),
             Command::Remove(id) => Ok(self.remove(id)),
-            Command::SetVelocity { id, velocity, angular_velocity } => {
-                Ok(self.change(id, |body, _| (body.velocity, body.angular_velocity) = (velocity, angular_velocity)))
+            Command::SetVelocity { id, .. } | Command::Impulse { id, .. } | Command::Wake(id) => {
+                self.change(id, |world, body| world.outcome(command, body))
             }
-            Command::Impulse { id, impulse, at, angular } => Ok(self.strike(id, impulse, at, angular)),
             Command::Force { id, force, torque, steps } => {
+                let body = self.look_up(id).map(|Place { tile, at }| self.tiles[tile as usize].at(at));
+                body.map_or(Ok(()), |body| self.outcome(command, body).map(drop))?;
                 if steps > 0 {
                     self.forces.push(Force { id, force, torque, left: steps });
                 }
-                Ok(self.look_up(id).is_some())
+                Ok(body.is_some())
             }
-            Command::SetKind { id, kind } => {
+            Command::SetKind { id, .. } => {
                 self.settle();
                 self.forget_ghosts(id);
-                let changed = self.change(id, |body, _| body.kind = kind);
+                let changed = self.change(id, |world, body| world.outcome(command, body))?;
                 if let Some(Place { tile, at }) = self.look_up(id) {
                     let is_it = |slot| matches!(slot, SlotKind::Owned(index) if index == at as usize);
                     self.tiles[tile as usize].forget_contacts(|slot| is_it(slot.kind()));
@@ -113,7 +115,6 @@ impl World {
                 self.tiles.iter_mut().for_each(|tile| tile.sleep.wake_all());
                 Ok(true)
             }
-            Command::Wake(id) => Ok(self.change(id, |_, _| ())),
         }
     }
 
@@ -147,25 +148,45 @@ impl World {
         self.setup.params.gravity
     }
 
-    /// Changes a body, which wakes; says whether it is here.
-    fn change(&mut self, id: GlobalId, change: impl FnOnce(&mut Body, &KindRow)) -> bool {
-        let Some(Place { tile, at }) = self.look_up(id) else { return false };
-        let tile = &mut self.tiles[tile as usize];
-        let mut body = tile.at(at);
+    /// What a command that can be done makes of the body it is about, which may be another rank's: the same wherever it is worked
+    /// out. A force leaves it as it is until the next step.
+    ///
+    /// # Errors
+    /// If the velocities that it leads to, a force within one step, are not finite.
+    pub fn outcome(&self, command: &Command, body: Body) -> Result<Body, SetupError> {
         let kind = self.setup.kind(body.kind);
-        change(&mut body, kind);
-        body.angular_velocity = self.setup.kind(body.kind).turning(body.angular_velocity);
-        tile.change_at(at, body);
-        self.questions.take();
-        true
+        let mut after = body;
+        match *command {
+            Command::SetVelocity { velocity, angular_velocity, .. } => {
+                (after.velocity, after.angular_velocity) = (velocity, angular_velocity);
+            }
+            Command::Impulse { impulse, at, angular, .. } => strike(&mut after, kind, impulse, at, angular),
+            Command::Force { force, torque, .. } => {
+                let dt = self.setup.params.dt;
+                strike(&mut after, kind, force * dt, None, torque * dt);
+            }
+            Command::SetKind { kind, .. } => after.kind = kind,
+            Command::Add(_) | Command::Remove(_) | Command::AddKind(_) | Command::SetGravity(_) | Command::Wake(_) => {}
+        }
+        after.angular_velocity = self.setup.kind(after.kind).turning(after.angular_velocity);
+        match command {
+            _ if !after.is_finite() => Err(SetupError::NotFinite { id: body.id }),
+            Command::Force { .. } => Ok(body),
+            _ => Ok(after),
+        }
     }
 
-    fn strike(&mut self, id: GlobalId, impulse: Vec2, at: Option<DVec2>, angular: f32) -> bool {
-        self.change(id, |body, kind| {
-            let arm = at.map_or(Vec2::ZERO, |at| (at - body.position).as_vec2());
-            body.velocity += impulse * kind.inv_mass;
-            body.angular_velocity += (angular + cross(arm, impulse)) / kind.inertia;
-        })
+    /// Changes a body, which wakes; says whether it is here.
+    fn change(
+        &mut self,
+        id: GlobalId,
+        change: impl FnOnce(&Self, Body) -> Result<Body, SetupError>,
+    ) -> Result<bool, SetupError> {
+        let Some(Place { tile, at }) = self.look_up(id) else { return Ok(false) };
+        let body = change(self, self.tiles[tile as usize].at(at))?;
+        self.tiles[tile as usize].change_at(at, body);
+        self.questions.take();
+        Ok(true)
     }
 
     /// Before a step: lets forces push.
@@ -173,12 +194,25 @@ impl World {
         let mut forces = std::mem::take(&mut self.forces);
         let dt = self.setup.params.dt;
         for Force { id, force, torque, left } in &mut forces {
-            self.strike(*id, *force * dt, None, *torque * dt);
+            let pushed = |world: &Self, mut body: Body| {
+                let kind = world.setup.kind(body.kind);
+                strike(&mut body, kind, *force * dt, None, *torque * dt);
+                // The step says who is no longer finite.
+                Ok(Body { angular_velocity: kind.turning(body.angular_velocity), ..body })
+            };
+            self.change(*id, pushed).expect("nothing is refused");
             *left -= 1;
         }
         forces.retain(|force| force.left > 0);
         self.forces = forces;
     }
+}
+
+/// What an impulse does to a body.
+fn strike(body: &mut Body, kind: &KindRow, impulse: Vec2, at: Option<DVec2>, angular: f32) {
+    let arm = at.map_or(Vec2::ZERO, |at| (at - body.position).as_vec2());
+    body.velocity += impulse * kind.inv_mass;
+    body.angular_velocity += (angular + cross(arm, impulse)) / kind.inertia;
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use super::text::{Event, Question};
 use atoll_core::{Body, GlobalId, RayHit, World};
-use serde::{Deserialize, Serialize};
+use glam::DVec2;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What one rank answers to a question, or all together.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -17,13 +18,27 @@ pub(crate) enum Part {
     Bodies(Vec<Option<State>>),
 }
 
+/// A number. What is not finite is `null` in JSON, and must not keep anybody from reading the rest.
+#[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Serialize)]
+pub(crate) struct Number<T>(T);
+
+impl<'de, T: Deserialize<'de> + From<f32>> Deserialize<'de> for Number<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(Self(Option::deserialize(deserializer)?.unwrap_or(f32::NAN.into())))
+    }
+}
+
+fn point(point: DVec2) -> [Number<f64>; 2] {
+    point.to_array().map(Number)
+}
+
 /// What a ray meets.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Hit {
     id: u64,
-    fraction: f64,
-    point: [f64; 2],
-    normal: [f64; 2],
+    fraction: Number<f64>,
+    point: [Number<f64>; 2],
+    normal: [Number<f64>; 2],
 }
 
 /// A contact, as seen from one of its bodies.
@@ -31,8 +46,8 @@ pub(crate) struct Hit {
 pub(crate) struct Touching {
     /// The other.
     id: u64,
-    points: [[f64; 2]; 2],
-    impulse: f32,
+    points: [[Number<f64>; 2]; 2],
+    impulse: Number<f32>,
 }
 
 /// A body, as it is.
@@ -40,12 +55,12 @@ pub(crate) struct Touching {
 pub(crate) struct State {
     id: u64,
     kind: u32,
-    x: f64,
-    y: f64,
-    angle: f32,
-    vx: f32,
-    vy: f32,
-    omega: f32,
+    x: Number<f64>,
+    y: Number<f64>,
+    angle: Number<f32>,
+    vx: Number<f32>,
+    vy: Number<f32>,
+    omega: Number<f32>,
 }
 
 impl State {
@@ -53,12 +68,12 @@ impl State {
         Self {
             id: body.id.0,
             kind: body.kind.0,
-            x: body.position.x,
-            y: body.position.y,
-            angle: body.rotation.angle(),
-            vx: body.velocity.x,
-            vy: body.velocity.y,
-            omega: body.angular_velocity,
+            x: Number(body.position.x),
+            y: Number(body.position.y),
+            angle: Number(body.rotation.angle()),
+            vx: Number(body.velocity.x),
+            vy: Number(body.velocity.y),
+            omega: Number(body.angular_velocity),
         }
     }
 }
@@ -101,11 +116,7 @@ impl Part {
                 let contact = |contact: atoll_core::ContactView| {
                     let [a, b] = contact.bodies;
                     let other = if a == *id { b } else { a };
-                    Touching {
-                        id: other.0,
-                        points: contact.points.map(|point| point.to_array()),
-                        impulse: contact.normal_impulse,
-                    }
+                    Touching { id: other.0, points: contact.points.map(point), impulse: Number(contact.normal_impulse) }
                 };
                 let is_there = world.is_static(*id) || world.get(*id).is_some();
                 Self::Touching(is_there.then(|| world.touching(*id).into_iter().map(contact).collect()))
@@ -143,8 +154,8 @@ impl Part {
 
 impl Hit {
     fn new(hit: RayHit) -> Self {
-        let RayHit { id, fraction, point, normal } = hit;
-        Self { id: id.0, fraction, point: point.to_array(), normal: normal.to_array() }
+        let RayHit { id, fraction, point: at, normal } = hit;
+        Self { id: id.0, fraction: Number(fraction), point: point(at), normal: point(normal) }
     }
 }
 
@@ -230,11 +241,13 @@ fn value(question: &Question, part: &Part, names: &[Option<String>]) -> String {
 mod tests {
     use super::*;
     use atoll_core::KindId;
-    use glam::DVec2;
 
     #[test]
     fn parts_join_in_any_order_and_are_told_in_one_line() {
-        let hit = |id, fraction| Part::Ray(Some(Hit { id, fraction, point: [0.5, 1.0], normal: [0.0, 1.0] }));
+        let hit = |id, fraction| {
+            let (at, normal) = (point(DVec2::new(0.5, 1.0)), point(DVec2::Y));
+            Part::Ray(Some(Hit { id, fraction: Number(fraction), point: at, normal }))
+        };
         let parts = [Part::Ray(None), hit(4, 0.5), hit(3, 0.5), hit(1, 0.75)];
         for turn in 0..4 {
             let all = (0..4).map(|k| parts[(k + turn) % 4].clone()).reduce(Part::join).unwrap();
@@ -258,5 +271,13 @@ mod tests {
         assert_eq!(told(&[None, None]), format!("{{\"step\":0,\"body\":{{\"id\":3,{rest}}}}}\n"));
         let expected = format!("{{\"step\":0,\"body\":{{\"id\":3,{rest},\"kind_name\":\"crate\"}}}}\n");
         assert_eq!(told(&[None, Some("crate".to_owned())]), expected);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_null_and_can_be_read() {
+        let body = Body::at_rest(GlobalId(3), KindId(0), DVec2::new(f64::INFINITY, 1.5));
+        let text = json(&Part::Bodies(vec![Some(State::new(&body))]));
+        assert!(text.contains("\"x\":null,\"y\":1.5"), "{text}");
+        assert_eq!(json(&serde_json::from_str::<Part>(&text).unwrap()), text);
     }
 }

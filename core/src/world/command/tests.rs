@@ -217,6 +217,14 @@ fn what_cannot_be_done_changes_nothing() {
         (Command::SetVelocity { id, velocity: nan, angular_velocity: 0.0 }, SetupError::NotFinite { id }),
         (Command::Impulse { id, impulse: nan, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: nan, torque: 0.0, steps: 1 }, SetupError::NotFinite { id }),
+        // What they lead to is not finite.
+        (Command::Impulse { id, impulse: Vec2::X * 2e38, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
+        (
+            Command::Impulse { id, impulse: Vec2::X, at: Some(DVec2::Y * 1e300), angular: 0.0 },
+            SetupError::NotFinite { id },
+        ),
+        (Command::Impulse { id, impulse: Vec2::ZERO, at: None, angular: 2e38 }, SetupError::NotFinite { id }),
+        (Command::Force { id, force: Vec2::X * 1e38, torque: 3e38, steps: 1 }, SetupError::NotFinite { id }),
         (Command::SetKind { id, kind: KindId(2) }, SetupError::NoKind { id, kind: KindId(2) }),
         (Command::AddKind(Kind::new(Shape::circle(0.0), Material::default())), SetupError::BadKind { kind: KindId(2) }),
     ] {

@@ -1,15 +1,15 @@
 //! Whether commands can be done: which of the bodies that they speak of there are, whoever holds them; and which names are free.
 
-use super::super::{RankError, records, unreadable};
+use super::super::{RankError, records};
 use crate::command::{Action, Line, NewBody};
 use crate::plan::Plan;
 use crate::scene::{MOST_AT_A_PLACE, place_of};
-use atoll_core::{Command, GlobalId, World};
-use atoll_transport::{Collective, Rank, Transport};
+use atoll_core::{Body, Command, GlobalId, World};
+use atoll_transport::{Collective, Transport};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// For each body that is spoken of whether there is one.
-pub(super) type Present = BTreeMap<GlobalId, bool>;
+/// For each body that is spoken of how it is, if there is one.
+pub(super) type Present = BTreeMap<GlobalId, Option<Body>>;
 
 /// The body that a command is about, if there is one that must be there.
 fn subject(command: &Command) -> Option<GlobalId> {
@@ -37,49 +37,55 @@ pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport
     if ids.is_empty() {
         return Ok(Present::new());
     }
-    let mut own: Vec<u8> = ids.iter().map(|&id| u8::from(world.get(id).is_some())).collect();
-    if transport.size() > 1 {
-        for (rank, told) in transport.all_gather(&own.clone()).map_err(RankError::Transport)?.iter().enumerate() {
-            if told.len() != own.len() {
-                return Err(RankError::Transport(unreadable(Rank::from_index(rank))));
-            }
-            own.iter_mut().zip(told).for_each(|(own, told)| *own |= told);
-        }
-    }
-    Ok(ids.into_iter().zip(own).map(|(id, is_there)| (id, is_there != 0)).collect())
+    let own: Vec<Body> = ids.iter().filter_map(|&id| world.get(id)).collect();
+    let told = if transport.size() == 1 {
+        own
+    } else {
+        let told = transport.all_gather(bytemuck::cast_slice(&own)).map_err(RankError::Transport)?;
+        records(&told).map_err(RankError::Transport)?
+    };
+    let mut present: Present = ids.into_iter().map(|id| (id, None)).collect();
+    present.extend(told.into_iter().map(|body| (body.id, Some(body))));
+    Ok(present)
 }
 
 /// Whether all of these can be done, one after the other; `present` goes on with what is there afterwards. The error is why not.
 pub(super) fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(), String> {
-    let mut before: Vec<(GlobalId, Option<bool>)> = Vec::new();
+    let mut before: Vec<(GlobalId, Option<Option<Body>>)> = Vec::new();
     for command in commands {
-        let is_there = |id: &GlobalId| present.get(id) == Some(&true);
-        let checked = world.check(command).map_err(|error| error.to_string()).and_then(|()| match command {
-            Command::Add(body) if is_there(&body.id) => {
-                Err(format!("there is a body {} already; give each a name of its own, or none", body.id))
+        match outcome(command, present, world) {
+            Ok(Some((id, after))) => before.push((id, present.insert(id, after))),
+            Ok(None) => {}
+            Err(reason) => {
+                for (id, was) in before.into_iter().rev() {
+                    match was {
+                        Some(was) => present.insert(id, was),
+                        None => present.remove(&id),
+                    };
+                }
+                return Err(reason);
             }
-            command => match subject(command) {
-                Some(id) if !is_there(&id) => Err(format!("there is no body {id}")),
-                _ => Ok(()),
-            },
-        });
-        match command {
-            _ if checked.is_err() => {}
-            Command::Add(body) => before.push((body.id, present.insert(body.id, true))),
-            Command::Remove(id) => before.push((*id, present.insert(*id, false))),
-            _ => {}
-        }
-        if let Err(reason) = checked {
-            for (id, was) in before.into_iter().rev() {
-                match was {
-                    Some(was) => present.insert(id, was),
-                    None => present.remove(&id),
-                };
-            }
-            return Err(reason);
         }
     }
     Ok(())
+}
+
+/// The body that a command is about, if it is about one, and how that is afterwards, if it is still there.
+fn outcome(command: &Command, present: &Present, world: &World) -> Result<Option<(GlobalId, Option<Body>)>, String> {
+    world.check(command).map_err(|error| error.to_string())?;
+    let of = |id: GlobalId| present.get(&id).copied().flatten();
+    let body = match command {
+        Command::Add(body) if of(body.id).is_some() => {
+            return Err(format!("there is a body {} already; give each a name of its own, or none", body.id));
+        }
+        Command::Add(body) => *body,
+        command => match subject(command) {
+            Some(id) => of(id).ok_or_else(|| format!("there is no body {id}"))?,
+            None => return Ok(None),
+        },
+    };
+    let after = world.outcome(command, body).map_err(|error| error.to_string())?;
+    Ok(Some((body.id, Some(after).filter(|_| !matches!(command, Command::Remove(_))))))
 }
 
 /// Which bodies came before the next step and are still there, by lines that were done.
@@ -140,7 +146,7 @@ pub(super) fn next_name(plan: &Plan, world: &World, transport: &mut impl Transpo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use atoll_core::{Body, KindId};
+    use atoll_core::KindId;
     use glam::DVec2;
 
     #[test]
