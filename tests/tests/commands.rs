@@ -305,6 +305,13 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{line}: {ended}");
         assert!(ended.stderr.contains(expected), "{line}: {ended}");
     }
+    // What would be asked after the last step as if something had been done is not answered.
+    let answers = folder.path().join("answers.jsonl");
+    let late = "{\"step\": 6, \"body\": 41}\n{\"step\": 6, \"remove\": 40}\n{\"step\": 6, \"body\": 40}\n";
+    let ended = start(late, &["--answers", answers.to_str().unwrap()]);
+    assert!(ended.stderr.contains("2 lines are for steps from 6 on, which were not made"), "{ended}");
+    let told = fs::read_to_string(&answers).unwrap();
+    assert!(told.lines().count() == 1 && told.contains("\"body\":{\"id\":41,"), "{told}");
     let ended = start("{\"step\": 6, \"remove\": 40}\n{\"step\": 9, \"remove\": 41}\n", &[]);
     assert!(ended.stderr.contains("2 lines are for steps from 6 on, which were not made"), "{ended}");
     assert_eq!(ended.code, Some(0), "{ended}");
@@ -318,6 +325,70 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{line:?}: {ended}");
         assert!(ended.stderr.contains(expected), "{ended}");
     }
+}
+
+#[test]
+fn what_is_refused_is_not_kept_and_a_run_goes_on_from_there() {
+    let folder = tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let start = |out: &str, more: &[&str]| {
+        let mut command = Way::Channel.command(2, CONFIG);
+        command.args(["--quiet", "--steps", "6", "--bodies", "500", "--out"]).arg(path(out)).args(more);
+        command
+    };
+    let kept = |out: &str| fs::read_to_string(path(out).join("commands.jsonl")).unwrap();
+    let lines = [
+        "{\"step\":1,\"remove\":40}",
+        "{\"step\":3,\"impulse\":{\"id\":41,\"x\":1,\"y\":0}}",
+        "{\"step\":3,\"name\":\"again\",\"remove\":40}",
+        "{\"step\":3,\"remove\":42}",
+        "{\"step\":4,\"remove\":43}",
+    ];
+    let of = |places: &[usize]| places.iter().map(|&place| format!("{}\n", lines[place])).collect::<String>();
+    fs::write(path("good.jsonl"), of(&[0, 1, 3, 4])).unwrap();
+    fs::write(path("bad.jsonl"), of(&[0, 1, 2, 3, 4])).unwrap();
+    let [good, bad] = ["good.jsonl", "bad.jsonl"].map(|name| path(name).display().to_string());
+    run(&mut start("whole", &["--commands", &good]));
+    let expected = end(&program::summary(&path("whole").join("summary.json")));
+    // Left out, it is not there for whoever repeats the run.
+    run(&mut start("skipped", &["--skip-refused", "--commands", &bad]));
+    assert_eq!((kept("skipped"), kept("whole")), (of(&[0, 1, 3, 4]), of(&[0, 1, 3, 4])));
+    // A run that it ends goes on with the lines after it, and so does one that is driven.
+    let refused = "line 3 (\"again\"): step 3: there is no body 40; mend it, or leave out what cannot be done by \
+                   --skip-refused, and go on with `atoll run --resume ";
+    let ended = program::run(&mut start("filed", &["--commands", &bad]));
+    assert!(ended.code == Some(2) && ended.complaints().len() == 1 && ended.stderr.contains(refused), "{ended}");
+    assert_eq!(kept("filed"), of(&[0, 1, 3, 4]));
+    let ended = run(Way::Channel.resume(1, &path("filed")).arg("--quiet"));
+    assert!(ended.stderr.contains("after step 3"), "{ended}");
+    assert_eq!(end(&program::summary(&path("filed").join("summary.json"))), expected);
+    let drive = |command: &mut Command, text: String| {
+        let (heard, mut said) = std::io::pipe().unwrap();
+        said.write_all(text.as_bytes()).unwrap();
+        program::run(command.args(["--commands", "-", "--answers", "-"]).stdin(heard))
+    };
+    let ended = drive(&mut start("driven", &[]), of(&[0, 1, 2, 3, 4]));
+    assert!(ended.code == Some(2) && ended.stderr.contains(refused), "{ended}");
+    assert!(ended.stdout.contains("{\"step\":3,\"name\":\"again\",\"line\":3,\"refused\":"), "{ended}");
+    assert_eq!(kept("driven"), of(&[0, 1]));
+    let ended = drive(Way::Channel.resume(3, &path("driven")).arg("--quiet"), of(&[3, 4]));
+    assert!(ended.code == Some(0) && ended.stdout.starts_with("{\"step\":3,\"waits\":true,\"done\":2}"), "{ended}");
+    assert_eq!(end(&program::summary(&path("driven").join("summary.json"))), expected);
+    assert_eq!(kept("driven"), kept("whole"));
+    // What comes too late for a run that goes on is told.
+    fs::write(path("late.jsonl"), of(&[0, 3]) + "{\"step\":2,\"wake\":44}\n{\"step\":7,\"wake\":44}\n").unwrap();
+    let mut later = Way::Channel.resume(1, &path("filed"));
+    let ended = run(later.args(["--quiet", "--steps", "8", "--commands"]).arg(path("late.jsonl")));
+    assert!(ended.stderr.contains("late.jsonl: 1 line is for steps before 3, which are made; left out"), "{ended}");
+    // Another run does not give way to one that cannot begin.
+    fs::write(path("bad.jsonl"), "{\"step\":0,\"remove\":[40,40]}\n").unwrap();
+    let before = fs::read(path("whole").join("summary.json")).unwrap();
+    let ended = program::run(&mut start("whole", &["--overwrite", "--commands", &bad]));
+    assert!(
+        ended.code == Some(2) && ended.stderr.contains("bad.jsonl: line 1: step 0: there is no body 40"),
+        "{ended}"
+    );
+    assert_eq!(fs::read(path("whole").join("summary.json")).unwrap(), before);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::launch;
 use crate::plan::{Commands, Plan};
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
-use crate::rank::{Host, Observer, check_logs};
+use crate::rank::{Host, Observer, check_commands, check_logs};
 use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -198,6 +198,7 @@ fn checked(plan: Result<Plan, RunError>) -> Result<Plan, RunError> {
     plan.check_recording()?;
     check_logs(&plan)?;
     plan.check_overwriting()?;
+    check_commands(&plan)?;
     Ok(plan)
 }
 

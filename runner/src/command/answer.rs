@@ -168,10 +168,10 @@ pub(crate) enum Answer<'a> {
     Added(&'a [u64]),
     /// What began and ended in the last step: contacts, or that a body is inside a sensor.
     Events { event: Event, began: &'a [[u64; 2]], ended: &'a [[u64; 2]] },
-    /// Why a command was not done.
-    Refused(&'a str),
-    /// The run waits to be told more.
-    Waits,
+    /// Why a command was not done, and which line that was.
+    Refused { line: u64, reason: &'a str },
+    /// The run waits to be told more than so many lines of this step, which were done before it went on.
+    Waits { done: u64 },
 }
 
 impl Answer<'_> {
@@ -188,8 +188,9 @@ impl Answer<'_> {
                 };
                 format!("\"{first}\":{},\"{last}\":{}", json(&began), json(&ended))
             }
-            Self::Refused(reason) => format!("\"refused\":{}", json(&reason)),
-            Self::Waits => "\"waits\":true".to_owned(),
+            Self::Refused { line, reason } => format!("\"line\":{line},\"refused\":{}", json(&reason)),
+            Self::Waits { done: 0 } => "\"waits\":true".to_owned(),
+            Self::Waits { done } => format!("\"waits\":true,\"done\":{done}"),
         };
         format!("{{\"step\":{step},{name}{rest}}}\n")
     }

@@ -15,4 +15,4 @@ pub use rehearsal::rehearse;
 pub(crate) use script::Script;
 pub use script::ScriptError;
 pub(crate) use state::State;
-pub(crate) use text::{Action, Event, Line, NO_UNTIL, NewBody, Question, Word, word};
+pub(crate) use text::{Action, Event, Line, NO_UNTIL, NewBody, Question, Word, named, word};

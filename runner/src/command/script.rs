@@ -69,6 +69,12 @@ impl Script {
         Ok(Self { path: path.to_owned(), text: text.into(), lines: lines.into() })
     }
 
+    /// The text of each of some of its lines.
+    pub(crate) fn texts<'a>(&'a self, lines: &'a [Line]) -> impl Iterator<Item = &'a str> {
+        let raw: Vec<&str> = self.text.lines().collect();
+        lines.iter().map(move |line| raw[line.number as usize - 1])
+    }
+
     /// A fingerprint of its text.
     #[cfg(any(test, feature = "iceoryx2", feature = "mpi"))]
     pub(crate) fn digest(&self) -> String {

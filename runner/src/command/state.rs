@@ -19,6 +19,9 @@ pub(crate) struct State {
     /// Rows that were added to the table of kinds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     kinds: Vec<KindText>,
+    /// How many lines of the step that is made next are done: more than none where a line after them was refused.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub(crate) done: u64,
     /// Forces that push still.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     forces: Vec<Push>,
@@ -28,6 +31,10 @@ pub(crate) struct State {
     /// Whether bodies that enter and leave sensors are told.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     tells_sensors: bool,
+}
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
 }
 
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]

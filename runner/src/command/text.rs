@@ -227,6 +227,12 @@ pub(crate) fn word(number: u64, text: &str, step: u64) -> Result<Word, String> {
     Ok(Word::Line(Line { step, number, name, action: action(raw)? }, value.to_string()))
 }
 
+/// The name in a line that may be wrong otherwise.
+pub(crate) fn named(text: &str) -> Option<String> {
+    let line: Value = serde_json::from_str(text).ok()?;
+    Some(line.get("name")?.as_str()?.to_owned())
+}
+
 fn read(text: &str) -> Result<Raw, String> {
     // On one line, lines are of no use.
     let short = |error: serde_json::Error| {

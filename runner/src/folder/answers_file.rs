@@ -26,22 +26,22 @@ struct Head {
 }
 
 impl AnswersFile {
-    /// Opens it for a run that begins, with step 0, or goes on `from` a step: what was said until then stays, and what comes after is
-    /// said again. A path of `-` is standard output.
+    /// Opens it for a run that begins, with step 0, or goes on `from` a step, of whose lines some may be done (`is_begun`): what was
+    /// said until then stays, and what comes after is said again. A path of `-` is standard output.
     ///
     /// # Errors
     /// What the system says.
-    pub(crate) fn open(path: &Path, from: u64) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path, from: u64, is_begun: bool) -> io::Result<Self> {
         if path == Path::new("-") {
             return Ok(Self { path: PathBuf::from("standard output"), to: To::Stdout(io::stdout()) });
         }
-        let kept = if from > 0 { Self::kept(path, from)? } else { String::new() };
+        let kept = if from > 0 { Self::kept(path, from, is_begun)? } else { String::new() };
         let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
         file.write_all(kept.as_bytes())?;
         Ok(Self { path: path.to_owned(), to: To::File(file) })
     }
 
-    fn kept(path: &Path, from: u64) -> io::Result<String> {
+    fn kept(path: &Path, from: u64, is_begun: bool) -> io::Result<String> {
         if !path.metadata().is_ok_and(|metadata| metadata.is_file()) {
             return Ok(String::new());
         }
@@ -52,7 +52,8 @@ impl AnswersFile {
         let stays = |line: &&str| {
             let head: Result<Head, _> = serde_json::from_str(line);
             let is_event = |head: &Head| head.began.is_some() || head.entered.is_some();
-            line.ends_with('\n') && head.is_ok_and(|head| head.step < from || head.step == from && is_event(&head))
+            line.ends_with('\n')
+                && head.is_ok_and(|head| head.step < from || head.step == from && (is_begun || is_event(&head)))
         };
         Ok(text.split_inclusive('\n').take_while(stays).collect())
     }
@@ -84,12 +85,12 @@ mod tests {
         let began = "{\"step\":5,\"began\":[[1,2]],\"ended\":[]}\n";
         let said = ["{\"step\":3,\"ray\":null}\n", began, "{\"step\":5,\"entered\":[],\"left\":[[7,2]]}\n"];
         let later = ["{\"step\":5,\"ray\":null}\n", "{\"step\":6,\"began\":[],\"ended\":[[1,2]]}\n", "{\"st"];
-        let mut file = AnswersFile::open(&path, 0).unwrap();
+        let mut file = AnswersFile::open(&path, 0, false).unwrap();
         said.iter().chain(&later).for_each(|line| file.add(line).unwrap());
-        let mut file = AnswersFile::open(&path, 5).unwrap();
+        let mut file = AnswersFile::open(&path, 5, false).unwrap();
         file.add("{\"step\":5}\n").unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), [said.concat(), "{\"step\":5}\n".to_owned()].concat());
-        drop(AnswersFile::open(&path, 0).unwrap());
+        drop(AnswersFile::open(&path, 0, false).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
     }
 }

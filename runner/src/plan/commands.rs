@@ -1,7 +1,7 @@
 //! What a run is told to do while it runs, and where it answers.
 
-use crate::command::Script;
-use std::fmt::Write as _;
+use crate::command::{Line, Script};
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// The usual ones are none.
@@ -26,20 +26,32 @@ impl Commands {
         self.given.as_ref().or(self.recorded.as_ref().filter(|_| !self.drives))
     }
 
-    /// What the folder of a run is to say that goes on `from` a step, or begins: all that was done before, and all that is known of
-    /// what is to come.
-    pub(crate) fn record(&self, from: u64) -> String {
-        let mut text = String::new();
-        let mut add = |script: Option<&Script>, is_meant: &dyn Fn(u64) -> bool| {
-            let Some(script) = script else { return };
-            let raw: Vec<&str> = script.text.lines().collect();
-            for line in script.lines.iter().filter(|line| is_meant(line.step)) {
-                writeln!(text, "{}", raw[line.number as usize - 1]).expect("a string takes any text");
-            }
+    /// The lines that were done before a run goes on `from` a step, or begins, with `done` of that step's lines; and those to come.
+    pub(crate) fn parted(&self, from: u64, done: u64) -> [Option<(&Script, &[Line])>; 2] {
+        let split = |script: &Script| {
+            let passed = script.lines.partition_point(|line| line.step < from);
+            let of_step = script.lines[passed..].partition_point(|line| line.step == from);
+            passed + of_step.min(usize::try_from(done).unwrap_or(usize::MAX))
         };
-        add(self.recorded.as_ref(), &|step| step < from);
-        add(self.to_come(), &|step| step >= from);
-        text
+        let before = self.recorded.as_ref().map(|script| (script, &script.lines[..split(script)]));
+        [before, self.to_come().map(|script| (script, &script.lines[split(script)..]))]
+    }
+
+    /// How many lines of a file that was given are for steps before the one `from` which the run goes on, and are none of those that
+    /// were done then.
+    pub(crate) fn late(&self, from: u64, done: u64) -> usize {
+        let Some(given) = &self.given else { return 0 };
+        let before = self.parted(from, done)[0];
+        let before: HashSet<&str> = before.into_iter().flat_map(|(script, lines)| script.texts(lines)).collect();
+        let passed = given.lines.partition_point(|line| line.step < from);
+        given.texts(&given.lines[..passed]).filter(|text| !before.contains(text)).count()
+    }
+
+    /// What the folder of a run is to say that goes on `from` a step with `done` of its lines, or begins: all that was done before,
+    /// and all that is known of what is to come.
+    pub(crate) fn record(&self, from: u64, done: u64) -> String {
+        let texts = self.parted(from, done).into_iter().flatten().flat_map(|(script, lines)| script.texts(lines));
+        texts.map(|text| format!("{text}\n")).collect()
     }
 
     /// What all ranks must have alike.
@@ -64,13 +76,17 @@ mod tests {
         };
         let commands = |given, recorded, drives| Commands { given, recorded, drives, ..Commands::default() };
         let steps = |commands: &Commands, from| {
-            let record = commands.record(from);
+            let record = commands.record(from, 0);
             Script::read(Path::new("b"), &record).unwrap().lines.iter().map(|line| line.step).collect::<Vec<_>>()
         };
         assert_eq!(steps(&commands(script(&[9, 2]), None, false), 0), [2, 9]);
         assert_eq!(steps(&commands(None, script(&[2, 5, 9]), false), 5), [2, 5, 9]);
         // Whoever drives says again what was said for later steps; and another file says otherwise.
         assert_eq!(steps(&commands(None, script(&[2, 5, 9]), true), 5), [2]);
-        assert_eq!(steps(&commands(script(&[1, 7]), script(&[2, 5, 9]), false), 5), [2, 7]);
+        let other = commands(script(&[1, 2, 7]), script(&[2, 5, 9]), false);
+        assert_eq!((steps(&other, 5), other.late(5, 0)), (vec![2, 7], 1));
+        // Of the step itself some may be done, and are not said again.
+        let resumed = commands(None, script(&[2, 5, 5, 9]), true);
+        assert_eq!([0, 1, 2, 3].map(|done| resumed.record(5, done).lines().count()), [1, 2, 3, 3]);
     }
 }

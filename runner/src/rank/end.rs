@@ -55,7 +55,8 @@ pub(super) fn finish(
     let Output { folder, every, .. } = recorder.output();
     let patience = plan.config.run.peer_timeout / 4;
     together(transport, observer, folder, || recorder.has_room(patience))?;
-    if stopped || every.checkpoint_every.is_some() {
+    // Before the first step there is nothing that a run which begins anew would not come to.
+    if world.step_count() > 0 && (stopped || every.checkpoint_every.is_some()) {
         recorder.snapshot(world, commands);
     }
     let kept = recorder.snapshot_before();

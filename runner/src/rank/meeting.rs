@@ -137,7 +137,7 @@ impl<'a> Meetings<'a> {
         let (waited, rank) = (halo.waited(), halo.transport().rank());
         let (assignment, transport) = halo.parts();
         let before = transport.stats();
-        loop {
+        while !commander.is_over() {
             let held = Held { rank, world, assignment, last, waited };
             match self.go_round(host, &held, transport).map_err(RankError::Transport)? {
                 Round::Over => break,

@@ -18,6 +18,7 @@ pub(crate) mod trace;
 pub(crate) mod trouble;
 
 pub use begin::scene as part_of_scene;
+pub(crate) use commands::check_commands;
 pub(crate) use facts::{Gathered, RankFacts};
 pub(crate) use halo::{ExchangeError, RankHalo};
 pub(crate) use log::check_logs;
@@ -148,7 +149,7 @@ fn run<T: Transport>(
     halo.transport().barrier().map_err(RankError::Transport)?;
     let logs = log::find(plan, resumed, halo.transport())?;
     recorder = end::start(plan, rank, resumed, halo.transport())?;
-    let mut commander = Commander::start(plan, rank, (resumed, commands), &world, halo.transport())?;
+    let mut commander = Commander::start(plan, rank, (resumed, commands), (&world, observer), halo.transport())?;
     let start_log = |logs| Log::start(plan, logs, resumed, (&world, &mut halo), (recorder.as_ref(), observer));
     let mut log = logs.map(start_log).transpose()?;
     *complete = world.step_count();
@@ -171,7 +172,7 @@ fn run<T: Transport>(
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan);
     meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
-    while world.step_count() < steps && !last.stopped {
+    while world.step_count() < steps && !last.stopped && !commander.is_over() {
         let unwritten = log_failure.is_some()
             || commander.failure().is_some()
             || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
@@ -208,10 +209,10 @@ fn run<T: Transport>(
                 (None, _) => {}
             }
         }
+        commander.after_step(&world, &mut halo)?;
         if let Some(recorder) = &mut recorder {
             recorder.write_due(&world, commander.state(), last.stopped);
         }
-        commander.after_step(&world, &mut halo)?;
         if !last.stopped {
             commander.take_turn(&mut world, &mut halo, observer)?;
         }
@@ -228,7 +229,7 @@ fn run<T: Transport>(
     }
     tracer.before(None);
     // Whoever asks while the last step is made gets all of them.
-    let interrupted = last.stopped && *complete < steps;
+    let interrupted = (last.stopped || commander.is_over() && *complete > 0) && *complete < steps;
     let mut output_time = match recorder {
         Some(recorder) => {
             end::finish(recorder, (&world, commander.state()), interrupted, plan, observer, halo.transport())?
@@ -236,6 +237,9 @@ fn run<T: Transport>(
         None => end::finish_log(log.as_ref(), log_failure, *complete, plan, halo.transport())?,
     };
     commander.close(halo.transport(), observer)?;
+    if let Some(refusal) = commander.refusal() {
+        return Err(refusal);
+    }
     drop(told);
     let finished = Instant::now();
 

@@ -2,12 +2,14 @@
 //! be done depends on the whole world, of which they tell each other beforehand.
 
 mod events;
+mod kept;
 mod presence;
+mod rehearsal;
 
 use super::halo::RankHalo;
 use super::trouble::all_well;
 use super::{Observer, RankError, unreadable};
-use crate::command::{Action, Answer, Event, Line, NO_UNTIL, NewBody, Part, Question, State, Word, word};
+use crate::command::{Action, Answer, Event, Line, NO_UNTIL, Part, Question, State, Word, named, word};
 use crate::error::{Exit, RunError};
 use crate::folder::AnswersFile;
 use crate::plan::Plan;
@@ -15,10 +17,11 @@ use crate::wording::OneLine;
 use atoll_core::{Command, GlobalId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use events::Followed;
-use presence::{Crowds, check, find, next_name};
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
-use std::path::PathBuf;
+use kept::Kept;
+use presence::{Crowds, acts, find, next_name};
+pub(crate) use rehearsal::check_commands;
+use std::collections::BTreeSet;
+use std::io;
 use std::time::{Duration, Instant};
 
 /// Sees to it that commands are done and questions answered.
@@ -40,9 +43,14 @@ pub(super) struct Commander {
     is_used: bool,
     /// Of the rank that speaks, where somebody wants them.
     answers: Option<AnswersFile>,
-    /// Where what is done is kept, by one rank of a run that has a folder; opened when there is something.
-    kept_in: Option<PathBuf>,
-    record: Option<File>,
+    /// Of one rank of a run that has a folder.
+    kept: Option<Kept>,
+    /// Of the lines of a turn, the places of those that were refused.
+    refused: BTreeSet<usize>,
+    /// How to go on with a run that ends too early, if it can be.
+    remedy: String,
+    /// What was refused and ends the run.
+    refusal: Option<String>,
     /// What there was after the last step of what is told.
     followed: Followed,
     /// What the scene calls its kinds.
@@ -51,6 +59,8 @@ pub(super) struct Commander {
     failure: Option<RunError>,
     /// After how many steps it was last said that the run waits.
     waits_after: Option<u64>,
+    /// How many lines of the step from which the run goes on were done before; until that is said.
+    done_before: u64,
     /// How long all of this took this rank, and what ranks sent each other for it.
     pub(super) time: Duration,
     pub(super) sent: Stats,
@@ -58,6 +68,8 @@ pub(super) struct Commander {
 
 /// What the words of whoever drives a run are called in errors.
 const LIVE: &str = "what was said";
+/// How to go on without what was refused.
+const MEND: &str = "mend it, or leave out what cannot be done by --skip-refused";
 
 /// Where a line stands. What pages say has no numbers.
 fn place(source: &str, number: u64) -> String {
@@ -73,36 +85,44 @@ impl Commander {
         plan: &Plan,
         rank: Rank,
         (resumed, state): (Option<u64>, Option<State>),
-        world: &World,
+        (world, observer): (&World, &Observer),
         transport: &mut impl Transport,
     ) -> Result<Self, RankError> {
         let commands = &plan.commands;
         let from = resumed.unwrap_or(0);
-        let script = commands.to_come();
-        let lines: Vec<Line> =
-            script.map_or(&[][..], |script| &script.lines).iter().filter(|line| line.step >= from).cloned().collect();
         let is_used = state.is_some();
+        let state = match state {
+            Some(state) => state,
+            None => State::new(next_name(plan, world, transport)?),
+        };
+        let done_before = state.done;
+        let [before, to_come] = commands.parted(from, done_before);
+        let folder = plan.output.as_ref().map(|output| &output.folder);
         let mut commander = Self {
             rank,
             next: 0,
-            lines,
-            source: script.map_or(String::new(), |script| script.path.display().to_string()),
+            lines: to_come.map_or(Vec::new(), |(_, lines)| lines.to_vec()),
+            source: to_come.map_or(String::new(), |(script, _)| script.path.display().to_string()),
             skips: commands.skips,
             is_page: !commands.drives,
             steps: plan.config.run.steps,
-            state: match state {
-                Some(state) => state,
-                None => State::new(next_name(plan, world, transport)?),
-            },
+            state,
             is_used,
             answers: None,
-            kept_in: plan.output.as_ref().map(|output| output.folder.commands()).filter(|_| rank == Rank(0)),
-            record: None,
+            kept: folder
+                .filter(|_| rank == Rank(0))
+                .map(|folder| Kept::new(folder.clone(), before.map_or(0, |(_, lines)| lines.len()))),
+            refused: BTreeSet::new(),
+            remedy: folder.map_or(String::new(), |folder| {
+                format!(", and go on with `atoll run --resume {}`", folder.path().display())
+            }),
+            refusal: None,
             followed: Followed::default(),
             names: plan.kind_names().to_vec(),
             crowds: Crowds::default(),
             failure: None,
             waits_after: None,
+            done_before,
             time: Duration::ZERO,
             sent: Stats::default(),
         };
@@ -111,23 +131,38 @@ impl Commander {
         }
         let opened = if rank == Rank(0) { commander.open(plan, from) } else { Ok(()) };
         all_well(transport, opened.as_ref().err())?;
+        let late = commands.late(from, done_before);
+        if rank == Rank(0) && late > 0 {
+            let lines = if late == 1 { "1 line is".to_owned() } else { format!("{late} lines are") };
+            observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", commander.source));
+        }
         Ok(commander)
     }
 
     /// Opens what one rank writes.
     fn open(&mut self, plan: &Plan, from: u64) -> Result<(), RunError> {
         if let Some(path) = &plan.commands.answers {
-            let opened = AnswersFile::open(path, from);
+            let opened = AnswersFile::open(path, from, self.done_before > 0);
             self.answers = Some(opened.map_err(|error| not_written(path, &error))?);
         }
         let Some(output) = &plan.output else { return Ok(()) };
-        let written = output.folder.write_commands(&plan.commands.record(from));
+        let written = output.folder.write_commands(&plan.commands.record(from, self.done_before));
         written.map_err(|error| not_written(&output.folder.commands(), &error))
     }
 
     /// What a snapshot is to tell of it, if there is anything.
     pub(super) fn state(&self) -> Option<&State> {
-        self.is_used.then_some(&self.state)
+        (self.is_used || self.state.done > 0).then_some(&self.state)
+    }
+
+    /// Whether something was refused that ends the run.
+    pub(super) fn is_over(&self) -> bool {
+        self.refusal.is_some()
+    }
+
+    /// What was refused and ends the run, if something was, on all ranks alike.
+    pub(super) fn refusal(&mut self) -> Option<RankError> {
+        self.refusal.take().map(|text| RankError::Agreed { text, exit: Exit::Usage })
     }
 
     /// How many more bodies there are to be than at the start.
@@ -146,6 +181,7 @@ impl Commander {
     /// That something could not be written, or a rank is lost.
     pub(super) fn close(&self, transport: &mut impl Transport, observer: &Observer) -> Result<(), RankError> {
         if self.rank == Rank(0)
+            && !self.is_over()
             && let [first, others @ ..] = &self.lines[self.next..]
         {
             let (rest, step) = (others.len() + 1, first.step);
@@ -156,33 +192,44 @@ impl Commander {
     }
 
     /// Does what is planned for the step that is to be made next, and answers what is asked of the world as it is. Once all steps
-    /// are made nothing is done any more.
+    /// are made nothing is done any more, and nothing answered that is asked after something to do.
     ///
     /// # Errors
-    /// If a rank is lost, or something cannot be done and is not to be left out.
+    /// If a rank is lost.
     pub(super) fn take_turn<T: Transport>(
         &mut self,
         world: &mut World,
         halo: &mut RankHalo<Counting<T>>,
         observer: &Observer,
     ) -> Result<(), RankError> {
-        let step = world.step_count();
-        let end = self.next + self.lines[self.next..].partition_point(|line| line.step <= step);
-        if self.next == end {
+        let (step, first) = (world.step_count(), self.next);
+        let due = self.lines[first..].iter().take_while(|line| line.step <= step);
+        // What is left is told of at the end.
+        let is_due = |line: &&Line| step < self.steps || matches!(line.action, Action::Ask(_));
+        let lines: Vec<Line> = due.take_while(is_due).cloned().collect();
+        if lines.is_empty() {
             return Ok(());
         }
-        let mut lines: Vec<Line> = self.lines[self.next..end].to_vec();
-        if step == self.steps {
-            // What is left is told of at the end.
-            self.lines.splice(self.next..end, lines.extract_if(.., |line| !matches!(line.action, Action::Ask(_))));
-        } else {
-            self.next = end;
-        }
+        self.next += lines.len();
         let (begun, sent, source) = (Instant::now(), halo.transport().stats(), self.source.clone());
         let done = self.obey(&lines, &source, world, halo.transport(), observer);
+        self.leave_out(first);
         self.time += begun.elapsed();
         self.sent += halo.transport().stats().since(&sent);
         done
+    }
+
+    /// Forgets those that were just refused of the lines from the place `first` on.
+    fn leave_out(&mut self, first: usize) {
+        if self.refused.is_empty() {
+            return;
+        }
+        let places: BTreeSet<usize> = self.refused.iter().map(|place| first + place).collect();
+        let stay = self.lines.drain(..).enumerate().filter(|(place, _)| !places.contains(place));
+        self.lines = stay.map(|(_, line)| line).collect();
+        self.next -= places.len();
+        let left_out = self.kept.as_mut().map_or(Ok(()), |kept| kept.leave_out(&places));
+        self.failure = self.failure.take().or(left_out.err());
     }
 
     /// Does what whoever drives the run says, each line of bytes after its number.
@@ -197,6 +244,7 @@ impl Commander {
         observer: &Observer,
     ) -> Result<(), RankError> {
         let (source, step) = (LIVE, world.step_count());
+        let is_past = step >= self.steps;
         for text in String::from_utf8_lossy(words).lines() {
             let (number, text) = text.split_once('\t').unwrap_or(("0", text));
             let number = number.parse().unwrap_or(0);
@@ -206,19 +254,25 @@ impl Commander {
                 Word::Until(_) => Err(NO_UNTIL.to_owned()),
             });
             match line {
-                Ok(line) if step >= self.steps && !matches!(line.action, Action::Ask(_)) => {
-                    let text =
+                Ok(line) if is_past && !matches!(line.action, Action::Ask(_)) => {
+                    let reason =
                         format!("{}: all steps are made, and nothing can be done any more", place(source, number));
-                    self.tell(step, None, Answer::Refused(&text));
+                    self.tell(step, line.name.as_deref(), Answer::Refused { line: number, reason: &reason });
                     if self.is_page && self.rank == Rank(0) {
-                        observer.note(&text);
+                        observer.note(&reason);
                     }
                 }
                 Ok(line) => {
-                    self.write_down(text);
                     self.obey(&[line], source, world, transport, observer)?;
+                    if self.refused.is_empty() {
+                        let added = self.kept.as_mut().map_or(Ok(()), |kept| kept.add(text));
+                        self.failure = self.failure.take().or(added.err());
+                    }
                 }
-                Err(reason) => self.refuse(source, number, step, &reason, observer)?,
+                Err(reason) => self.refuse(source, (number, named(text).as_deref()), step, &reason, observer),
+            }
+            if self.is_over() {
+                break;
             }
         }
         Ok(())
@@ -227,21 +281,8 @@ impl Commander {
     /// Tells whoever drives the run that it is his turn.
     pub(super) fn wait(&mut self, step: u64) {
         if self.waits_after.replace(step) != Some(step) {
-            self.tell(step, None, Answer::Waits);
-        }
-    }
-
-    /// Keeps what was said, before it is done.
-    fn write_down(&mut self, text: &str) {
-        let Some(path) = &self.kept_in else { return };
-        let open = || OpenOptions::new().create(true).append(true).open(path);
-        let file = match &mut self.record {
-            Some(file) => Ok(file),
-            record => open().map(|file| record.insert(file)),
-        };
-        let written = file.and_then(|file| file.write_all(format!("{text}\n").as_bytes()));
-        if let Err(error) = written {
-            self.failure = Some(not_written(path, &error));
+            let done = std::mem::take(&mut self.done_before);
+            self.tell(step, None, Answer::Waits { done });
         }
     }
 
@@ -261,6 +302,7 @@ impl Commander {
         transport: &mut impl Transport,
         observer: &Observer,
     ) -> Result<(), RankError> {
+        self.refused.clear();
         let done = self.obey_each(lines, source, world, transport, observer);
         world.settle();
         done
@@ -277,32 +319,32 @@ impl Commander {
         let step = world.step_count();
         let mut present = find(lines, world, transport)?;
         let mut asked: Vec<(&Line, &Question)> = Vec::new();
-        for line in lines {
+        for (place, line) in lines.iter().enumerate() {
             if let Action::Ask(question) = &line.action {
                 asked.push((line, question));
+                self.state.done += 1;
                 continue;
             }
             self.answer(&std::mem::take(&mut asked), world, transport)?;
-            let commands = match &line.action {
-                Action::Add(bodies) => self.crowds.check(bodies).and_then(|()| self.name(bodies)),
-                Action::Do(commands) => Ok(commands.clone()),
-                Action::Tell(event, is_told) => {
-                    // What is gone already ends no contact later: so it is where each line is heard alone.
-                    world.settle();
-                    self.state.tell(*event, *is_told);
-                    self.followed.set(*event, *is_told, world, transport)?;
-                    self.is_used = true;
-                    continue;
-                }
-                Action::Ask(_) => continue,
-            };
-            let commands = match commands.and_then(|all| check(&all, &mut present, world).map(|()| all)) {
+            if let Action::Tell(event, is_told) = line.action {
+                // What is gone already ends no contact later: so it is where each line is heard alone.
+                world.settle();
+                self.state.tell(event, is_told);
+                self.followed.set(event, is_told, world, transport)?;
+                self.is_used = true;
+            }
+            let commands = match acts(line, self.state.next, &mut present, &self.crowds, world) {
                 Ok(commands) => commands,
                 Err(reason) => {
-                    self.refuse(source, line.number, step, &reason, observer)?;
+                    self.refused.insert(place);
+                    self.refuse(source, (line.number, line.name.as_deref()), step, &reason, observer);
+                    if self.is_over() {
+                        break;
+                    }
                     continue;
                 }
             };
+            self.state.done += 1;
             for command in &commands {
                 world.command(command).map_err(RankError::Setup)?;
                 self.state.note(command, step);
@@ -319,41 +361,26 @@ impl Commander {
         self.answer(&asked, world, transport)
     }
 
-    /// Bodies that have no name of their own get the next ones, as long as there are some.
-    fn name(&self, bodies: &[NewBody]) -> Result<Vec<Command>, String> {
-        let mut next = self.state.next;
-        let named = |new: &NewBody| {
-            let mut body = new.body;
-            if !new.is_named {
-                if next == u64::MAX {
-                    return Err("no name is left above those of all bodies; give it one of its own".to_owned());
-                }
-                body.id = GlobalId(next);
-            }
-            next = next.max(body.id.0.saturating_add(1));
-            Ok(Command::Add(body))
-        };
-        bodies.iter().map(named).collect()
-    }
-
+    /// Tells why a line, of this number and name, is not done. That ends the run, as long as it is not to be left out.
     fn refuse(
         &mut self,
         source: &str,
-        number: u64,
+        (line, name): (u64, Option<&str>),
         step: u64,
         reason: &str,
         observer: &Observer,
-    ) -> Result<(), RankError> {
-        let text = format!("{}: step {step}: {}", place(source, number), OneLine(reason));
-        self.tell(step, None, Answer::Refused(&text));
+    ) {
+        let called = name.map_or(String::new(), |name| format!(" (\"{}\")", OneLine(name)));
+        let text = format!("{}{called}: step {step}: {}", place(source, line), OneLine(reason));
+        self.tell(step, name, Answer::Refused { line, reason: &text });
+        let is_past = source == LIVE && step >= self.steps;
         if self.skips || self.is_page && source == LIVE {
             if self.rank == Rank(0) {
                 observer.note(&format!("{text}; left out"));
             }
-            return Ok(());
+        } else if !is_past {
+            self.refusal = Some(format!("{text}; {MEND}{}", self.remedy));
         }
-        let text = format!("{text}; mend it, or leave out what cannot be done by --skip-refused");
-        Err(RankError::Agreed { text, exit: Exit::Usage })
     }
 
     fn answer(
@@ -397,6 +424,7 @@ impl Commander {
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
         self.crowds = Crowds::default();
+        self.state.done = 0;
         if !Event::ALL.iter().any(|&event| self.state.tells(event)) {
             return Ok(());
         }

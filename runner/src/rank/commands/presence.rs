@@ -24,8 +24,8 @@ fn subject(command: &Command) -> Option<GlobalId> {
     }
 }
 
-/// Which of all bodies that lines speak of there are.
-pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport) -> Result<Present, RankError> {
+/// All bodies that lines speak of.
+pub(super) fn spoken_of(lines: &[Line]) -> BTreeSet<GlobalId> {
     let mut ids = BTreeSet::new();
     for line in lines {
         match &line.action {
@@ -34,6 +34,12 @@ pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport
             Action::Ask(_) | Action::Tell(..) => {}
         }
     }
+    ids
+}
+
+/// Which of all bodies that lines speak of there are.
+pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport) -> Result<Present, RankError> {
+    let ids = spoken_of(lines);
     if ids.is_empty() {
         return Ok(Present::new());
     }
@@ -49,8 +55,41 @@ pub(super) fn find(lines: &[Line], world: &World, transport: &mut impl Transport
     Ok(present)
 }
 
+/// What a line does, if all of it can be done: bodies that have no name get the next ones from `next` on. `present` goes on with
+/// what is there afterwards. The error is why not.
+pub(super) fn acts(
+    line: &Line,
+    next: u64,
+    present: &mut Present,
+    crowds: &Crowds,
+    world: &World,
+) -> Result<Vec<Command>, String> {
+    let commands = match &line.action {
+        Action::Add(bodies) => crowds.check(bodies).and_then(|()| named(bodies, next))?,
+        Action::Do(commands) => commands.clone(),
+        Action::Ask(_) | Action::Tell(..) => Vec::new(),
+    };
+    check(&commands, present, world).map(|()| commands)
+}
+
+/// Bodies that have no name of their own get the next ones, as long as there are some.
+fn named(bodies: &[NewBody], mut next: u64) -> Result<Vec<Command>, String> {
+    let named = |new: &NewBody| {
+        let mut body = new.body;
+        if !new.is_named {
+            if next == u64::MAX {
+                return Err("no name is left above those of all bodies; give it one of its own".to_owned());
+            }
+            body.id = GlobalId(next);
+        }
+        next = next.max(body.id.0.saturating_add(1));
+        Ok(Command::Add(body))
+    };
+    bodies.iter().map(named).collect()
+}
+
 /// Whether all of these can be done, one after the other; `present` goes on with what is there afterwards. The error is why not.
-pub(super) fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(), String> {
+fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(), String> {
     let mut before: Vec<(GlobalId, Option<Option<Body>>)> = Vec::new();
     for command in commands {
         match outcome(command, present, world) {
