@@ -22,6 +22,15 @@ impl fmt::Display for OneLine<'_> {
     }
 }
 
+/// A text without the mark that some editors begin files with.
+pub(crate) fn unmarked(mut text: String) -> String {
+    const MARK: char = '\u{feff}';
+    if text.starts_with(MARK) {
+        text.drain(..MARK.len_utf8());
+    }
+    text
+}
+
 /// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
 const SIMILAR: f64 = 0.6;
 

@@ -4,6 +4,7 @@
 use crate::command::{Word, word};
 use crate::error::RunError;
 use crate::rank::{Held, Host, Next};
+use crate::wording::unmarked;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, stdin};
@@ -90,7 +91,7 @@ impl Driver {
     fn hear_all(&self, from: impl BufRead) {
         for (number, line) in (1..).zip(from.split(b'\n')) {
             let Ok(line) = line else { break };
-            let text = String::from_utf8_lossy(&line).trim().to_owned();
+            let text = unmarked(String::from_utf8_lossy(&line).trim().to_owned());
             if !text.is_empty() {
                 self.lock().hear(number, text);
                 self.more.notify_all();

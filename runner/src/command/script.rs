@@ -1,7 +1,7 @@
 //! A file of commands: a line for each, in any order of their steps.
 
 use super::text::{Line, parse};
-use crate::wording::OneLine;
+use crate::wording::{OneLine, unmarked};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
@@ -84,6 +84,7 @@ impl Script {
 
 fn read(path: &Path) -> Result<String, ScriptError> {
     std::fs::read_to_string(path)
+        .map(unmarked)
         .map_err(|error| ScriptError::Read { path: path.to_owned(), reason: error.to_string() })
 }
 

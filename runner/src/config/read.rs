@@ -5,6 +5,7 @@ use super::keys::{self, KEYS};
 use super::sections::{Config, TransportKind};
 use super::settings::{Override, Settings};
 use crate::scene::{self, SceneKind};
+use crate::wording::unmarked;
 use atoll_core::SetupError;
 use std::path::Path;
 use toml::{Table, Value};
@@ -94,7 +95,7 @@ impl Readers {
 fn read_file(path: &Path) -> Result<(String, String), ConfigError> {
     let file = path.display().to_string();
     match std::fs::read_to_string(path) {
-        Ok(text) => Ok((file, text)),
+        Ok(text) => Ok((file, unmarked(text))),
         Err(error) => Err(ConfigError::Read { file, reason: error.to_string() }),
     }
 }

@@ -34,6 +34,7 @@ pub(crate) use row::{Column, FARTHEST};
 pub(super) use statics::chain_of;
 
 use super::{Place, SceneError, large};
+use crate::wording::unmarked;
 use atoll_core::{Body, GlobalId, Kind, StaticBody};
 use csv_rows::CsvRows;
 use description::{Bodies, Description};
@@ -359,7 +360,7 @@ fn read_text(path: &Path) -> Result<String, SceneError> {
     let mut bytes = Vec::new();
     let read = File::open(path).and_then(|file| file.take(LONGEST_TEXT).read_to_end(&mut bytes));
     read.map_err(|error| SceneError::read(path, WHAT, error))?;
-    String::from_utf8(bytes).map_err(|error| {
+    String::from_utf8(bytes).map(unmarked).map_err(|error| {
         let line = error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|&&byte| byte == b'\n').count();
         let place = Place { line: Some(line as u64 + 1), ..Place::default() };
         SceneError::bad(path, place, "it is not UTF-8; save the file as that")
