@@ -4,6 +4,7 @@ use super::html::{Short, Text, Unit, Whole, table};
 use super::letter;
 use super::source::Source;
 use crate::config;
+use crate::plan::tiles;
 use std::fmt::Write as _;
 
 /// What the page is called.
@@ -149,7 +150,10 @@ fn facts(sources: &[Source]) -> String {
             let (made, all) = (source.steps()?, source.config.run.steps);
             Some(format!("{} of {}, {} each", Whole(made), Whole(all), Unit(source.time(1.0), "s")))
         }),
-        ("Tiles", |source| Some(source.tiles().map(|tiles| tiles.to_string()).join(" \u{d7} "))),
+        ("Tiles", |source| {
+            let how = source.config.run.retiling.map(|retiling| retiling.how);
+            Some(Text(&tiles::in_words(source.tiles(), how).replace(" x ", " \u{d7} ")).to_string())
+        }),
         ("Ranks and threads", |source| {
             let ranks = source.number("ranks").unwrap_or(source.config.run.ranks as f64);
             let threads = source.number("threads").or(source.config.run.threads.map(|threads| threads as f64));
