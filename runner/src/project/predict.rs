@@ -15,6 +15,9 @@ const MOVE: f64 = 120e-9;
 /// Bytes of a tile on its way, for each of its bodies and about as many contacts.
 const MOVED_BYTES: f64 = 150.0;
 
+/// A thread more helps with a tile for so many of its bodies, about.
+const WORTH_A_THREAD: u64 = 2000;
+
 /// What a number of ranks would take, by one rule of dealing tiles. Times are of a step, in milliseconds.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Prediction {
@@ -112,7 +115,7 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
             loads = messages(course, window, &assignment);
             loads_of = Some(window);
         }
-        let work = work(moment, &assignment, threads);
+        let work = work(moment, &course.windows[window].bodies, &assignment, threads);
         let busiest = work.iter().copied().fold(0.0, f64::max);
         let mean = work.iter().sum::<f64>() / ranks as f64;
         let with_messages = work.iter().zip(&loads).map(|(work, load)| work + network.busy(load)).fold(0.0, f64::max);
@@ -173,7 +176,7 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
 
 /// What each rank works in a step, in seconds. Its threads take the longest tiles first; what no tile accounts for is shared by
 /// tiles.
-fn work(moment: &Moment, assignment: &Assignment, threads: usize) -> Vec<f64> {
+fn work(moment: &Moment, bodies: &[u64], assignment: &Assignment, threads: usize) -> Vec<f64> {
     let ranks = assignment.ranks_of_tiles();
     let rest = moment.rest / ranks.len() as f64;
     if threads == 1 {
@@ -184,18 +187,22 @@ fn work(moment: &Moment, assignment: &Assignment, threads: usize) -> Vec<f64> {
         return work;
     }
     let mut tiles = vec![Vec::new(); assignment.ranks()];
-    for (&rank, &time) in ranks.iter().zip(&moment.tiles) {
-        tiles[rank as usize].push(f64::from(time) + rest);
+    for ((&rank, &time), &bodies) in ranks.iter().zip(&moment.tiles).zip(bodies) {
+        tiles[rank as usize].push((f64::from(time) + rest, bodies));
     }
     tiles.into_iter().map(|tiles| makespan(tiles, threads)).collect()
 }
 
-/// How long so many hands take for some jobs of which they take the longest first.
-fn makespan(mut jobs: Vec<f64>, hands: usize) -> f64 {
-    if jobs.len() < hands {
-        // All work within one after the other.
-        return jobs.iter().sum::<f64>() / hands as f64;
+/// How long so many hands take for some tiles, of which they take the longest first: each takes so long for one of them, and has so
+/// many bodies.
+fn makespan(tiles: Vec<(f64, u64)>, hands: usize) -> f64 {
+    if tiles.len() < hands {
+        // Whoever has none helps another, as far as that is worth it.
+        let shared = tiles.iter().map(|(time, _)| time).sum::<f64>() / hands as f64;
+        let alone = tiles.iter().map(|&(time, bodies)| time / (bodies / WORTH_A_THREAD).max(1) as f64);
+        return alone.fold(shared, f64::max);
     }
+    let mut jobs: Vec<f64> = tiles.into_iter().map(|(time, _)| time).collect();
     jobs.sort_unstable_by(|a, b| b.total_cmp(a));
     let mut busy = vec![0.0_f64; hands];
     for job in jobs {
@@ -297,6 +304,10 @@ mod tests {
         assert!(two.exchange_ms > sync && two.exchange_ms < sync + 0.01, "{two:?}");
         let threads = predict(&course, machine(1, 4), Balance::Off);
         assert!((threads.work_ms - 2.0).abs() < 1e-5 && (threads.efficiency - 1.0).abs() < 1e-5, "{threads:?}");
+        // A thread more is worth nothing to a tile of a thousand bodies.
+        let idle = predict(&course, machine(1, 64), Balance::Off);
+        assert!((idle.work_ms - 1.0).abs() < 1e-5, "{idle:?}");
+        assert!((makespan(vec![(8.0, 20_000)], 64) - 0.8).abs() < 1e-9 && makespan(vec![(8.0, 20_000)], 4) == 2.0);
         let many = predict(&course, machine(100, 1), Balance::Off);
         assert!(many.idle_ranks == 92 && many.work_ms > 0.99 && many.efficiency < 0.08, "{many:?}");
     }
