@@ -340,3 +340,44 @@ fn a_run_whose_folder_was_removed_says_so() {
         }
     }
 }
+
+#[test]
+fn what_is_lost_of_a_run_is_told_where_it_is_looked_at() {
+    let folder = tempdir().unwrap();
+    let (run, out) = (folder.path().join("run"), folder.path().join("out"));
+    let atoll = |words: &[&str]| {
+        let mut command = program::command();
+        program::run(command.args(words.iter().map(|word| match *word {
+            "RUN" => run.as_os_str(),
+            word => std::ffi::OsStr::new(word),
+        })))
+    };
+    let config = ["run", "configs/quickstart.toml", "--bodies", "500", "--steps", "4", "--record-every", "2"];
+    let ended = atoll(&[&config[..], &["--set", "tiles=bisected", "--set", "tile_count=6", "--out", "RUN"]].concat());
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let [page, picture] = ["page.html", "end.png"].map(|name| out.with_file_name(name).display().to_string());
+    let look: [&[&str]; 3] =
+        [&["report", "RUN", "--out", &page], &["render", "RUN", "--step", "4", "--out", &picture], &["info", "RUN"]];
+    for words in look {
+        let ended = atoll(words);
+        assert!(ended.code == Some(0) && ended.complaints().is_empty(), "{ended}");
+    }
+    let told = fs::read_to_string(&page).unwrap();
+    assert!(told.contains("6 tiles with borders that follow the bodies"), "{told}");
+    fs::remove_file(run.join("tilings.jsonl")).unwrap();
+    for words in look {
+        let ended = atoll(words);
+        assert_eq!((ended.code, ended.complaints().len()), (Some(0), 1), "{words:?}: {ended}");
+        assert!(ended.stderr.contains("tilings.jsonl: No such file") && ended.stderr.contains("bring back"), "{ended}");
+    }
+    let begun = fs::read_to_string(run.join("run.toml")).unwrap();
+    for damaged in [String::new(), begun.replace("steps = 4", "steps = = 4"), begun.replace("steps = 4", "stops = 4")] {
+        fs::write(run.join("run.toml"), &damaged).unwrap();
+        for words in [&["run", "--resume", "RUN"][..], look[0], look[2]] {
+            let ended = atoll(words);
+            assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{words:?}: {ended}");
+            assert!(ended.stderr.contains("its run.toml is damaged: "), "{words:?}: {ended}");
+            assert!(ended.stderr.contains("bring back a good copy of it"), "{words:?}: {ended}");
+        }
+    }
+}

@@ -3,7 +3,6 @@
 use super::args::InfoArgs;
 use super::console::complain;
 use super::output;
-use crate::config::Config;
 use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
@@ -28,7 +27,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         _ if folder.holds_run() => of_run(&folder, &mut trouble)?,
         Some("atoll") => of_snapshot_file(path)?,
         Some("parquet") => of_segment(path)?,
-        _ if path.is_dir() => match Snapshot::open(path)? {
+        _ if path.is_dir() => match folder
+            .damaged()
+            .map_or_else(|| Snapshot::open(path).map_err(RunError::from), |error| Err(error.into()))?
+        {
             Some(snapshot) => of_snapshot(&snapshot)?,
             None => {
                 return Err(folder.refusal("holds no run and no complete snapshot; name one, or a file of one").into());
@@ -47,7 +49,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
 
 /// `trouble` is what is wrong with a file that is damaged, of which the text tells as well.
 fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, RunError> {
-    let config = Config::load_begun(&folder.configuration())?;
+    let config = folder.begun()?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let tiling = tiles::in_words(tiles, config.run.retiling.map(|retiling| retiling.how));
@@ -103,6 +105,7 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
         Err(RecordingError::Nothing { .. }) => return Ok(format!("every {every} steps, none complete")),
         recording => recording?,
     };
+    recording.damage().iter().for_each(|damage| complain(damage));
     let (steps, files) = (recording.steps(), recording.files());
     let mut rows = Vec::new();
     steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;

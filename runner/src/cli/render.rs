@@ -148,7 +148,9 @@ fn open(args: &RenderArgs) -> Result<Source, RunError> {
         let reason = format!("a recording does not tell; {} runs it again, and shows it", again.display());
         return Err(unsuitable(option, reason));
     }
-    Ok(Source::Recorded(Box::new(Recorded::open(&args.source)?)))
+    let recorded = Recorded::open(&args.source)?;
+    recorded.recording().damage().iter().for_each(|damage| complain(damage));
+    Ok(Source::Recorded(Box::new(recorded)))
 }
 
 /// What a configuration is about to do.

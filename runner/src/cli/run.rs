@@ -126,7 +126,7 @@ fn configuration(args: &RunArgs, goes_on: bool) -> PathBuf {
 
 fn load(args: &RunArgs, goes_on: bool) -> Result<Config, RunError> {
     if let (None, Some(folder)) = (&args.config, folder(args)) {
-        folder.check_begun()?;
+        folder.begun()?;
     }
     Ok(Config::load(&configuration(args, goes_on), &args.overrides()?)?)
 }

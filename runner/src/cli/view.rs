@@ -42,6 +42,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Exit, RunError> {
     }
     let open = |folder: &std::path::PathBuf| Ok::<_, RunError>((name(folder), Recorded::open(folder)?));
     let recorded = args.sources.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    recorded.iter().filter_map(|(_, recorded)| recorded.recording().damage()).for_each(|damage| complain(&damage));
     let desk = Arc::new(Desk::new(args.speed));
     let player = Player::new(recorded, Arc::clone(&desk))
         .ok_or_else(|| unsuitable("SOURCE", "there is no step that all of these have a record of; name others"))?;

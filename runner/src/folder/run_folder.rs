@@ -11,8 +11,13 @@ use std::path::{Path, PathBuf};
 /// The name of what every process of a run holds.
 const LOCK: &str = "lock";
 
-/// The name of what tells of tiles that follow the bodies.
+/// The name of what says what is run.
+pub(super) const CONFIGURATION: &str = "run.toml";
+
+/// The name of what is done while it runs.
 const COMMANDS: &str = "commands.jsonl";
+
+/// The name of what tells of tiles that follow the bodies.
 pub(super) const TILINGS: &str = "tilings.jsonl";
 
 /// A folder that is, or is to be, that of a run.
@@ -36,7 +41,7 @@ impl RunFolder {
 
     /// The resolved configuration.
     pub fn configuration(&self) -> PathBuf {
-        self.path.join("run.toml")
+        self.path.join(CONFIGURATION)
     }
 
     /// The closing figures.
@@ -100,7 +105,9 @@ impl RunFolder {
         {
             // A run that was killed before it began leaves a little.
             Ok(true) => Ok(()),
-            Ok(false) => Err(self.refusal("it is not empty, and what it holds is no run; name another folder")),
+            Ok(false) => Err(self
+                .damaged()
+                .unwrap_or_else(|| self.refusal("it is not empty, and what it holds is no run; name another folder"))),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
             Err(error) => Err(self.refusal(format!("{error}; name a folder"))),
         }
@@ -127,7 +134,33 @@ impl RunFolder {
     /// If none was.
     pub fn check_begun(&self) -> Result<(), FolderError> {
         let begin = "no run was begun there; begin one with `atoll run CONFIG --out DIR`";
-        if self.holds_run() { Ok(()) } else { Err(self.refusal(begin)) }
+        if self.holds_run() { Ok(()) } else { Err(self.damaged().unwrap_or_else(|| self.refusal(begin))) }
+    }
+
+    /// That a run was begun here, by what else there is, and its configuration is not one any more.
+    pub fn damaged(&self) -> Option<FolderError> {
+        let is_run =
+            self.lock().is_file() && (self.snapshots().is_dir() || self.rank(0).is_dir() || self.log().is_file());
+        let reason = match fs::read_to_string(self.configuration()) {
+            _ if !is_run || self.holds_run() => return None,
+            Ok(_) => "it does not begin as runs write it".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        Some(self.bad_configuration(&reason))
+    }
+
+    fn bad_configuration(&self, reason: &str) -> FolderError {
+        self.refusal(format!("its {CONFIGURATION} is damaged: {reason}; bring back a good copy of it"))
+    }
+
+    /// The configuration of the run that was begun here.
+    ///
+    /// # Errors
+    /// If none was, or it is damaged.
+    pub fn begun(&self) -> Result<Config, FolderError> {
+        self.check_begun()?;
+        let config = Config::load_begun(&self.configuration());
+        config.map_err(|error| self.bad_configuration(&error.to_string()))
     }
 
     /// Refuses to go on with a run that is configured otherwise than the one here. More steps, or fewer, are no other run.
@@ -135,8 +168,7 @@ impl RunFolder {
     /// # Errors
     /// Naming the first key that differs; or if no run was begun here.
     pub fn check_same_run(&self, config: &Config, tiles: [u32; 2]) -> Result<(), FolderError> {
-        self.check_begun()?;
-        let begun = Config::load_begun(&self.configuration())?;
+        let begun = self.begun()?;
         other_run(&config.identity(tiles), &begun.identity(tiles_of(&begun))).map_or(Ok(()), |difference| {
             let Difference { key, ours, theirs } = difference;
             Err(self.refusal(format!("{key} = {theirs} there, and {ours} here; only how a run is spread can change")))

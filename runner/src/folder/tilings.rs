@@ -117,24 +117,45 @@ impl TilingsFile {
 
 /// The tilings that a run wrote down, ascending.
 #[derive(Clone, Default, Debug)]
-pub(crate) struct Tilings(Vec<(u64, Arc<Partition>)>);
+pub(crate) struct Tilings {
+    all: Vec<(u64, Arc<Partition>)>,
+    /// What is wrong with their file.
+    damage: Option<String>,
+}
 
 impl Tilings {
-    /// Those of a file, over columns x rows of squares. None if there is no such file. What comes after a line that cannot be
-    /// read is left out.
-    pub(crate) fn read(path: &Path, domain: [DVec2; 2], squares: [u32; 2]) -> Self {
-        let text = fs::read_to_string(path).unwrap_or_default();
+    /// Those of a file, over columns x rows of squares. None if there is no such file, which is as it should be unless tiles
+    /// `follow` the bodies. What comes after a line that cannot be read is left out.
+    pub(crate) fn read(path: &Path, domain: [DVec2; 2], squares: [u32; 2], follow: bool) -> Self {
+        let read = fs::read(path);
+        let missing = read.as_ref().err().filter(|_| follow).map(ToString::to_string);
+        let text = String::from_utf8_lossy(&read.unwrap_or_default()).into_owned();
         let tiling = |line: &str| {
             let Line { after, levels } = serde_json::from_str(line).ok()?;
             Some((after, Arc::new(of_letters(&levels, domain, squares)?)))
         };
-        Self(text.lines().map_while(tiling).collect())
+        let all: Vec<_> = text.lines().map_while(tiling).collect();
+        let is_empty = follow && all.is_empty();
+        // A run that was killed may leave half of a line.
+        let bad = text.split_inclusive('\n').nth(all.len()).filter(|line| line.ends_with('\n') || is_empty);
+        let bad = bad.map(|_| format!("line {} cannot be read", all.len() + 1));
+        let damage = missing.or(bad).or_else(|| is_empty.then(|| "it is empty".to_owned()));
+        let damage = damage.map(|reason| {
+            let path = path.display();
+            format!("{path}: {reason}, so tiles are not shown as they were; bring back a good copy of it")
+        });
+        Self { all, damage }
+    }
+
+    /// What is wrong with their file, if anything is, and how to mend it.
+    pub(crate) fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
     }
 
     /// The tiles with which a step was made, counted from one; of step 0 those that the run began with.
     pub(crate) fn at(&self, step: u64) -> Option<&Arc<Partition>> {
-        let before = self.0.partition_point(|(after, _)| *after < step).max(1);
-        self.0.get(before - 1).map(|(_, partition)| partition)
+        let before = self.all.partition_point(|(after, _)| *after < step).max(1);
+        self.all.get(before - 1).map(|(_, partition)| partition)
     }
 }
 
@@ -168,8 +189,12 @@ mod tests {
         let domain = [DVec2::ZERO, DVec2::new(2.0, 1.0)];
         let of = |levels: &[u8]| Partition::forest(domain[0], domain[1], 2, 1, levels).unwrap();
         let all = [of(&[0, 0]), of(&[1, 1, 1, 1, 0]), of(&[0, 1, 1, 1, 1]), of(&[1; 8])];
-        let at = |step| Tilings::read(&path, domain, [2, 1]).at(step).map(|partition| (**partition).clone());
+        let read = || Tilings::read(&path, domain, [2, 1], true);
+        let at = |step| read().at(step).map(|partition| (**partition).clone());
+        let damage = || read().damage().map(str::to_owned);
         assert_eq!(at(3), None);
+        assert!(damage().unwrap().contains("tilings.jsonl: No such file"));
+        assert_eq!(Tilings::read(&path, domain, [2, 1], false).damage(), None);
         let mut file = TilingsFile::start(path.clone(), &all[0], None).unwrap();
         for (after, partition) in [(0, &all[1]), (64, &all[2]), (128, &all[3])] {
             file.append(after, partition).unwrap();
@@ -182,5 +207,8 @@ mod tests {
         file.append(64, &all[2]).unwrap();
         fs::write(&path, fs::read_to_string(&path).unwrap() + "{\"after\":9").unwrap();
         assert_eq!(found([0, 1, 64, 65, 128, 129]), [0, 1, 1, 2, 2, 2].map(Some));
+        assert_eq!(damage(), None);
+        fs::write(&path, "{\"after\":0,\"levels\":\"q\"}\n").unwrap();
+        assert!(damage().unwrap().contains("line 1 cannot be read, so tiles are not shown as they were"));
     }
 }

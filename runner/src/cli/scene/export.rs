@@ -52,7 +52,7 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
     }
     let recorded = Recorded::open(&args.from)?;
     let folder = RunFolder::new("export", &args.from);
-    let mut config = Config::load_begun(&folder.configuration())?;
+    let mut config = folder.begun()?;
     if let Some(gravity) = gravity_of_commands(&folder, step)? {
         config.params.gravity = gravity;
     }

@@ -5,8 +5,9 @@ use super::record::Row;
 use super::segment::Segment;
 use super::stage::{Stage, StageText};
 use super::{RecordingError, rank_folder, rank_of_folder, steps_of_segment};
+use crate::config::Config;
 use crate::folder::ended::Ended;
-use crate::folder::run_folder::TILINGS;
+use crate::folder::run_folder::{CONFIGURATION, TILINGS};
 use crate::folder::tilings::Tilings;
 use atoll_core::{Partition, SetupError};
 use std::fs;
@@ -96,7 +97,10 @@ impl Recording {
         recording.stage = stage.map_err(bad)?;
         recording.ended = Ended::read(folder).ok().flatten();
         let RunFacts { domain, tiles, .. } = recording.facts;
-        recording.tilings = Tilings::read(&folder.join(TILINGS), domain, tiles);
+        // What cannot be read is complained about by who needs it.
+        let config = Config::load_begun(&folder.join(CONFIGURATION));
+        let follow = config.is_ok_and(|config| config.run.retiling.is_some());
+        recording.tilings = Tilings::read(&folder.join(TILINGS), domain, tiles, follow);
         (recording.steps, recording.incomplete) =
             recording.find_complete(recording.ended.as_ref().map(|ended| ended.steps))?;
         if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
@@ -168,6 +172,11 @@ impl Recording {
                 stage,
             )
         }))
+    }
+
+    /// What is wrong with the file that tells of tiles, if anything is: then they are not known.
+    pub(crate) fn damage(&self) -> Option<&str> {
+        self.tilings.damage()
     }
 
     /// The tiles with which a step was made, if they follow the bodies.

@@ -48,7 +48,10 @@ impl Report {
 
     /// What is wrong with files that the page does without.
     pub(crate) fn notes(&self) -> impl Iterator<Item = &str> {
-        self.sources.iter().filter_map(|source| source.damaged.as_deref())
+        self.sources.iter().flat_map(|source| {
+            let tiles = source.recording.as_ref().and_then(|recording| recording.damage());
+            source.damaged.as_deref().into_iter().chain(tiles)
+        })
     }
 
     /// The page.

@@ -40,8 +40,7 @@ impl Source {
     /// If there is no run, or what is there cannot be read.
     pub(super) fn read(path: &Path) -> Result<Self, RunError> {
         let folder = RunFolder::new("report", path);
-        folder.check_begun()?;
-        let config = Config::load_begun(&folder.configuration())?;
+        let config = folder.begun()?;
         let unreadable = |name: &str, error: &dyn std::fmt::Display| -> RunError {
             folder.refusal(format!("{name}: {error}; remove it, or bring back a good copy of it")).into()
         };
