@@ -237,10 +237,35 @@ fn read(text: &str) -> Result<Raw, String> {
     // On one line, lines are of no use.
     let short = |error: serde_json::Error| {
         let text = error.to_string();
+        let place = |words: &str| format!("{}, at column {}", plain(words), error.column());
         text.strip_suffix(&format!(" at line {} column {}", error.line(), error.column()))
-            .map_or_else(|| text.clone(), |words| format!("{words}, at column {}", error.column()))
+            .map_or_else(|| plain(&text), place)
     };
     serde_json::from_str(text).map_err(short)
+}
+
+/// What does not fit, in words of JSON and not of this program.
+fn plain(words: &str) -> String {
+    let Some((what, must)) = words.strip_prefix("invalid ").and_then(|rest| rest.rsplit_once(", expected ")) else {
+        return words.to_owned();
+    };
+    let found = what.split_once(": ").map_or("sequence", |(_, found)| found).replace('`', "");
+    let found = match found.as_str() {
+        "map" => "an object",
+        "sequence" => "a list",
+        other => {
+            ["integer ", "floating point ", "boolean "].iter().find_map(|of| other.strip_prefix(of)).unwrap_or(other)
+        }
+    };
+    let must = match must {
+        "u64" | "u32" => "a whole number that is not negative",
+        "f64" | "f32" => "a number",
+        "a boolean" => "true or false",
+        "an array of length 2" => "two numbers in a list",
+        must if must == "a map" || must.starts_with("struct ") => "an object, {...}",
+        must => must,
+    };
+    format!("{found} stands where {must} must")
 }
 
 fn action(raw: Raw) -> Result<Action, String> {
