@@ -1,7 +1,7 @@
 //! A world that bodies are put into and taken out of while it runs, and that is asked what is where.
 
+use atoll_core::glam::{DVec2, Vec2};
 use atoll_core::*;
-use glam::{DVec2, Vec2};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let solid = |shape| Kind::new(shape, Material::default());

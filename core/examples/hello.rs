@@ -1,7 +1,7 @@
 //! A box falls on a floor.
 
+use atoll_core::glam::{DVec2, Vec2};
 use atoll_core::*;
-use glam::{DVec2, Vec2};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let solid = |width, height| Kind::new(Shape::rectangle(width, height), Material::default());

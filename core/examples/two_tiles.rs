@@ -1,9 +1,9 @@
 //! Two tiles, a halo of one's own, and a disc that flies from one tile into the other.
 
+use atoll_core::glam::{DVec2, Vec2};
 use atoll_core::{
     Blueprint, Body, GlobalId, Halo, Inbox, Kind, KindId, Material, Outbox, Params, Partition, Shape, World, step,
 };
-use glam::{DVec2, Vec2};
 use std::convert::Infallible;
 
 /// Delivers as [`atoll_core::Loopback`] does, and counts what it delivers.
@@ -15,7 +15,7 @@ impl Halo for Counting {
     type Error = Infallible;
     fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), Infallible> {
         self.messages += outbox.messages().count();
-        outbox.deliver(inbox);
+        let _ = outbox.deliver(inbox);
         Ok(())
     }
 }

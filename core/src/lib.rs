@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use atoll_core::*;
-//! use glam::{DVec2, Vec2};
+//! use atoll_core::glam::{DVec2, Vec2};
 //!
 //! let solid = |width, height| Kind::new(Shape::rectangle(width, height), Material::default());
 //! let blueprint = Blueprint {
@@ -78,6 +78,9 @@ mod step;
 mod testing;
 mod tiling;
 mod world;
+
+/// The vectors that are spoken of here, in the version that is meant.
+pub use glam;
 
 pub use exchange::codec::{FORMAT, Frames};
 pub use exchange::halo::{Halo, Loopback, NotHere};

@@ -141,6 +141,7 @@ impl Outbox {
     /// Sees to it that every message for a tile that `inbox` holds is received there, without copying, and this rank's
     /// own verdict. Returns the destination of the first message that is for others to receive, if there is one. All
     /// stay readable here until the sync point is over.
+    #[must_use = "messages for tiles of other ranks are still to be sent"]
     pub fn deliver(&mut self, inbox: &mut Inbox) -> Option<TileId> {
         inbox.hear(self.verdict);
         let mut for_others = None;

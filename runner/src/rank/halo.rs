@@ -103,7 +103,7 @@ impl<T: Transport> Halo for RankHalo<T> {
         self.waited += self.incoming.waited();
         let begun = thread_time();
         // What stays on this rank never becomes bytes.
-        outbox.deliver(inbox);
+        let _ = outbox.deliver(inbox);
         inbox.hear(Verdict::from_word(self.incoming.flag_word()));
         for (from, bytes) in self.incoming.iter().filter(|(_, bytes)| !bytes.is_empty()) {
             inbox.decode(bytes).map_err(|error| ExchangeError::Frame { from, error })?;

@@ -278,7 +278,7 @@ impl Halo for Scribe {
                 self.records.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
             }
         }
-        outbox.deliver(inbox);
+        let _ = outbox.deliver(inbox);
         Ok(())
     }
 }

@@ -38,7 +38,7 @@ impl Halo for Counting {
             carried.impulses += message.impulses.len();
         }
         self.0.push(carried);
-        outbox.deliver(inbox);
+        let _ = outbox.deliver(inbox);
         Ok(())
     }
 }

@@ -149,7 +149,7 @@ impl Halo for Lossy {
         if outbox.moment() == self.loses {
             inbox.hear(outbox.verdict());
         } else {
-            outbox.deliver(inbox);
+            let _ = outbox.deliver(inbox);
         }
         Ok(())
     }
