@@ -73,6 +73,17 @@ pub enum RunError {
         /// Bytes free.
         available: u64,
     },
+    /// More bodies at one place than any world is meant to have.
+    #[error(
+        "too crowded: at least {pairs} pairs of the {bodies} bodies are nearer to each other than they are wide, and each would \
+         be a contact; give them more room, or make them smaller"
+    )]
+    Crowded {
+        /// Pairs that are too near, at least.
+        pairs: u64,
+        /// Bodies.
+        bodies: u64,
+    },
     /// An option, or what stands for one, that does not suit what it is used with.
     #[error("{option}: {reason}")]
     Unsuitable {
@@ -328,6 +339,7 @@ impl RunError {
             | Self::Recording(_)
             | Self::Log(_)
             | Self::TooLarge { .. }
+            | Self::Crowded { .. }
             | Self::Threads { .. }
             | Self::NeedsProcesses { .. }
             | Self::Mismatch { .. }

@@ -78,3 +78,21 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
         }
     }
 }
+
+/// Four thousand boxes within half a meter: each would touch all others.
+#[test]
+fn a_world_that_is_too_crowded_is_refused() {
+    let folder = tempdir().unwrap();
+    let scene = folder.path().join("world.toml");
+    let text = "format = \"atoll-scene/1\"\ndomain = [[0, 0], [10, 10]]\n[[kinds]]\nbox = [0.5, 0.5]\n[bodies]\npath = \"b.csv\"\n";
+    std::fs::write(&scene, "\u{feff}".to_owned() + text).unwrap();
+    let place = |k: u32| format!("{},{}\n", 4.6 + 0.003 * f64::from(k % 64), 4.6 + 0.003 * f64::from(k / 64));
+    std::fs::write(folder.path().join("b.csv"), "\u{feff}x,y\n".to_owned() + &(0..4000).map(place).collect::<String>())
+        .unwrap();
+    for ranks in ["1", "2"] {
+        let mut command = program::command();
+        let ended = program::run(command.arg("run").arg(&scene).args(["--quiet", "--tiles=2x1", "--ranks", ranks]));
+        assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
+        assert!(ended.stderr.contains("too crowded: at least 7998000 pairs of the 4000 bodies are nearer"), "{ended}");
+    }
+}

@@ -211,9 +211,9 @@ mod tests {
     #[test]
     fn a_rank_that_dies_in_the_middle_ends_the_run_on_all() {
         let plan = plan();
-        // Three rounds before the first step, then one a step.
+        // Four rounds before the first step, then one a step.
         let ends = channel::run(3, ChannelOptions::default(), |inner| {
-            rank::drive(Dying { inner, rounds_left: 7 }, &plan, &Observer::default(), false)
+            rank::drive(Dying { inner, rounds_left: 8 }, &plan, &Observer::default(), false)
         });
         let error = outcome(&plan, ends, 0).unwrap_err();
         assert_eq!(error.to_string(), "rank 1 was lost after 4 of 9 steps: rank 1 panicked: on purpose");

@@ -1,11 +1,12 @@
 //! How a rank begins: with its part of the scene, or of a snapshot.
 
 use super::trouble::{Refusal, all_well};
-use super::{Observer, RankError, names};
+use super::{Observer, RankError, names, records};
 use crate::command::State;
 use crate::error::RunError;
 use crate::folder::snapshot::{NO_OTHER, Snapshot, SnapshotError};
 use crate::plan::{Assignment, Holding, Plan};
+use crate::scene::MOST_AT_A_PLACE;
 use atoll_core::{Blueprint, Body, World};
 use atoll_transport::{Collective, Rank, Transport};
 use tracing::info;
@@ -51,6 +52,25 @@ pub(super) fn build(
     }
     let world = if plan.scene.file().is_some() { from_files(plan, rank, transport)? } else { made(plan, rank)? };
     Ok(Beginning { world, assignment: plan.assignment.clone(), resumed: None, commands: None })
+}
+
+/// So many pairs of bodies may be nearer than they are wide in any world: as many as files may have at one place.
+const PAIRS: u64 = (MOST_AT_A_PLACE * MOST_AT_A_PLACE / 2) as u64;
+
+/// And so many for each body: more than memory has room for, and no world that is meant.
+const PAIRS_OF_A_BODY: u64 = 100;
+
+/// Refuses a world in which far too many bodies are too near to each other, of all ranks, before contacts are looked for.
+pub(super) fn check_crowding(world: &World, transport: &mut impl Transport) -> Result<(), RankError> {
+    let own = [world.crowding(), world.body_count() as u64];
+    let told = transport.all_gather(bytemuck::bytes_of(&own)).map_err(RankError::Transport)?;
+    let told: Vec<[u64; 2]> = records(&told).map_err(RankError::Transport)?;
+    let [pairs, bodies] = [0, 1].map(|which| told.iter().map(|counts| counts[which]).sum::<u64>());
+    if pairs <= PAIRS + PAIRS_OF_A_BODY * bodies {
+        return Ok(());
+    }
+    let error = RunError::Crowded { pairs, bodies };
+    Err(RankError::Agreed { text: error.to_string(), exit: error.exit() })
 }
 
 /// This rank's part of a scene that is made, with which nothing can be wrong on one rank alone.

@@ -145,6 +145,7 @@ fn run<T: Transport>(
     let mut halo = RankHalo::new(Counting::new(transport), plan.assignment.clone());
     let Beginning { mut world, assignment, resumed, commands } = begin::build(plan, rank, observer, halo.transport())?;
     halo.assign(assignment);
+    begin::check_crowding(&world, halo.transport())?;
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
     let logs = log::find(plan, resumed, halo.transport())?;
