@@ -32,6 +32,9 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// How often is looked whether all is over.
 const POLL: Duration = Duration::from_millis(50);
 
+/// How long a page that was told all may take to hang up.
+const FAREWELL: Duration = Duration::from_secs(1);
+
 /// What there is to get, with its type.
 const FILES: [(&str, &str, &str); 14] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
@@ -144,7 +147,7 @@ fn accept(listener: &TcpListener, door: &Door) {
         }
     }
     let asked = Instant::now();
-    while door.open.load(Ordering::Relaxed) > 0 && asked.elapsed() < 4 * POLL {
+    while door.open.load(Ordering::Relaxed) > 0 && asked.elapsed() < FAREWELL + 4 * POLL {
         thread::sleep(POLL / 10);
     }
 }
@@ -296,6 +299,12 @@ fn serve_page(mut stream: TcpStream, door: &Door, page: PageId, key: &str) -> io
         }
     }
     let _ = output.close(None).and_then(|()| output.flush());
+    // To hang up on what the page still says would take from it what it has not read yet.
+    let _ = stream.shutdown(std::net::Shutdown::Write);
+    let asked = Instant::now();
+    while !gone.load(Ordering::Relaxed) && asked.elapsed() < FAREWELL {
+        thread::sleep(POLL / 10);
+    }
     // Also wakes the reader.
     let _ = stream.shutdown(std::net::Shutdown::Both);
     let _ = reader.join();

@@ -15,10 +15,9 @@ const KEYS = [
   ["Esc", "let go of a body"],
 ];
 
+// What the button says follows once the run has heard it, which other pages may have told something else.
 function play() {
-  state.playing = !state.playing;
-  at("play").textContent = state.playing ? "Pause" : "Play";
-  tell({ do: state.playing ? "play" : "pause" });
+  tell({ do: state.playing ? "pause" : "play" });
 }
 
 function step(by) {
