@@ -119,8 +119,13 @@ fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
             "{note}"
         );
         served.interrupt();
-        heard(&mut page, "over");
-        assert_eq!(served.end().code, Some(130));
+        if let Way::Mpi(_) = way {
+            // What mpirun does about an interrupt of its own is its business.
+            served.end();
+        } else {
+            heard(&mut page, "over");
+            assert_eq!(served.end().code, Some(130), "{way}");
+        }
     }
     let mut command = program::command();
     command.args(["view", "configs/quickstart.toml", "--ranks", "2", "--commands"]).arg(&acts);
