@@ -161,10 +161,7 @@ impl World {
                 (after.velocity, after.angular_velocity) = (velocity, angular_velocity);
             }
             Command::Impulse { impulse, at, angular, .. } => strike(&mut after, kind, impulse, at, angular),
-            Command::Force { force, torque, .. } => {
-                let dt = self.setup.params.dt;
-                strike(&mut after, kind, force * dt, None, torque * dt);
-            }
+            Command::Force { force, torque, .. } => after = self.pushed(body, force, torque),
             Command::SetKind { kind, .. } => after.kind = kind,
             Command::Add(_) | Command::Remove(_) | Command::AddKind(_) | Command::SetGravity(_) | Command::Wake(_) => {}
         }
@@ -174,6 +171,13 @@ impl World {
             Command::Force { .. } => Ok(body),
             _ => Ok(after),
         }
+    }
+
+    /// What a force makes of a body within a step.
+    fn pushed(&self, mut body: Body, force: Vec2, torque: f32) -> Body {
+        let (kind, dt) = (self.setup.kind(body.kind), self.setup.params.dt);
+        strike(&mut body, kind, force * dt, None, torque * dt);
+        Body { angular_velocity: kind.turning(body.angular_velocity), ..body }
     }
 
     /// Changes a body, which wakes; says whether it is here.
@@ -192,15 +196,9 @@ impl World {
     /// Before a step: lets forces push.
     pub(crate) fn push(&mut self) {
         let mut forces = std::mem::take(&mut self.forces);
-        let dt = self.setup.params.dt;
         for Force { id, force, torque, left } in &mut forces {
-            let pushed = |world: &Self, mut body: Body| {
-                let kind = world.setup.kind(body.kind);
-                strike(&mut body, kind, *force * dt, None, *torque * dt);
-                // The step says who is no longer finite.
-                Ok(Body { angular_velocity: kind.turning(body.angular_velocity), ..body })
-            };
-            self.change(*id, pushed).expect("nothing is refused");
+            // The step says who is no longer finite.
+            self.change(*id, |world, body| Ok(world.pushed(body, *force, *torque))).expect("nothing is refused");
             *left -= 1;
         }
         forces.retain(|force| force.left > 0);

@@ -27,15 +27,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         _ if folder.holds_run() => of_run(&folder, &mut trouble)?,
         Some("atoll") => of_snapshot_file(path)?,
         Some("parquet") => of_segment(path)?,
-        _ if path.is_dir() => match folder
-            .damaged()
-            .map_or_else(|| Snapshot::open(path).map_err(RunError::from), |error| Err(error.into()))?
-        {
-            Some(snapshot) => of_snapshot(&snapshot)?,
-            None => {
-                return Err(folder.refusal("holds no run and no complete snapshot; name one, or a file of one").into());
-            }
-        },
+        _ if path.is_dir() => {
+            folder.damaged().map_or(Ok(()), Err)?;
+            let nothing = || folder.refusal("holds no run and no complete snapshot; name one, or a file of one");
+            of_snapshot(&Snapshot::open(path)?.ok_or_else(nothing)?)?
+        }
         _ => {
             return Err(folder
                 .refusal("is no run, snapshot or recording; name a folder, a .atoll or a .parquet file")

@@ -203,9 +203,8 @@ impl Desk {
                 page.texts.push(text(&Say::Note { text: full }));
             }
         }
-        let now = inner.pace.say();
-        if now != was.say() {
-            inner.tell(&now);
+        if inner.pace.say() != was.say() {
+            inner.tell_pace();
             self.ready.notify_all();
         }
         drop(inner);
@@ -241,8 +240,7 @@ impl Desk {
         inner.tell(&greeting);
         if matches!(greeting, Say::Hello(_)) {
             inner.greeting.clear();
-            let pace = inner.pace.say();
-            inner.tell(&pace);
+            inner.tell_pace();
         }
         inner.greeting.retain(|earlier| discriminant(earlier) != discriminant(&greeting));
         inner.greeting.push(greeting);
@@ -331,8 +329,7 @@ impl Desk {
     pub(crate) fn pause(&self) {
         let mut inner = self.lock();
         inner.pace.playing = false;
-        let pace = inner.pace.say();
-        inner.tell(&pace);
+        inner.tell_pace();
         drop(inner);
         self.ready.notify_all();
     }
@@ -390,6 +387,10 @@ impl Inner {
             }
             page.texts.push(text(say));
         }
+    }
+
+    fn tell_pace(&mut self) {
+        self.tell(&self.pace.say());
     }
 }
 

@@ -71,6 +71,10 @@ const LIVE: &str = "what was said";
 /// How to go on without what was refused.
 const MEND: &str = "mend it, or leave out what cannot be done by --skip-refused";
 
+fn lines_are(count: usize) -> String {
+    if count == 1 { "1 line is".to_owned() } else { format!("{count} lines are") }
+}
+
 /// Where a line stands. What pages say has no numbers.
 fn place(source: &str, number: u64) -> String {
     if number == 0 { "a hand on the page".to_owned() } else { format!("{source}: line {number}") }
@@ -131,9 +135,9 @@ impl Commander {
         }
         let opened = if rank == Rank(0) { commander.open(plan, from) } else { Ok(()) };
         all_well(transport, opened.as_ref().err())?;
-        let late = commands.late(from, done_before);
-        if rank == Rank(0) && late > 0 {
-            let lines = if late == 1 { "1 line is".to_owned() } else { format!("{late} lines are") };
+        let late = if rank == Rank(0) { commands.late(from, done_before) } else { 0 };
+        if late > 0 {
+            let lines = lines_are(late);
             observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", commander.source));
         }
         Ok(commander)
@@ -184,8 +188,7 @@ impl Commander {
             && !self.is_over()
             && let [first, others @ ..] = &self.lines[self.next..]
         {
-            let (rest, step) = (others.len() + 1, first.step);
-            let rest = if rest == 1 { "1 line is".to_owned() } else { format!("{rest} lines are") };
+            let (rest, step) = (lines_are(others.len() + 1), first.step);
             observer.note(&format!("{}: {rest} for steps from {step} on, which were not made", self.source));
         }
         all_well(transport, self.failure.as_ref()).map_err(Into::into)

@@ -20,8 +20,8 @@ function play() {
   tell({ do: state.playing ? "pause" : "play" });
 }
 
+// Time stands still then.
 function step(by) {
-  if (state.playing) play();
   tell({ do: "step", by });
 }
 
