@@ -11,7 +11,7 @@ pub(crate) enum Answer {
     Rest,
     /// It came in fast, and parts.
     Part(Parting),
-    /// It came apart, and only a blow within the step had it press: if that gave it more than this speed, in m/s, the blow is
+    /// Both bodies flew, and only a blow within the step had them press here: if that gave more than this speed, in m/s, it is
     /// passed on in the next step, as one between bodies that come in fast.
     NotYet(f32),
 }

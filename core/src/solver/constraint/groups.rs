@@ -31,6 +31,8 @@ pub(crate) struct Groups {
     pub(super) bouncing: Vec<u32>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
+    /// For each body whether something held it as the step began, where that was asked.
+    pub(super) holds: Vec<Option<bool>>,
 }
 
 /// A contact that may bounce.

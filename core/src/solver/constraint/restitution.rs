@@ -4,8 +4,7 @@ use super::bounce::{Answer, Parting};
 use super::columns::Columns;
 use super::groups::{Bounce, Groups, Lane};
 use super::rows::Source;
-use crate::collide::broad_phase::Pair;
-use crate::model::contact::Contact;
+use crate::model::kind::KindRow;
 use crate::model::math::{dot, max, right_perp, turn};
 use crate::model::params::Exchange;
 use crate::solver::batches::{Batch, Batches};
@@ -19,29 +18,32 @@ const PASSES_OFF_STATICS: usize = 200;
 /// The part of the speed at which a contact closed that a pass may leave wrong.
 const EXACT: f32 = 1e-5;
 
+/// What is held comes nearer or parts by no more than gravity gives it in so many steps.
+const STILL: f32 = 4.0;
+
 impl Groups {
     /// Finds the contacts that may bounce, in the order in which they do in each batch.
     pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
         self.bounces.clear();
         self.bouncing.clear();
         self.bounces_at_once.clear();
+        let threshold = source.setup.params.restitution_threshold;
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
-            let sides = source.contacts.bodies[i];
-            let kinds = sides.map(|body| source.setup.kind(source.tile.bodies.kind[body as usize]));
+            let kinds = source.kinds_of(i);
             let restitution = max(kinds[0].material.restitution, kinds[1].material.restitution);
             if restitution > 0.0 && self.is_solved(i as u32) {
-                let threshold = source.setup.params.restitution_threshold;
                 let mut answers = [Answer::Rest; 2];
                 let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
-                    let separation = source.contacts.separation[i][point];
-                    let [closing, slip] = meeting_speeds(source, sides, contact, point, separation);
+                    let [closing, slip] = source.meeting_speeds(i, point);
                     fastest = max(fastest, closing);
-                    if closing > threshold {
-                        *answer = Answer::Part(Parting { closing, slip, speed: restitution * closing });
-                    } else if closing < 0.0 && contact.points[point].normal_impulse == 0.0 {
-                        *answer = Answer::NotYet(threshold);
-                    }
+                    *answer = if closing > threshold {
+                        Answer::Part(Parting { closing, slip, speed: restitution * closing })
+                    } else if source.holds(i, point, closing) {
+                        Answer::Rest
+                    } else {
+                        Answer::NotYet(threshold)
+                    };
                 }
                 if answers != [Answer::Rest; 2] {
                     let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
@@ -51,6 +53,7 @@ impl Groups {
                 }
             }
         }
+        self.leave_held(source);
         self.bouncing.extend(self.bounces.iter().map(|bounce| bounce.contact));
         let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
@@ -64,6 +67,37 @@ impl Groups {
         self.bounces_at_once.sort_by(first);
         let lanes = &self.lanes;
         self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+    }
+
+    /// Has points rest that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
+    /// what lies above: without it that would be thrown down, and what bounces off would have more energy than there was.
+    fn leave_held(&mut self, source: Source<'_>) {
+        let Self { bounces, bounces_at_once, holds: held, .. } = self;
+        let sides = |contact: usize| source.contacts.bodies[contact].map(|body| body as usize);
+        let is_not_yet = |answer: &Answer| matches!(answer, Answer::NotYet(_));
+        held.clear();
+        held.resize(source.tile.bodies.len(), None);
+        let asked = bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.answers.iter().any(is_not_yet));
+        for contact in asked.map(|bounce| bounce.contact as usize) {
+            for (body, kind) in sides(contact).into_iter().zip(source.kinds_of(contact)) {
+                held[body] = (kind.inv_mass > 0.0).then_some(false);
+            }
+        }
+        for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
+            let mut points = 0..contact.point_count();
+            if sides(i).iter().any(|&body| held[body] == Some(false))
+                && points.any(|point| source.holds(i, point, source.meeting_speeds(i, point)[0]))
+            {
+                sides(i).into_iter().for_each(|body| held[body] = held[body].and(Some(true)));
+            }
+        }
+        let is_held = |bounce: &Bounce| sides(bounce.contact as usize).iter().any(|&body| held[body] == Some(true));
+        for bounces in [bounces, bounces_at_once] {
+            for bounce in bounces.iter_mut().filter(|bounce| is_held(bounce)) {
+                bounce.answers.iter_mut().filter(|answer| is_not_yet(answer)).for_each(|answer| *answer = Answer::Rest);
+            }
+            bounces.retain(|bounce| bounce.answers != [Answer::Rest; 2]);
+        }
     }
 
     /// Whether a contact whose batch keeps its rows is among those.
@@ -104,24 +138,42 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mu
     }
 }
 
-/// Speeds at which a point's surfaces will come nearer as they touch, and slide along each other, in m/s. The first is that of now, and
-/// what a gravity that only one of the bodies feels adds over the gap between them. Without that each bounce loses a step's fall.
-fn meeting_speeds(source: Source<'_>, sides: Pair, contact: &Contact, point: usize, separation: f32) -> [f32; 2] {
-    let (bodies, setup) = (&source.tile.bodies, source.setup);
-    let anchor = contact.points[point].anchor;
-    let tangent = right_perp(contact.normal);
-    let motion = |body: u32, arm: Vec2, runs: f32| {
-        let i = body as usize;
-        let kind = setup.kind(bodies.kind[i]);
-        let falls = kind.inv_mass > 0.0;
-        let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
-        let belt = tangent * (runs * kind.material.surface_speed);
-        (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
-    };
-    let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
-        (motion(sides[0], anchor, 1.0), motion(sides[1], anchor - contact.offset, -1.0));
-    let closing = -dot(velocity_b - velocity_a, contact.normal);
-    let pull = -dot(gravity_b - gravity_a, contact.normal);
-    let touching = max(closing * closing + 2.0 * pull * max(separation, 0.0), 0.0).sqrt();
-    [if closing > 0.0 { touching } else { closing }, dot(velocity_b - velocity_a, tangent)]
+impl<'a> Source<'a> {
+    fn kinds_of(self, contact: usize) -> [&'a KindRow; 2] {
+        self.contacts.bodies[contact].map(|body| self.setup.kind(self.tile.bodies.kind[body as usize]))
+    }
+
+    /// Whether a point that comes nearer at that speed, in m/s, held its bodies in the last step, and does so yet: they come nearer or
+    /// part slowly, as what lies in a pile does.
+    fn holds(self, contact: usize, point: usize, closing: f32) -> bool {
+        let params = &self.setup.params;
+        let scales = self.kinds_of(contact).map(|kind| kind.dynamics.gravity_scale.abs());
+        let slow =
+            params.restitution_threshold + STILL * max(scales[0], scales[1]) * params.gravity.length() * params.dt;
+        self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && closing.abs() <= slow
+    }
+
+    /// Speeds at which a point's surfaces will come nearer as they touch, and slide along each other, in m/s. The first is that of now,
+    /// and what a gravity that only one of the bodies feels adds over the gap between them. Without that each bounce loses a step's fall.
+    fn meeting_speeds(self, contact: usize, point: usize) -> [f32; 2] {
+        let (bodies, setup, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
+        let separation = self.contacts.separation[contact][point];
+        let contact = &self.tile.contacts.contacts[contact];
+        let anchor = contact.points[point].anchor;
+        let tangent = right_perp(contact.normal);
+        let motion = |body: u32, arm: Vec2, runs: f32| {
+            let i = body as usize;
+            let kind = setup.kind(bodies.kind[i]);
+            let falls = kind.inv_mass > 0.0;
+            let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
+            let belt = tangent * (runs * kind.material.surface_speed);
+            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
+        };
+        let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
+            (motion(a, anchor, 1.0), motion(b, anchor - contact.offset, -1.0));
+        let closing = -dot(velocity_b - velocity_a, contact.normal);
+        let pull = -dot(gravity_b - gravity_a, contact.normal);
+        let touching = max(closing * closing + 2.0 * pull * max(separation, 0.0), 0.0).sqrt();
+        [if closing > 0.0 { touching } else { closing }, dot(velocity_b - velocity_a, tangent)]
+    }
 }
