@@ -28,24 +28,63 @@ fn gas(side: u64, apart: f64, radius: f32, speed: f32, restitution: f32) -> Scen
     scene
 }
 
-/// Defect: with exchange "step" they gained energy without bound, which the program warns of; and on one tile they lost three
-/// quarters of it.
+/// Defect: with exchange "step" they gained energy without bound, which the program warns of; on one tile they lost three quarters
+/// of it, as who was hit and met another in the same step was stopped there; and over borders as much of what bounced is sure as both
+/// owners know of.
 #[test]
-fn discs_of_restitution_1_gain_no_energy() {
-    for grid in [(1, 1), (2, 3), (4, 4), (7, 7), (12, 12)] {
-        let mut scene = gas(14, 1.0, 0.2, 5.0, 1.0);
+fn discs_of_restitution_1_keep_their_energy() {
+    for (grid, side, apart, steps, keep) in [
+        ((1, 1), 14, 1.0, 3000, 0.99),
+        ((2, 3), 14, 1.0, 3000, 0.99),
+        ((7, 7), 14, 1.0, 3000, 0.99),
+        ((12, 12), 14, 1.0, 3000, 0.99),
+        // Two centimeters between them: each meets several others in each step.
+        ((1, 1), 40, 0.42, 120, 0.97),
+        ((5, 5), 40, 0.42, 120, 0.95),
+    ] {
+        let mut scene = gas(side, apart, 0.2, 5.0, 1.0);
         scene.params.restitution_threshold = 0.0;
         let mut sim = scene.start_on(grid, Exchange::Substep);
         let before = sim.kinetic_energy();
         let mut most = 0.0_f64;
         for _ in 0..30 {
-            sim.run(100);
+            sim.run(steps / 30);
             most = most.max(sim.kinetic_energy() / before);
         }
         let after = sim.kinetic_energy() / before;
-        println!("{grid:?}: at most {most:.4}, at the end {after:.4} of the energy");
-        assert!(most < 1.005, "{grid:?}: {most} of the energy there was");
-        assert!(after > 0.8 || grid != (1, 1), "{after} of the energy is left");
+        println!("{grid:?}, {apart} m apart: at most {most:.4}, at the end {after:.4} of the energy");
+        assert!(most < 1.005, "{grid:?}, {apart} m apart: {most} of the energy there was");
+        assert!(after > keep, "{grid:?}, {apart} m apart: {after} of the energy is left");
+    }
+}
+
+/// What a blow within a step gives is passed on in the next one, and what lies in a pile is not: that would be thrown about for ever.
+#[test]
+fn what_bounces_comes_to_rest_in_a_bin() {
+    for (shape, restitution) in [(Shape::circle(0.2), 0.9), (Shape::rectangle(0.4, 0.4), 0.5)] {
+        for (threshold, exchange, grid) in [(1.0, Exchange::Step, (1, 1)), (0.0, Exchange::Substep, (3, 3))] {
+            let mut scene = gas(20, 0.6, 0.2, 1.0, restitution);
+            scene.params.gravity = Vec2::new(0.0, -10.0);
+            scene.params.restitution_threshold = threshold;
+            scene.kinds[0].shape = shape.clone();
+            let weight = 10.0 * scene.kinds[0].shape.area() * scene.kinds[0].material.density;
+            let mut sim = scene.start_on(grid, exchange);
+            let energy = |sim: &Sim| {
+                let heights: f64 = sim.world.bodies().map(|body| body.position.y).sum();
+                sim.kinetic_energy() + f64::from(weight) * heights
+            };
+            let (begun, mut before, mut gained) = (energy(&sim), energy(&sim), 0.0);
+            for _ in 0..900 {
+                sim.run(1);
+                let now = energy(&sim);
+                gained += (now - before).max(0.0);
+                before = now;
+            }
+            let (left, lost) = (sim.kinetic_energy(), begun - before);
+            println!("{shape:?}, threshold {threshold}: gained {gained:.3} J, lost {lost:.1} J, {left:.5} J are left");
+            assert!(gained < 0.02 * lost, "{shape:?}, threshold {threshold}: gained {gained} J, lost {lost} J");
+            assert!(left < 1e-3 * lost, "{shape:?}, threshold {threshold}: {left} of {lost} J are left");
+        }
     }
 }
 

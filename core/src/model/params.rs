@@ -252,6 +252,15 @@ impl Params {
         }
     }
 
+    /// How often bounces are worked out in a step. Both owners of a border contact do so with what each knows, and take the lesser; once
+    /// they have heard of each other's, who parts too slowly yet gets the rest.
+    pub(crate) fn bounce_rounds(&self) -> u32 {
+        match self.exchange {
+            Exchange::Step => 1,
+            Exchange::Substep => 2,
+        }
+    }
+
     /// Length of a substep in seconds.
     pub(crate) fn substep(&self) -> f32 {
         self.dt / self.integrations() as f32
