@@ -119,8 +119,7 @@ await_python() {
 
 # Started once others are compiled: many of their tests mostly wait, and it takes what they leave.
 begin_aarch64() {
-    # Under qemu it counts how well it is compiled.
-    env -u CARGO_PROFILE_RELEASE_CODEGEN_UNITS nice tests/aarch64.sh >"$target/aarch64.log" 2>&1 &
+    nice tests/aarch64.sh >"$target/aarch64.log" 2>&1 &
     aarch64_job=$!
 }
 
@@ -132,10 +131,8 @@ await_aarch64() {
 }
 
 # Where nobody will look into the programs, less is compiled into them: lines for backtraces in one profile, nothing in the other.
-# Nor will anybody change a little and compile again, or measure: in many units a crate is compiled sooner, and computes the same.
 if [[ -n ${CI:-} ]]; then
     export CARGO_PROFILE_DEV_DEBUG=line-tables-only CARGO_PROFILE_RELEASE_DEBUG=none CARGO_INCREMENTAL=0
-    export CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16
 fi
 
 provide

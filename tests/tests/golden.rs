@@ -239,6 +239,11 @@ fn results_are_golden_on_portable_lanes() {
     if is_x86_feature_detected!("avx2") {
         judge(&results(("portable", Instructions::Portable)), "portable lanes");
     }
+}
+
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn results_are_golden_on_avx2() {
     if is_x86_feature_detected!("avx512f") {
         judge(&results(("avx2", Instructions::Avx2)), "AVX2");
     }

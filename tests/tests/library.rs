@@ -7,7 +7,7 @@ use atoll_core::{
 use atoll_tests::program;
 use atoll_tests::scenes;
 use glam::DVec2;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Looking at a world changes nothing of what comes, and shows what it would end with.
 #[test]
@@ -68,8 +68,8 @@ fn a_name_is_given_once() {
     assert_eq!(world.bodies().count(), 3);
 }
 
-/// Tiles that follow the bodies: kilometers of nothing around a dense cluster cost next to nothing. Of several tries the quickest
-/// counts; at full length with as many bodies as are asked about.
+/// Tiles that follow the bodies: kilometers of nothing around a dense cluster cost next to nothing. Of several tries in turn the
+/// quickest counts, as others may be busy beside; at full length with as many bodies as are asked about.
 #[test]
 fn nothing_around_a_cluster_costs_little() {
     let side = if std::env::var_os("ATOLL_FULL_LENGTH").is_some() { 317 } else { 60 };
@@ -92,12 +92,18 @@ fn nothing_around_a_cluster_costs_little() {
             step(&mut world, &mut Loopback).unwrap();
         }
         assert_eq!(world.bodies().count(), scene.bodies.len());
-        (begun.elapsed(), world.partition().tiles())
+        begun.elapsed()
     };
-    let quickest = |reach| (0..3).map(|_| run(reach)).min().expect("some tries");
-    let (alone, apart) = (quickest(0.7 * side as f64 + 2.0), quickest(5e4));
-    println!("{} bodies: {alone:?} alone, {apart:?} in 10^5 m", scene.bodies.len());
-    assert!(apart.0 < 2 * alone.0, "{alone:?} alone, {apart:?} in 10^5 m");
+    let [mut alone, mut apart] = [Duration::MAX; 2];
+    for _ in 0..12 {
+        alone = alone.min(run(0.7 * side as f64 + 2.0));
+        apart = apart.min(run(5e4));
+        println!("{} bodies: {alone:?} alone, {apart:?} in 10^5 m", scene.bodies.len());
+        if apart < 2 * alone {
+            return;
+        }
+    }
+    panic!("{alone:?} alone, {apart:?} in 10^5 m");
 }
 
 /// What a blueprint says of memory is what a run takes, within a factor of two: few tiles, or many more than bodies.

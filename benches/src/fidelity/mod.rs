@@ -4,6 +4,7 @@
 //! many moments within the step in which they do: what is told is the mean error and the worst one, in parts of the value.
 
 mod crowds;
+mod hard_discs;
 mod laws;
 
 use crate::peers::given::{Corners, Given};
