@@ -32,7 +32,7 @@ impl Sides {
     /// that would change the speed at a point by less than `least`, in m/s. Whether something did.
     pub(crate) fn bounce(
         &self,
-        points: &[PointRows],
+        points: &mut [PointRows],
         totals: &mut [Totals],
         lane: usize,
         answers: [Answer; 2],
@@ -60,7 +60,7 @@ impl Sides {
     /// it back.
     fn bounce_along_normals(
         &self,
-        points: &[PointRows],
+        points: &mut [PointRows],
         totals: &mut [Totals],
         lane: usize,
         answers: [Answer; 2],
@@ -68,7 +68,7 @@ impl Sides {
         velocity: &mut [Quad],
     ) -> bool {
         if let ([one, two], [total_one, total_two], [Answer::Part(first), Answer::Part(second)]) =
-            (points, &mut *totals, answers)
+            (&*points, &mut *totals, answers)
         {
             let totals = [&mut total_one.normal[lane], &mut total_two.normal[lane]];
             let speeds = [first.speed, second.speed];
@@ -80,7 +80,7 @@ impl Sides {
             }
         }
         let mut acted = false;
-        for ((point, totals), answer) in points.iter().zip(totals).zip(answers) {
+        for ((point, totals), answer) in points.iter_mut().zip(totals).zip(answers) {
             let (pressed, rows) = (&mut totals.normal[lane], self.normal_rows(point, lane, velocity));
             let wanted = match answer {
                 Answer::Part(parting) if *pressed > 0.0 => {
@@ -93,6 +93,10 @@ impl Sides {
             if impulse.abs() > least * point.normal_mass[lane] {
                 self.add_impulse(rows, pressed, lane, impulse, velocity);
                 acted = true;
+            }
+            // What was given back is not there to begin the next step with, nor to tell of somebody who is held.
+            if *pressed == 0.0 {
+                (point.normal_impulse[lane], point.tangent_impulse[lane]) = (0.0, 0.0);
             }
         }
         acted

@@ -69,9 +69,9 @@ impl Columns {
     }
 
     /// The rows of a group, and its impulses of the step, to change these.
-    pub(crate) fn totals_mut(&mut self, column: usize, group: usize) -> (&Sides, &[PointRows], &mut [Totals]) {
-        fn all<const N: usize>(group: &mut Group<N>) -> (&Sides, &[PointRows], &mut [Totals]) {
-            (&group.sides, &group.points, &mut group.totals)
+    pub(crate) fn totals_mut(&mut self, column: usize, group: usize) -> (&Sides, &mut [PointRows], &mut [Totals]) {
+        fn all<const N: usize>(group: &mut Group<N>) -> (&Sides, &mut [PointRows], &mut [Totals]) {
+            (&group.sides, &mut group.points, &mut group.totals)
         }
         match column {
             0 => all(&mut self.single[group]),

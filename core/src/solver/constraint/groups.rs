@@ -84,7 +84,7 @@ impl Lane {
         (sides, points, self.lane.into())
     }
 
-    pub(super) fn totals_mut(self, columns: &mut Columns) -> (&Sides, &[PointRows], &mut [Totals], usize) {
+    pub(super) fn totals_mut(self, columns: &mut Columns) -> (&Sides, &mut [PointRows], &mut [Totals], usize) {
         let (sides, points, totals) = columns.totals_mut(self.column.into(), self.group as usize);
         (sides, points, totals, self.lane.into())
     }
