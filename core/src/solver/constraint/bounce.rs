@@ -11,8 +11,8 @@ pub(crate) enum Answer {
     Rest,
     /// It came in fast, and parts.
     Part(Parting),
-    /// Both bodies flew, and only a blow within the step had them press here: if that gave more than this speed, in m/s, it is
-    /// passed on in the next step, as one between bodies that come in fast.
+    /// Both bodies flew, and came no nearer, or slowly. Where more pressed than takes this speed, in m/s, it was a blow within the step,
+    /// which is passed on in the next one, as one between bodies that come in fast.
     NotYet(f32),
 }
 

@@ -42,7 +42,7 @@ impl Groups {
                     } else if source.holds(i, point, closing) {
                         Answer::Rest
                     } else {
-                        Answer::NotYet(threshold)
+                        Answer::NotYet(max(closing, 0.0) + source.fall(i))
                     };
                 }
                 if answers != [Answer::Rest; 2] {
@@ -143,13 +143,17 @@ impl<'a> Source<'a> {
         self.contacts.bodies[contact].map(|body| self.setup.kind(self.tile.bodies.kind[body as usize]))
     }
 
+    /// What gravity gives the bodies of a contact in so many steps as what is held may take to settle, in m/s.
+    fn fall(self, contact: usize) -> f32 {
+        let params = &self.setup.params;
+        let scales = self.kinds_of(contact).map(|kind| kind.dynamics.gravity_scale.abs());
+        STILL * max(scales[0], scales[1]) * params.gravity.length() * params.dt
+    }
+
     /// Whether a point that comes nearer at that speed, in m/s, held its bodies in the last step, and does so yet: they come nearer or
     /// part slowly, as what lies in a pile does.
     fn holds(self, contact: usize, point: usize, closing: f32) -> bool {
-        let params = &self.setup.params;
-        let scales = self.kinds_of(contact).map(|kind| kind.dynamics.gravity_scale.abs());
-        let slow =
-            params.restitution_threshold + STILL * max(scales[0], scales[1]) * params.gravity.length() * params.dt;
+        let slow = self.setup.params.restitution_threshold + self.fall(contact);
         self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && closing.abs() <= slow
     }
 
