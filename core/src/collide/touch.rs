@@ -21,8 +21,9 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 
-/// A contact's geometry may be kept only while each box turned by less than this cosine (11 degrees).
-const RECYCLE_COSINE: f32 = 0.98;
+/// A contact's geometry may be kept only while each of the two turned by less than this cosine (0.01 rad): it stays as it is, and would
+/// lag behind a table that is tilted, or a drum.
+const RECYCLE_COSINE: f32 = 0.99995;
 
 /// And while the two have moved by less than this part of the lesser half extent, and turned by less than that part of the way between their
 /// points: arms that lag further behind hold up what tips.

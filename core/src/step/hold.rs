@@ -1,16 +1,18 @@
-//! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands there;
-//! so whoever has gone so far, or turned so, that it could, is held back, after the step, where it met a static.
+//! Contacts are made where bodies come on their free way. Who is hit by then goes elsewhere, and could pass through what stands there, or
+//! come into it where two statics meet; so whoever has gone so far, or turned so, that it could, is held back, after the step, where it
+//! met a static.
 
 use crate::collide::passage::Passage;
 use crate::exchange::far::{self, StaticsByPlace};
 use crate::model::body::Body;
+use crate::model::contact::SlotKind;
 use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot};
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::terrain::ascend;
 use crate::tiling::tile::Tile;
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
 /// A body that may come to the other side of something in this step, and how it begins it.
 #[derive(Clone, Copy, Debug)]
@@ -20,25 +22,38 @@ pub(crate) struct Way {
     rotation: Rot,
 }
 
-/// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed.
+/// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed; and those that a
+/// static has turned aside, as in a corner, and that could come with their middle into another.
 pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way> {
     let bodies = &tile.bodies;
     let slimness = &setup.slimness;
     // Looser than what is asked of each below, so that nothing depends on who shares a tile.
-    let any_moves = || solved.any_moves(slimness.longest_arm, 0.49 * slimness.of_both);
-    if setup.statics.is_empty() || !any_moves() && !far::any(&bodies.velocity[..tile.owned], setup) {
+    let any_moves = |far: f32| solved.any_moves(slimness.longest_arm, 0.49 * far);
+    if setup.statics.is_empty() || !any_moves(slimness.of_bodies) && !far::any(&bodies.velocity[..tile.owned], setup) {
         return Vec::new();
     }
-    let may = |&row: &usize| {
+    let goes = |row: usize, far: f32| {
         let kind = setup.kind(bodies.kind[row]);
-        let passes = |(moved, turned): (Vec2, f32)| {
+        solved.moved(row).is_some_and(|(moved, turned)| {
             let swept = kind.not_round * kind.bounding_radius * turned;
-            dot(moved, moved).sqrt() + swept > 0.5 * (kind.inner_radius + slimness.of_statics)
-        };
-        setup.goes_far(bodies.velocity[row]) || solved.moved(row).is_some_and(passes)
+            dot(moved, moved).sqrt() + swept > 0.5 * (kind.inner_radius + far)
+        })
     };
+    let thrown = tile.contacts.keys[..tile.contacts.own()].iter().filter_map(|key| {
+        match (key.low().kind(), key.high().kind()) {
+            (SlotKind::Owned(row), SlotKind::Static(_)) => Some(row),
+            _ => None,
+        }
+    });
+    let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
+    if any_moves(slimness.of_both) || far::any(&bodies.velocity[..tile.owned], setup) {
+        let may = |&row: &usize| setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics);
+        rows.extend((0..tile.owned).filter(may));
+        rows.sort_unstable();
+    }
+    rows.dedup();
     let way = |row| Way { row, start: bodies.position[row], rotation: bodies.rotation[row] };
-    (0..tile.owned).filter(may).map(way).collect()
+    rows.into_iter().map(way).collect()
 }
 
 /// Takes bodies back to where they come to lie too deep in a static: of what they are thrown against they had no contact. Velocities

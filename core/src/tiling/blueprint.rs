@@ -74,6 +74,8 @@ fn is_choosy(kind: &KindRow) -> bool {
 /// How thin and how long anything is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slimness {
+    /// The least inner radius of a dynamic body, in meters.
+    pub(crate) of_bodies: f32,
     /// The least inner radius of a static that is no sensor, in meters; infinite where there is none.
     pub(crate) of_statics: f32,
     /// The least sum of that of such a static and of a dynamic body, in meters.
@@ -89,9 +91,9 @@ impl Slimness {
         let least = |kinds: &[KindRow]| {
             kinds.iter().filter(|kind| !kind.sensor).map(|kind| kind.inner_radius).fold(f32::INFINITY, math::min)
         };
-        let of_statics = least(fixed);
+        let (of_bodies, of_statics) = (least(own), least(fixed));
         let longest_arm = own.iter().map(|kind| kind.not_round * kind.bounding_radius).fold(0.0, math::max);
-        Self { of_statics, of_both: least(own) + of_statics, longest_arm }
+        Self { of_bodies, of_statics, of_both: of_bodies + of_statics, longest_arm }
     }
 }
 
