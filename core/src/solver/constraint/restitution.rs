@@ -5,7 +5,7 @@ use super::columns::Columns;
 use super::groups::{Bounce, Groups, Lane};
 use super::rows::Source;
 use crate::model::kind::KindRow;
-use crate::model::math::{dot, max, right_perp, turn};
+use crate::model::math::{dot, max, min, right_perp, turn};
 use crate::model::params::Exchange;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
@@ -151,9 +151,10 @@ impl<'a> Source<'a> {
     }
 
     /// Whether a point that comes nearer at that speed, in m/s, held its bodies in the last step, and does so yet: they come nearer or
-    /// part slowly, as what lies in a pile does.
+    /// part slowly, as what lies in a pile does. Without gravity nothing lies.
     fn holds(self, contact: usize, point: usize, closing: f32) -> bool {
-        let slow = self.setup.params.restitution_threshold + self.fall(contact);
+        let fall = self.fall(contact);
+        let slow = fall + min(self.setup.params.restitution_threshold, 2.0 * fall);
         self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && closing.abs() <= slow
     }
 
