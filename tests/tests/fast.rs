@@ -132,6 +132,31 @@ fn who_flies_past_others_meets_nobody() {
     }
 }
 
+/// Defect: a wall turned aside what came into a corner, and the floor, which it would not have met, let it in along the seam of the two.
+#[test]
+fn what_is_small_and_fast_stays_in_a_corner() {
+    for shape in [Shape::circle(0.02), Shape::rectangle(0.04, 0.03)] {
+        for (restitution, exchange) in [(0.0, Exchange::Step), (1.0, Exchange::Substep)] {
+            for throw in 0..200 {
+                let mut scene = Scene::new(MIDDLE, 0.0);
+                let material = Material { friction: 0.0, restitution, ..Material::default() };
+                scene.wall(MIDDLE + DVec2::new(2.0, -1.0), (4.0, 2.0), 0.0, material);
+                scene.wall(MIDDLE + DVec2::new(-1.0, 0.0), (2.0, 4.0), 0.0, material);
+                let kind = scene.kind(shape.clone(), material);
+                let velocity = Vec2::from_angle(3.4 + 1.1 * noise(1, throw) as f32) * 12.0;
+                let off = DVec2::new(noise(2, throw), noise(3, throw)) * 0.3;
+                let id = scene.body(kind, MIDDLE + DVec2::splat(0.04) + off - velocity.as_dvec2() / 60.0, velocity);
+                let mut sim = scene.start_on((1, 1), exchange);
+                for step in 0..12 {
+                    sim.run(1);
+                    let place = sim.body(id).position - MIDDLE;
+                    assert!(place.min_element() > 0.0, "{shape:?}, throw {throw}: at {place} after step {step}");
+                }
+            }
+        }
+    }
+}
+
 /// Whoever goes along a wall, some millimeters from it, feels next to nothing of its corner; nor of turning, which is as far as
 /// its spin says.
 #[test]

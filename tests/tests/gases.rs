@@ -58,6 +58,27 @@ fn discs_of_restitution_1_keep_their_energy() {
     }
 }
 
+/// Ten discs in a row, a millimeter apart, and one of 28.8 times their mass. Blow by blow, as they follow on each other, the energy stays, and
+/// the last disc goes off at 38.7 m/s. Defect: with those within a step passed on only in part it doubled.
+#[test]
+fn a_blow_goes_through_a_row_as_blow_by_blow() {
+    let mut scene = Scene::new(MIDDLE, 0.0);
+    scene.half = DVec2::new(200.0, 8.0);
+    let material = Material { friction: 0.0, restitution: 1.0, ..Material::default() };
+    let light = scene.kind(Shape::circle(0.25), material);
+    let heavy = scene.kind(Shape::circle(0.3), Material { density: 20.0, ..material });
+    for k in 0..10 {
+        scene.body(light, MIDDLE + DVec2::new(0.501 * f64::from(k), 0.0), Vec2::ZERO);
+    }
+    scene.body(heavy, MIDDLE - DVec2::new(2.0, 0.0), Vec2::new(20.0, 0.0));
+    let mut sim = scene.start_on((1, 1), Exchange::Substep);
+    let before = sim.kinetic_energy();
+    sim.run(120);
+    let fastest = sim.world.bodies().map(|body| body.velocity.x).fold(0.0, f32::max);
+    assert!((sim.kinetic_energy() / before - 1.0).abs() < 1e-3, "{} of {before} J", sim.kinetic_energy());
+    assert!((fastest - 38.7).abs() < 0.1, "the fastest goes at {fastest} m/s");
+}
+
 /// What a blow within a step gives is passed on in the next one, and what lies in a pile is not: that would be thrown about for ever.
 #[test]
 fn what_bounces_comes_to_rest_in_a_bin() {

@@ -21,9 +21,11 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 
-/// A contact's geometry may be kept only while each of the two turned by less than this cosine (0.01 rad): it stays as it is, and would
-/// lag behind a table that is tilted, or a drum.
-const RECYCLE_COSINE: f32 = 0.99995;
+/// A contact's geometry may be kept only while each of the two turned by less than the first cosine (11 degrees), and what never moves but
+/// by its path by less than the second (0.005 rad): it stays as it is, and would lag behind a table that is tilted, or a drum. What sways
+/// in a stack finds its rest by what it has.
+const RECYCLE_COSINE: f32 = 0.98;
+const RECYCLE_COSINE_OF_STATICS: f32 = 0.999_987_5;
 
 /// And while the two have moved by less than this part of the lesser half extent, and turned by less than that part of the way between their
 /// points: arms that lag further behind hold up what tips.
@@ -372,7 +374,8 @@ impl<'a> Approach<'a> {
             return None;
         }
         let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
-        if !(turned_a.c > RECYCLE_COSINE && turned_b.c > RECYCLE_COSINE) {
+        let least = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { RECYCLE_COSINE } else { RECYCLE_COSINE_OF_STATICS };
+        if !(turned_a.c > least(a) && turned_b.c > least(b)) {
             return None;
         }
         let moved = turned_a.unrotate(*offset) - known.offset;
