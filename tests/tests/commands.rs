@@ -327,12 +327,11 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
     }
 }
 
-/// All files of a folder but the lock and the configuration, with what they hold.
+/// All files of a folder but the lock, with what they hold.
 fn files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let of = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![(path.clone(), fs::read(&path).unwrap())] };
-    let mut all: Vec<_> =
-        paths.filter(|path| !path.ends_with("lock") && !path.ends_with("run.toml")).flat_map(of).collect();
+    let mut all: Vec<_> = paths.filter(|path| !path.ends_with("lock")).flat_map(of).collect();
     all.sort();
     all
 }

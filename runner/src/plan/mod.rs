@@ -134,8 +134,9 @@ impl Plan {
     /// If it cannot be written to, or another run writes there.
     pub fn claim(&self, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
         let Some(output) = &self.output else { return Ok(None) };
-        let begins = output.begins.then(|| self.commands.record(0, 0));
-        Ok(Some(output.folder.claim(held, begins.as_deref(), &output.configuration)?))
+        let commands = output.begins.then(|| self.commands.record(0, 0));
+        let begins = commands.as_deref().map(|commands| (commands, output.configuration.as_str()));
+        Ok(Some(output.folder.claim(held, begins)?))
     }
 
     /// Everywhere figures over time are written to.
