@@ -262,9 +262,16 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         ("{\"step\": 3, \"add\": {\"id\": 41, \"x\": 1, \"y\": 1}}\n", "line 2: step 3: there is a body 41 already"),
         (
             "{\"step\": 3, \"add\": {\"id\": 0, \"x\": 1, \"y\": 1}}\n",
-            "line 2: step 3: body 0: position and velocities",
+            "line 2: step 3: body 0: a static has this name; give each its own; mend it",
         ),
-        ("{\"step\": 3, \"add\": {\"kind\": 9, \"x\": 1, \"y\": 1}}\n", "its kind a row of the table"),
+        (
+            "{\"step\": 3, \"add\": [{\"x\": 1, \"y\": 1}, {\"kind\": 9, \"x\": 0, \"y\": 1}]}\n",
+            "line 2: step 3: the body at 0.0, 1.0: there is no kind 9; use a row of the table of kinds; mend it",
+        ),
+        (
+            "{\"step\": 3, \"add\": {\"id\": 9000, \"x\": 1, \"y\": 1, \"cos\": 2, \"sin\": 0}}\n",
+            "line 2: step 3: body 9000: its rotation must be of length one: a cosine and a sine whose squares add up to 1",
+        ),
         ("{\"step\": 3, \"kind\": {\"id\": 60, \"kind\": 9}}\n", "line 2: step 3: body 60: there is no kind 9"),
         (crowd.as_str(), "line 2: step 3: more than 1000 bodies would come to 5.0, 5.0 at once, where every two"),
         ("{\"step\": 3, \"gravity\": [0, 1e39]}\n", "line 2"),
