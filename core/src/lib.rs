@@ -89,7 +89,7 @@ pub use exchange::record::{BorderImpulse, BorderPoint, ContactRecord, GhostRecor
 pub use exchange::verdict::Verdict;
 pub use model::body::{Bodies, Body, StaticBody};
 pub use model::contact::{Contact, ContactPoint};
-pub use model::error::{CodecError, SetupError, StepError};
+pub use model::error::{BodyFault, CodecError, SetupError, StepError};
 pub use model::id::{GlobalId, KindId, TileId};
 pub use model::kind::{Dynamics, Filter, Kind, Material};
 pub use model::math::Rot;

@@ -55,19 +55,15 @@ pub enum RunError {
     Scene(#[from] SceneError),
     /// More than this machine can hold.
     #[error(
-        "too large for {within}: {bodies} bodies on {tiles} tiles with {ranks} ranks need about {} of memory, and {} are free: use fewer",
+        "too large for {within}: {what} need about {} of memory, and {} are free: use fewer",
         size(*.needed),
         size(*.available)
     )]
     TooLarge {
         /// What sets the bound.
         within: &'static str,
-        /// Bodies asked for.
-        bodies: u64,
-        /// Tiles asked for, or by default.
-        tiles: u64,
-        /// Ranks.
-        ranks: u64,
+        /// Bodies, and what else was asked for or is so by default.
+        what: String,
         /// Bytes, estimated.
         needed: u64,
         /// Bytes free.

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tempfile::tempdir;
 
@@ -262,9 +262,16 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         ("{\"step\": 3, \"add\": {\"id\": 41, \"x\": 1, \"y\": 1}}\n", "line 2: step 3: there is a body 41 already"),
         (
             "{\"step\": 3, \"add\": {\"id\": 0, \"x\": 1, \"y\": 1}}\n",
-            "line 2: step 3: body 0: position and velocities",
+            "line 2: step 3: body 0: a static has this name; give each its own; mend it",
         ),
-        ("{\"step\": 3, \"add\": {\"kind\": 9, \"x\": 1, \"y\": 1}}\n", "its kind a row of the table"),
+        (
+            "{\"step\": 3, \"add\": [{\"x\": 1, \"y\": 1}, {\"kind\": 9, \"x\": 0, \"y\": 1}]}\n",
+            "line 2: step 3: the body at 0.0, 1.0: there is no kind 9; use a row of the table of kinds; mend it",
+        ),
+        (
+            "{\"step\": 3, \"add\": {\"id\": 9000, \"x\": 1, \"y\": 1, \"cos\": 2, \"sin\": 0}}\n",
+            "line 2: step 3: body 9000: its rotation must be of length one: a cosine and a sine whose squares add up to 1",
+        ),
         ("{\"step\": 3, \"kind\": {\"id\": 60, \"kind\": 9}}\n", "line 2: step 3: body 60: there is no kind 9"),
         (crowd.as_str(), "line 2: step 3: more than 1000 bodies would come to 5.0, 5.0 at once, where every two"),
         ("{\"step\": 3, \"gravity\": [0, 1e39]}\n", "line 2"),
@@ -325,6 +332,15 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{line:?}: {ended}");
         assert!(ended.stderr.contains(expected), "{ended}");
     }
+}
+
+/// All files of a folder but the lock, with what they hold.
+fn files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let of = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![(path.clone(), fs::read(&path).unwrap())] };
+    let mut all: Vec<_> = paths.filter(|path| !path.ends_with("lock")).flat_map(of).collect();
+    all.sort();
+    all
 }
 
 #[test]
@@ -388,15 +404,23 @@ fn what_is_refused_is_not_kept_and_a_run_goes_on_from_there() {
     let mut later = Way::Channel.resume(1, &path("filed"));
     let ended = run(later.args(["--quiet", "--steps", "8", "--commands"]).arg(path("late.jsonl")));
     assert!(ended.stderr.contains("late.jsonl: 1 line is for steps before 3, which are made; left out"), "{ended}");
-    // Another run does not give way to one that cannot begin.
-    fs::write(path("bad.jsonl"), "{\"step\":0,\"remove\":[40,40]}\n").unwrap();
-    let before = fs::read(path("whole").join("summary.json")).unwrap();
-    let ended = program::run(&mut start("whole", &["--overwrite", "--commands", &bad]));
-    assert!(
-        ended.code == Some(2) && ended.stderr.contains("bad.jsonl: line 1: step 0: there is no body 40"),
-        "{ended}"
-    );
-    assert_eq!(fs::read(path("whole").join("summary.json")).unwrap(), before);
+    // No run gives way to one that cannot begin, or go on; of step 3 the first line was done before.
+    let text = "{\"step\":0,\"remove\":[40,40]}\n{\"step\":3,\"wake\":0}\n{\"step\":3,\"name\":\"b\",\"wake\":40}\n";
+    fs::write(path("bad.jsonl"), text).unwrap();
+    let leaves = |mut command: Command, out: &str, expected: &str| {
+        let before = files(&path(out));
+        assert!(before.iter().any(|(path, _)| path.ends_with("timings.csv")));
+        let ended = program::run(command.args(["--commands", &bad]));
+        let told = ended.stderr.contains(&format!("bad.jsonl: {expected}: there is no body 40; mend it"));
+        assert!(ended.code == Some(2) && told, "{ended}");
+        assert!(files(&path(out)) == before, "{ended}");
+    };
+    leaves(start("whole", &["--overwrite"]), "whole", "line 1: step 0");
+    for way in Way::all() {
+        let mut on = way.resume(if way.supports(2) { 2 } else { 1 }, &path("filed"));
+        on.args(["--quiet", "--steps", "9"]);
+        leaves(on, "filed", "line 3 (\"b\"): step 3");
+    }
 }
 
 #[test]

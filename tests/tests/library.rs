@@ -1,8 +1,8 @@
 //! The library as somebody uses it who has all tiles in one process: `atoll_core` without a halo of one's own.
 
 use atoll_core::{
-    Adaptive, Blueprint, Body, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params, Partition,
-    SetupError, Solver, StepError, TileId, World, finish, halo_width, measure, step,
+    Adaptive, Blueprint, Body, BodyFault, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params,
+    Partition, SetupError, Solver, StepError, TileId, World, finish, halo_width, measure, step,
 };
 use atoll_tests::program;
 use atoll_tests::scenes;
@@ -64,7 +64,7 @@ fn a_name_is_given_once() {
         assert_eq!(world.add(at(id, part)), Err(SetupError::NameTaken { id: GlobalId(id) }));
     }
     // A static's.
-    assert_eq!(world.add(at(0, 0.5)), Err(SetupError::BadBody { id: GlobalId(0) }));
+    assert_eq!(world.add(at(0, 0.5)), Err(SetupError::BadBody { id: GlobalId(0), fault: BodyFault::NameOfStatic }));
     assert_eq!(world.bodies().count(), 3);
 }
 

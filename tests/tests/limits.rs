@@ -77,6 +77,11 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
             assert_eq!(ended.complaints().len(), 1, "{ended}");
         }
     }
+    let export = format!("scene export {quick} --bodies 20000000 --out $DIR/exported");
+    let ended = limited("-v 1000000", &export.replace(" --steps 3", ""), folder.path());
+    let told = "atoll: too large for the limit on a process (ulimit -v): 20000000 bodies need about ";
+    assert!(ended.code == Some(2) && ended.stderr.starts_with(told), "{ended}");
+    assert!(ended.complaints().len() == 1 && !folder.path().join("exported").exists(), "{ended}");
 }
 
 /// Four thousand boxes within half a meter: each would touch all others.

@@ -32,21 +32,13 @@ pub enum SetupError {
         /// Its name.
         id: GlobalId,
     },
-    /// A dynamic body.
-    #[error(
-        "body {id}: position and velocities must be finite, its rotation of length one, its kind a row of the table, its name no static's"
-    )]
+    /// A dynamic body, or what one is to become.
+    #[error("body {id}: {fault}")]
     BadBody {
         /// Its name.
         id: GlobalId,
-    },
-    /// What a body is to become.
-    #[error("body {id}: there is no kind {}; use a row of the table of kinds", kind.0)]
-    NoKind {
-        /// Its name.
-        id: GlobalId,
-        /// The kind.
-        kind: KindId,
+        /// What is wrong with it.
+        fault: BodyFault,
     },
     /// What is to be done to a body.
     #[error(
@@ -134,6 +126,23 @@ pub enum SetupError {
         /// Its name.
         tile: TileId,
     },
+}
+
+/// What is wrong with a dynamic body.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+pub enum BodyFault {
+    /// Its state has numbers that are none.
+    #[error("its position, rotation and velocities must be finite numbers")]
+    NotFinite,
+    /// Its rotation is none.
+    #[error("its rotation must be of length one: a cosine and a sine whose squares add up to 1")]
+    NoRotation,
+    /// Its kind is no row of the table.
+    #[error("there is no kind {}; use a row of the table of kinds", .0.0)]
+    NoKind(KindId),
+    /// Its name is that of a static.
+    #[error("a static has this name; give each its own")]
+    NameOfStatic,
 }
 
 /// A frame of bytes that is not one of ours.

@@ -2,7 +2,7 @@
 
 use crate::exchange::overlap;
 use crate::model::body::{Body, StaticBody};
-use crate::model::error::SetupError;
+use crate::model::error::{BodyFault, SetupError};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::kind::{Dynamics, Filter, Kind, KindRow};
 use crate::model::math;
@@ -255,8 +255,14 @@ impl Setup {
     /// Whether a dynamic body may be one of this world.
     pub(crate) fn check_body(&self, body: &Body) -> Result<(), SetupError> {
         let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
-        let fits = body.is_finite() && turned && self.knows(body);
-        if fits { Ok(()) } else { Err(SetupError::BadBody { id: body.id }) }
+        let fault = match body {
+            _ if !body.is_finite() => BodyFault::NotFinite,
+            _ if !turned => BodyFault::NoRotation,
+            _ if !self.has_kind(body.kind) => BodyFault::NoKind(body.kind),
+            _ if self.is_static(body.id) => BodyFault::NameOfStatic,
+            _ => return Ok(()),
+        };
+        Err(SetupError::BadBody { id: body.id, fault })
     }
 
     /// Whether a static has this name.
@@ -266,7 +272,12 @@ impl Setup {
 
     /// Whether a dynamic body may be one of this world: its kind is in the table, its name no static's.
     pub(crate) fn knows(&self, body: &Body) -> bool {
-        (body.kind.0 as usize) < self.dynamic_kinds && !self.is_static(body.id)
+        self.has_kind(body.kind) && !self.is_static(body.id)
+    }
+
+    /// Whether a dynamic body may be of this kind.
+    pub(crate) fn has_kind(&self, kind: KindId) -> bool {
+        (kind.0 as usize) < self.dynamic_kinds
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@ use super::World;
 use super::locator::Place;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
-use crate::model::error::SetupError;
+use crate::model::error::{BodyFault, SetupError};
 use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::{Kind, KindRow};
 use crate::model::math::cross;
@@ -134,8 +134,8 @@ impl World {
             }
             Command::Force { id, force, torque, .. } => finite(id, force.is_finite() && torque.is_finite()),
             Command::SetKind { id, kind } => {
-                let is_there = (kind.0 as usize) < self.setup.dynamic_kinds;
-                if is_there { Ok(()) } else { Err(SetupError::NoKind { id, kind }) }
+                let fault = BodyFault::NoKind(kind);
+                if self.setup.has_kind(kind) { Ok(()) } else { Err(SetupError::BadBody { id, fault }) }
             }
             Command::AddKind(ref kind) => self.setup.check_kind(kind),
             Command::SetGravity(gravity) => Params { gravity, ..self.setup.params.clone() }.check(),

@@ -70,13 +70,14 @@ impl RunFolder {
         })
     }
 
-    /// Makes the folder that of a run about to begin or to go on: what an overwritten run left is gone, and the configuration
-    /// is there. `begins` are the commands of one that begins: wherever it is killed, no configuration is there without its own.
-    /// `held` is what [`hold`](Self::hold) gave before the folder was looked at.
+    /// Makes the folder that of a run about to begin or to go on. `begins` are the commands and the configuration of one that
+    /// begins: what an overwritten run left is gone, these are there, and wherever it is killed, no configuration is there without
+    /// its own commands. What was done in the folder of one that goes on stays until [`go_on`](Self::go_on). `held` is what
+    /// [`hold`](Self::hold) gave before the folder was looked at.
     ///
     /// # Errors
     /// If it cannot be written to, or another run has begun there meanwhile.
-    pub fn claim(&self, held: Option<Claim>, begins: Option<&str>, configuration: &str) -> Result<Claim, FolderError> {
+    pub fn claim(&self, held: Option<Claim>, begins: Option<(&str, &str)>) -> Result<Claim, FolderError> {
         let failed = |error: io::Error| self.not_writable(&error);
         let claim = match held {
             Some(claim) => claim,
@@ -86,11 +87,10 @@ impl RunFolder {
                 claim
             }
         };
-        if let Some(commands) = begins {
-            self.remove_after(None).and_then(|()| self.begin(commands)).map_err(failed)?;
+        if let Some((commands, configuration)) = begins {
+            let begun = self.remove_after(None).and_then(|()| self.begin(commands));
+            begun.and_then(|()| self.write_configuration(configuration)).map_err(failed)?;
         }
-        let write = |file: &mut File| file.write_all(configuration.as_bytes());
-        write_durably(&self.configuration(), write).map_err(failed)?;
         // Nobody else has ever written this.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         fs::write(self.lock(), format!("{} {now}\n", process::id())).map_err(failed)?;
@@ -102,6 +102,20 @@ impl RunFolder {
         remove_if_there(&self.configuration())?;
         sync_folder(self.path())?;
         self.write_commands(commands)
+    }
+
+    /// Makes the folder that of a run of this configuration that goes on after `step`, once it is known that it can: what an earlier
+    /// attempt left after that is gone.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn go_on(&self, step: Option<u64>, configuration: &str) -> io::Result<()> {
+        self.write_configuration(configuration)?;
+        self.remove_after(step)
+    }
+
+    fn write_configuration(&self, configuration: &str) -> io::Result<()> {
+        write_durably(&self.configuration(), |file| file.write_all(configuration.as_bytes()))
     }
 
     /// Keeps these commands, and no others; no file if there are none.
@@ -168,7 +182,7 @@ mod tests {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", &folder.path().join("new"));
         assert!(run.hold(None).unwrap().is_none());
-        let claim = run.claim(None, Some(""), &configuration()).unwrap();
+        let claim = run.claim(None, Some(("", &configuration()))).unwrap();
         let token = run.token().unwrap();
         let shared = run.share(&token, Duration::ZERO).unwrap();
         // A folder of the same name on another host has another, and a broken one none.
@@ -188,7 +202,7 @@ mod tests {
         assert!(held.is_some());
         // Who comes later finds what was begun meanwhile.
         drop(held);
-        let told = run.claim(None, Some(""), "").unwrap_err().to_string();
+        let told = run.claim(None, Some(("", ""))).unwrap_err().to_string();
         assert!(told.contains("it holds a run"), "{told}");
     }
 
@@ -197,15 +211,21 @@ mod tests {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", folder.path());
         let commands = || fs::read_to_string(run.commands()).ok();
-        drop(run.claim(None, Some("one\n"), &configuration()).unwrap());
+        drop(run.claim(None, Some(("one\n", &configuration()))).unwrap());
         assert_eq!(commands().as_deref(), Some("one\n"));
-        // Who goes on does not know yet from which step.
-        drop(run.claim(run.hold(None).unwrap(), None, &configuration()).unwrap());
+        // Who goes on does not know yet from which step, or whether it can.
+        let mut longer = configuration();
+        longer.push_str("# longer\n");
+        let claim = run.claim(run.hold(None).unwrap(), None).unwrap();
+        assert_eq!(fs::read_to_string(run.configuration()).unwrap(), configuration());
+        run.go_on(None, &longer).unwrap();
+        drop(claim);
+        assert_eq!(fs::read_to_string(run.configuration()).unwrap(), longer);
         assert_eq!(commands().as_deref(), Some("one\n"));
         // Killed before its configuration is there, a run leaves what another can begin over.
         run.begin("two\n").unwrap();
         assert!(!run.holds_run() && run.check_free(false).is_ok());
-        drop(run.claim(run.hold(None).unwrap(), Some(""), &configuration()).unwrap());
+        drop(run.claim(run.hold(None).unwrap(), Some(("", &configuration()))).unwrap());
         assert_eq!(commands(), None);
     }
 }

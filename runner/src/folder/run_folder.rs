@@ -268,7 +268,7 @@ mod tests {
         let run = RunFolder::new("--resume", folder.path());
         let check = |overrides| run.check_same_run(&config(overrides), [2, 2]).map_err(|error| error.to_string());
         assert!(check(&[]).unwrap_err().contains("no run was begun there"));
-        run.claim(None, Some(""), &config(&[]).to_toml([2, 2])).unwrap();
+        run.claim(None, Some(("", &config(&[]).to_toml([2, 2])))).unwrap();
         check(&[("steps", "9"), ("ranks", "2"), ("checkpoint_every", "9")]).unwrap();
         // Wherever it was begun.
         let begun = fs::read_to_string(run.configuration()).unwrap();

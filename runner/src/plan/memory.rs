@@ -34,15 +34,10 @@ pub(super) fn check(
     let world = blueprint.memory(bodies).saturating_add(bodies.saturating_mul(copies + saved + read));
     // Every rank has its share, four bytes for each tile in a map, and a channel to every other.
     let of = |held: u64| (world / ranks).saturating_mul(held).saturating_add(held * (4 * tiles + 500 * ranks));
-    let check = |within: &'static str, needed: u64, available: Option<u64>| match available {
-        Some(available) if needed > available => {
-            Err(RunError::TooLarge { within, bodies, tiles, ranks, needed, available })
-        }
-        _ => Ok(()),
-    };
+    let what = || format!("{bodies} bodies on {tiles} tiles with {ranks} ranks");
     // Of an MPI job the others may be anywhere.
     let here = if config.transport() == TransportKind::Mpi { 1 } else { ranks };
-    check("this machine", of(here), free())?;
+    within_machine(of(here), what)?;
     let in_process = match config.transport() {
         TransportKind::Local | TransportKind::Channel => ranks,
         TransportKind::Iceoryx2 | TransportKind::Mpi => 1,
@@ -52,7 +47,40 @@ pub(super) fn check(
     let left = left_of_limit();
     let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
     let arenas = if left.is_some_and(|left| left >= ARENA) { threads.min(ARENAS * cores) * ARENA } else { 0 };
-    check("the limit on a process (ulimit -v)", of(in_process) + threads * STACK + arenas + PROCESS, left)
+    within_limit(of(in_process) + threads * STACK + arenas + PROCESS, left, what)
+}
+
+/// Refuses so many bodies to be listed by this process and sorted, before it tries to.
+///
+/// # Errors
+/// If there is no room for them.
+pub(crate) fn check_list(bodies: u64) -> Result<(), RunError> {
+    // They are sorted by keys of at most half their size.
+    let needed = bodies.saturating_mul(size_of::<Body>() as u64 * 3 / 2);
+    let what = || format!("{bodies} bodies");
+    within_machine(needed, what)?;
+    within_limit(needed.saturating_add(PROCESS), left_of_limit(), what)
+}
+
+fn within_machine(needed: u64, what: impl Fn() -> String) -> Result<(), RunError> {
+    within("this machine", needed, free(), what)
+}
+
+fn within_limit(needed: u64, left: Option<u64>, what: impl Fn() -> String) -> Result<(), RunError> {
+    within("the limit on a process (ulimit -v)", needed, left, what)
+}
+
+/// `what` needs so much is said if less is available.
+fn within(
+    within: &'static str,
+    needed: u64,
+    available: Option<u64>,
+    what: impl Fn() -> String,
+) -> Result<(), RunError> {
+    match available {
+        Some(available) if needed > available => Err(RunError::TooLarge { within, what: what(), needed, available }),
+        _ => Ok(()),
+    }
 }
 
 /// Bytes that the machine has to spare, if it says so.

@@ -11,6 +11,7 @@ pub(crate) mod tiles;
 pub(crate) use assignment::Assignment;
 pub(crate) use commands::Commands;
 pub(crate) use holding::Holding;
+pub(crate) use memory::check_list;
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;
@@ -134,8 +135,9 @@ impl Plan {
     /// If it cannot be written to, or another run writes there.
     pub fn claim(&self, held: Option<Claim>) -> Result<Option<Claim>, RunError> {
         let Some(output) = &self.output else { return Ok(None) };
-        let begins = output.begins.then(|| self.commands.record(0, 0));
-        Ok(Some(output.folder.claim(held, begins.as_deref(), &output.configuration)?))
+        let commands = output.begins.then(|| self.commands.record(0, 0));
+        let begins = commands.as_deref().map(|commands| (commands, output.configuration.as_str()));
+        Ok(Some(output.folder.claim(held, begins)?))
     }
 
     /// Everywhere figures over time are written to.

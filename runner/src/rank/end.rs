@@ -19,8 +19,8 @@ const UNSEEN: Duration = Duration::from_secs(10);
 /// A user may wonder after so long.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// Starts to write, on all ranks or none. What an earlier attempt left after the step from which the run goes on is removed
-/// first.
+/// Starts to write, on all ranks or none. Where the run goes on, its folder is first made that of a run which goes on from there:
+/// what an earlier attempt left after that step is removed.
 pub(super) fn start<'a>(
     plan: &'a Plan,
     rank: Rank,
@@ -33,9 +33,12 @@ pub(super) fn start<'a>(
     // Others wait for the one that waits.
     let claim = output.folder.share(&token, UNSEEN.min(plan.config.run.peer_timeout / 2)).map_err(RunError::Folder);
     all_well(transport, claim.as_ref().err())?;
-    let removed = if rank == Rank(0) { output.folder.remove_after(resumed) } else { Ok(()) };
+    let goes_on = match rank {
+        Rank(0) if !output.begins => output.folder.go_on(resumed, &output.configuration),
+        _ => Ok(()),
+    };
     // Nobody writes before it is done.
-    let trouble = removed.err().map(|error| RunError::Folder(output.folder.not_writable(&error)));
+    let trouble = goes_on.err().map(|error| RunError::Folder(output.folder.not_writable(&error)));
     all_well(transport, trouble.as_ref())?;
     let recorder = claim.and_then(|claim| Recorder::start(plan, output, claim, rank, resumed));
     all_well(transport, recorder.as_ref().err())?;

@@ -149,8 +149,9 @@ fn run<T: Transport>(
     // From here on the clock measures steps, not how long another rank takes to build.
     halo.transport().barrier().map_err(RankError::Transport)?;
     let logs = log::find(plan, resumed, halo.transport())?;
+    let mut commander = Commander::start(plan, rank, (resumed, commands), &world, halo.transport())?;
     recorder = end::start(plan, rank, resumed, halo.transport())?;
-    let mut commander = Commander::start(plan, rank, (resumed, commands), (&world, observer), halo.transport())?;
+    commander.open(plan, world.step_count(), observer, halo.transport())?;
     let start_log = |logs| Log::start(plan, logs, resumed, (&world, &mut halo), (recorder.as_ref(), observer));
     let mut log = logs.map(start_log).transpose()?;
     *complete = world.step_count();

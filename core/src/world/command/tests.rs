@@ -2,6 +2,7 @@ use super::*;
 use crate::Loopback;
 use crate::model::body::StaticBody;
 use crate::model::kind::Material;
+use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::Shape;
 use crate::step::{finish, step};
@@ -211,9 +212,20 @@ fn what_cannot_be_done_changes_nothing() {
     let id = GlobalId(1);
     let bad = Body { position: DVec2::new(0.0, f64::INFINITY), ..Body::at_rest(GlobalId(999), KindId(0), DVec2::ZERO) };
     for (command, expected) in [
-        (Command::Add(bad), SetupError::BadBody { id: GlobalId(999) }),
+        (Command::Add(bad), SetupError::BadBody { id: bad.id, fault: BodyFault::NotFinite }),
+        (
+            Command::Add(Body { position: DVec2::ONE, rotation: Rot { c: 2.0, s: 0.0 }, ..bad }),
+            SetupError::BadBody { id: bad.id, fault: BodyFault::NoRotation },
+        ),
+        (
+            Command::Add(Body::at_rest(bad.id, KindId(2), DVec2::ONE)),
+            SetupError::BadBody { id: bad.id, fault: BodyFault::NoKind(KindId(2)) },
+        ),
         (Command::Add(Body::at_rest(id, KindId(0), DVec2::ONE)), SetupError::NameTaken { id }),
-        (Command::Add(Body::at_rest(GlobalId(0), KindId(0), DVec2::ONE)), SetupError::BadBody { id: GlobalId(0) }),
+        (
+            Command::Add(Body::at_rest(GlobalId(0), KindId(0), DVec2::ONE)),
+            SetupError::BadBody { id: GlobalId(0), fault: BodyFault::NameOfStatic },
+        ),
         (Command::SetVelocity { id, velocity: nan, angular_velocity: 0.0 }, SetupError::NotFinite { id }),
         (Command::Impulse { id, impulse: nan, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: nan, torque: 0.0, steps: 1 }, SetupError::NotFinite { id }),
@@ -225,7 +237,7 @@ fn what_cannot_be_done_changes_nothing() {
         ),
         (Command::Impulse { id, impulse: Vec2::ZERO, at: None, angular: 2e38 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: Vec2::X * 1e38, torque: 3e38, steps: 1 }, SetupError::NotFinite { id }),
-        (Command::SetKind { id, kind: KindId(2) }, SetupError::NoKind { id, kind: KindId(2) }),
+        (Command::SetKind { id, kind: KindId(2) }, SetupError::BadBody { id, fault: BodyFault::NoKind(KindId(2)) }),
         (Command::AddKind(Kind::new(Shape::circle(0.0), Material::default())), SetupError::BadKind { kind: KindId(2) }),
     ] {
         assert_eq!(world.command(&command), Err(expected));

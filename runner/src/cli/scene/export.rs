@@ -9,6 +9,7 @@ use crate::folder::RunFolder;
 use crate::folder::recording::Row;
 use crate::look::frame::Frame;
 use crate::look::recorded::Recorded;
+use crate::plan::check_list;
 use crate::scene::file::write::World;
 use crate::scene::{Scene, SceneFile};
 use atoll_core::{Body, Command, GlobalId, KindId, Rot};
@@ -30,7 +31,11 @@ pub(super) fn run(args: &SceneExportArgs) -> Result<Exit, RunError> {
         (false, None) => {
             let config = Config::load(from, &values.overrides()?)?;
             let scene = Scene::open(&config.scene)?;
-            let bodies = scene.iter().collect::<Result<Vec<_>, _>>()?;
+            check_list(scene.bodies())?;
+            let mut bodies = Vec::with_capacity(scene.bodies() as usize);
+            for body in scene.iter() {
+                bodies.push(body?);
+            }
             let world = World {
                 name: scene.file().map_or(Some(config.scene.kind.name()), SceneFile::name),
                 domain: scene.domain(),

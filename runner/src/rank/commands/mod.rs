@@ -80,16 +80,22 @@ fn place(source: &str, number: u64) -> String {
     if number == 0 { "a hand on the page".to_owned() } else { format!("{source}: line {number}") }
 }
 
+/// A line of this number and name that is not done before the step after `step`, and why.
+fn refusal(source: &str, (line, name): (u64, Option<&str>), step: u64, reason: &str) -> String {
+    let called = name.map_or(String::new(), |name| format!(" (\"{}\")", OneLine(name)));
+    format!("{}{called}: step {step}: {}", place(source, line), OneLine(reason))
+}
+
 impl Commander {
-    /// For a rank that begins, or goes on from the snapshot of the step `resumed`, which had this `state`.
+    /// For a rank that begins, or goes on from the snapshot of the step `resumed`, which had this `state`. Nothing is written yet.
     ///
     /// # Errors
-    /// If what is done or answered cannot be written down.
+    /// If the run goes on, and what is to be done before its next step cannot be: then its folder is left as it is.
     pub(super) fn start(
         plan: &Plan,
         rank: Rank,
         (resumed, state): (Option<u64>, Option<State>),
-        (world, observer): (&World, &Observer),
+        world: &World,
         transport: &mut impl Transport,
     ) -> Result<Self, RankError> {
         let commands = &plan.commands;
@@ -130,21 +136,55 @@ impl Commander {
             time: Duration::ZERO,
             sent: Stats::default(),
         };
+        if plan.output.as_ref().is_some_and(|output| !output.begins) {
+            commander.rehearse(plan, world, transport)?;
+        }
         for event in Event::ALL {
             commander.followed.set(event, commander.state.tells(event), world, transport)?;
-        }
-        let opened = if rank == Rank(0) { commander.open(plan, from) } else { Ok(()) };
-        all_well(transport, opened.as_ref().err())?;
-        let late = if rank == Rank(0) { commands.late(from, done_before) } else { 0 };
-        if late > 0 {
-            let lines = lines_are(late);
-            observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", commander.source));
         }
         Ok(commander)
     }
 
-    /// Opens what one rank writes.
-    fn open(&mut self, plan: &Plan, from: u64) -> Result<(), RunError> {
+    /// Whether what is planned before the next step can be done.
+    ///
+    /// # Errors
+    /// If not, and it is not to be left out.
+    fn rehearse(&self, plan: &Plan, world: &World, transport: &mut impl Transport) -> Result<(), RankError> {
+        let step = world.step_count();
+        let lines = &self.lines[..self.lines.partition_point(|line| line.step <= step)];
+        if self.skips || step >= self.steps || lines.is_empty() {
+            return Ok(());
+        }
+        let present = find(lines, world, transport)?;
+        let rehearsed = rehearsal::rehearse(plan, lines, present, self.state.clone()).map_err(RankError::Setup)?;
+        rehearsed.map_err(|(line, reason)| {
+            let text = refusal(&self.source, (line.number, line.name.as_deref()), step, &reason);
+            RankError::Agreed { text: format!("{text}; {MEND}"), exit: Exit::Usage }
+        })
+    }
+
+    /// Opens what one rank writes, and says what comes too late.
+    ///
+    /// # Errors
+    /// If what is done or answered cannot be written down.
+    pub(super) fn open(
+        &mut self,
+        plan: &Plan,
+        from: u64,
+        observer: &Observer,
+        transport: &mut impl Transport,
+    ) -> Result<(), RankError> {
+        let opened = if self.rank == Rank(0) { self.open_files(plan, from) } else { Ok(()) };
+        all_well(transport, opened.as_ref().err())?;
+        let late = if self.rank == Rank(0) { plan.commands.late(from, self.done_before) } else { 0 };
+        if late > 0 {
+            let lines = lines_are(late);
+            observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", self.source));
+        }
+        Ok(())
+    }
+
+    fn open_files(&mut self, plan: &Plan, from: u64) -> Result<(), RunError> {
         if let Some(path) = &plan.commands.answers {
             let opened = AnswersFile::open(path, from, self.done_before > 0);
             self.answers = Some(opened.map_err(|error| not_written(path, &error))?);
@@ -373,8 +413,7 @@ impl Commander {
         reason: &str,
         observer: &Observer,
     ) {
-        let called = name.map_or(String::new(), |name| format!(" (\"{}\")", OneLine(name)));
-        let text = format!("{}{called}: step {step}: {}", place(source, line), OneLine(reason));
+        let text = refusal(source, (line, name), step, reason);
         self.tell(step, name, Answer::Refused { line, reason: &text });
         let is_past = source == LIVE && step >= self.steps;
         if self.skips || self.is_page && source == LIVE {

@@ -4,7 +4,7 @@ use super::super::{RankError, records};
 use crate::command::{Action, Line, NewBody};
 use crate::plan::Plan;
 use crate::scene::{MOST_AT_A_PLACE, place_of};
-use atoll_core::{Body, Command, GlobalId, World};
+use atoll_core::{Body, Command, GlobalId, SetupError, World};
 use atoll_transport::{Collective, Transport};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,15 +65,16 @@ pub(super) fn acts(
     world: &World,
 ) -> Result<Vec<Command>, String> {
     let commands = match &line.action {
-        Action::Add(bodies) => crowds.check(bodies).and_then(|()| named(bodies, next))?,
+        Action::Add(bodies) => crowds.check(bodies).and_then(|()| named(bodies, next, world))?,
         Action::Do(commands) => commands.clone(),
         Action::Ask(_) | Action::Tell(..) => Vec::new(),
     };
     check(&commands, present, world).map(|()| commands)
 }
 
-/// Bodies that have no name of their own get the next ones, as long as there are some.
-fn named(bodies: &[NewBody], mut next: u64) -> Result<Vec<Command>, String> {
+/// Bodies that have no name of their own get the next ones, as long as there are some. What is wrong with one of these is said of where
+/// it is, as nobody has said that name.
+fn named(bodies: &[NewBody], mut next: u64, world: &World) -> Result<Vec<Command>, String> {
     let named = |new: &NewBody| {
         let mut body = new.body;
         if !new.is_named {
@@ -81,6 +82,9 @@ fn named(bodies: &[NewBody], mut next: u64) -> Result<Vec<Command>, String> {
                 return Err("no name is left above those of all bodies; give it one of its own".to_owned());
             }
             body.id = GlobalId(next);
+            if let Err(SetupError::BadBody { fault, .. }) = world.check(&Command::Add(body)) {
+                return Err(format!("the body at {:?}, {:?}: {fault}", body.position.x, body.position.y));
+            }
         }
         next = next.max(body.id.0.saturating_add(1));
         Ok(Command::Add(body))
