@@ -32,7 +32,7 @@ pub(crate) struct Groups {
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
     /// For each body whether something held it as the step began, where that was asked.
-    pub(super) holds: Vec<Option<bool>>,
+    pub(super) held: Vec<Option<bool>>,
 }
 
 /// A contact that may bounce.

@@ -72,7 +72,7 @@ impl Groups {
     /// Has points rest that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
     /// what lies above: without it that would be thrown down, and what bounces off would have more energy than there was.
     fn leave_held(&mut self, source: Source<'_>) {
-        let Self { bounces, bounces_at_once, holds: held, .. } = self;
+        let Self { bounces, bounces_at_once, held, .. } = self;
         let sides = |contact: usize| source.contacts.bodies[contact].map(|body| body as usize);
         let is_not_yet = |answer: &Answer| matches!(answer, Answer::NotYet(_));
         held.clear();
