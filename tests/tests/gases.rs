@@ -36,6 +36,7 @@ fn discs_of_restitution_1_keep_their_energy() {
     for (grid, side, apart, steps, keep) in [
         ((1, 1), 14, 1.0, 3000, 0.99),
         ((2, 3), 14, 1.0, 3000, 0.99),
+        ((4, 4), 14, 1.0, 3000, 0.99),
         ((7, 7), 14, 1.0, 3000, 0.99),
         ((12, 12), 14, 1.0, 3000, 0.99),
         // Two centimeters between them: each meets several others in each step.

@@ -305,6 +305,8 @@ fn a_damaged_snapshot_is_named_and_the_one_before_is_used() {
             assert_eq!(fs::read_to_string(whole.join("run.toml")).unwrap(), configuration, "{way}");
         }
     }
+    let ended = program::run(&mut Way::Channel.resume(3, &whole));
+    assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
 }
 
 #[test]

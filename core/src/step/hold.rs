@@ -29,7 +29,11 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     let slimness = &setup.slimness;
     // Looser than what is asked of each below, so that nothing depends on who shares a tile.
     let any_moves = |far: f32| solved.any_moves(slimness.longest_arm, 0.49 * far);
-    if setup.statics.is_empty() || !any_moves(slimness.of_bodies) && !far::any(&bodies.velocity[..tile.owned], setup) {
+    if setup.statics.is_empty() {
+        return Vec::new();
+    }
+    let any_goes_far = far::any(&bodies.velocity[..tile.owned], setup);
+    if !any_goes_far && !any_moves(slimness.of_bodies) {
         return Vec::new();
     }
     let goes = |row: usize, far: f32| {
@@ -46,7 +50,7 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
         }
     });
     let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
-    if any_moves(slimness.of_both) || far::any(&bodies.velocity[..tile.owned], setup) {
+    if any_goes_far || any_moves(slimness.of_both) {
         let may = |&row: &usize| setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics);
         rows.extend((0..tile.owned).filter(may));
         rows.sort_unstable();

@@ -74,7 +74,7 @@ fn is_choosy(kind: &KindRow) -> bool {
 /// How thin and how long anything is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slimness {
-    /// The least inner radius of a dynamic body, in meters.
+    /// The least inner radius of a dynamic body that is no sensor, in meters.
     pub(crate) of_bodies: f32,
     /// The least inner radius of a static that is no sensor, in meters; infinite where there is none.
     pub(crate) of_statics: f32,

@@ -18,7 +18,7 @@ const PASSES_OFF_STATICS: usize = 200;
 /// The part of the speed at which a contact closed that a pass may leave wrong.
 const EXACT: f32 = 1e-5;
 
-/// What is held comes nearer or parts by no more than gravity gives it in so many steps.
+/// In so many steps gravity gives what lies in a pile the speed at which it may come nearer and part.
 const STILL: f32 = 4.0;
 
 impl Groups {
@@ -75,9 +75,13 @@ impl Groups {
         let Self { bounces, bounces_at_once, held, .. } = self;
         let sides = |contact: usize| source.contacts.bodies[contact].map(|body| body as usize);
         let is_not_yet = |answer: &Answer| matches!(answer, Answer::NotYet(_));
+        let asked = bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.answers.iter().any(is_not_yet));
+        let mut asked = asked.peekable();
+        if asked.peek().is_none() {
+            return;
+        }
         held.clear();
         held.resize(source.tile.bodies.len(), None);
-        let asked = bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.answers.iter().any(is_not_yet));
         for contact in asked.map(|bounce| bounce.contact as usize) {
             for (body, kind) in sides(contact).into_iter().zip(source.kinds_of(contact)) {
                 held[body] = (kind.inv_mass > 0.0).then_some(false);
@@ -143,7 +147,7 @@ impl<'a> Source<'a> {
         self.contacts.bodies[contact].map(|body| self.setup.kind(self.tile.bodies.kind[body as usize]))
     }
 
-    /// What gravity gives the bodies of a contact in so many steps as what is held may take to settle, in m/s.
+    /// What gravity gives the bodies of a contact in [`STILL`] steps, in m/s.
     fn fall(self, contact: usize) -> f32 {
         let params = &self.setup.params;
         let scales = self.kinds_of(contact).map(|kind| kind.dynamics.gravity_scale.abs());
@@ -153,9 +157,11 @@ impl<'a> Source<'a> {
     /// Whether a point that comes nearer at that speed, in m/s, held its bodies in the last step, and does so yet: they come nearer or
     /// part slowly, as what lies in a pile does. Without gravity nothing lies.
     fn holds(self, contact: usize, point: usize, closing: f32) -> bool {
-        let fall = self.fall(contact);
-        let slow = fall + min(self.setup.params.restitution_threshold, 2.0 * fall);
-        self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && closing.abs() <= slow
+        let is_slow = || {
+            let fall = self.fall(contact);
+            closing.abs() <= fall + min(self.setup.params.restitution_threshold, 2.0 * fall)
+        };
+        self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && is_slow()
     }
 
     /// Speeds at which a point's surfaces will come nearer as they touch, and slide along each other, in m/s. The first is that of now,
