@@ -7,6 +7,7 @@ pub(crate) mod narrow_phase;
 pub(crate) mod passage;
 mod piece_boxes;
 pub(crate) mod proxies;
+mod seams;
 mod touch;
 mod wide_boxes;
 mod wide_moments;

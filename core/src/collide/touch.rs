@@ -7,8 +7,10 @@
 //! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
 mod meeting;
+mod stopped;
 
 pub(super) use meeting::{Meeting, Met, meet};
+pub(super) use stopped::Stopped;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
@@ -67,6 +69,10 @@ impl<'a> Side<'a> {
             velocity: bodies.velocity[i],
             angular_velocity: bodies.angular_velocity[i],
         }
+    }
+
+    fn moves(&self) -> bool {
+        self.kind.inv_mass > 0.0
     }
 
     #[inline(always)]
@@ -150,6 +156,16 @@ impl<'a> Approach<'a> {
         let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
         let between = b.velocity - a.velocity;
         Self { a, b, offset, between, pieces: None, features: 0 }
+    }
+
+    /// Of those that a contact is of, two pieces if they have some.
+    fn of_contact(tile: &Tile, pair: Pair, contact: &Contact, setup: &'a Setup) -> Self {
+        let mut pair = Self::new(tile, pair, setup);
+        if !(pair.a.kind.form.is_simple() && pair.b.kind.form.is_simple()) {
+            let [a, b] = contact.piece_numbers();
+            (pair.pieces, pair.features) = (Some([&pair.a.kind.pieces[a], &pair.b.kind.pieces[b]]), contact.pieces());
+        }
+        pair
     }
 
     /// The contact, if there is one, of bodies whose surfaces can move so [`far`](Self::far).

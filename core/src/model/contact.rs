@@ -72,6 +72,12 @@ impl Contact {
         self.points[0].feature & Self::features_of(PIECES - 1, PIECES - 1)
     }
 
+    /// The numbers of those pieces.
+    pub(crate) fn piece_numbers(&self) -> [usize; 2] {
+        let numbers = self.points[0].feature >> FEATURE_BITS;
+        [numbers >> PIECE_BITS, numbers].map(|number| (number & (PIECES - 1)) as usize)
+    }
+
     /// The part of a feature that names two pieces.
     pub(crate) fn features_of(piece_a: u32, piece_b: u32) -> u32 {
         (piece_a << PIECE_BITS | piece_b) << FEATURE_BITS

@@ -45,6 +45,18 @@ impl Contacts {
         });
     }
 
+    /// Takes out those at some places, ascending, of these and of a cache.
+    pub(in crate::collide) fn remove(&mut self, places: &[usize], cache: &mut ContactCache) {
+        fn without<T>(column: &mut Vec<T>, places: &[usize]) {
+            let (mut place, mut places) = (0.., places.iter().copied().peekable());
+            column.retain(|_| places.next_if_eq(&place.next().expect("it has no end")).is_none());
+        }
+        without(&mut cache.keys, places);
+        without(&mut cache.contacts, places);
+        without(&mut self.separation, places);
+        without(&mut self.bodies, places);
+    }
+
     /// Contacts of a tile, and border contacts, of which body A is owned: so that each is counted by one tile.
     pub(crate) fn count(&self, tile: &Tile) -> (u64, u64) {
         let (mut all, mut border) = (0, 0);

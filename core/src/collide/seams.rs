@@ -1,0 +1,109 @@
+//! Statics side by side are one surface. Contacts are made where bodies come on their free way, each as if it were alone; but where one
+//! stops a body, that does not go on into the side of the next, behind the surface that it came to.
+//!
+//! So what of several statics is touched behind the plane of the first one is looked for again, on the way that this one leaves. Sources for
+//! what goes wrong where each is seen alone: G. van den Bergen, "Collision Detection in Interactive 3D Environments", 2003; E. Catto,
+//! "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
+
+use crate::collide::broad_phase::Pair;
+use crate::collide::narrow_phase::Contacts;
+use crate::collide::touch::Stopped;
+use crate::model::contact::{Contact, PairKey, SlotKind};
+use crate::model::kind::Form;
+use crate::model::math::{dot, min};
+use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
+use glam::Vec2;
+use std::ops::Range;
+
+/// What stands out of a plane by less is not before it, in m, and as part of the radius of what there is room for in the body.
+const LEVEL: f32 = 0.0005;
+const LEVEL_BY_SIZE: f32 = 0.02;
+
+/// Normals count as one whose angle has a greater cosine.
+const ONE_NORMAL: f32 = 0.999_99;
+
+/// Looks again for those contacts of a tile that are behind others.
+pub(super) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
+    let mut gone = Vec::new();
+    let mut first = 0;
+    while let Some(run) = next_of_several(tile, first) {
+        first = run.end;
+        if run.clone().any(|i| run.clone().any(|k| is_behind(tile, contacts, [i, k], setup))) {
+            mend_of_one(tile, contacts, run, setup, &mut gone);
+        }
+    }
+    if !gone.is_empty() {
+        contacts.remove(&gone, &mut tile.contacts);
+    }
+}
+
+/// The next contacts, from one on, that a body has with several statics, or pieces of them: these are its last.
+fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
+    let keys = &tile.contacts.keys[from..];
+    let is_static = |key: &PairKey| matches!(key.high().kind(), SlotKind::Static(_));
+    let first = keys.windows(2).position(|two| two[0].low() == two[1].low() && is_static(&two[0]))?;
+    let count = keys[first..].iter().take_while(|key| key.low() == keys[first].low()).count();
+    Some(from + first..from + first + count)
+}
+
+/// Whether a contact is of another direction than a first one, and not before the plane of that. Round bodies roll from one to the other;
+/// what else pressed already stands on both.
+fn is_behind(tile: &Tile, contacts: &Contacts, [first, other]: [usize; 2], setup: &Setup) -> bool {
+    if first == other {
+        return false;
+    }
+    let contact = |number: usize| (&tile.contacts.contacts[number], contacts.bodies[number]);
+    let [one, two] = [first, other].map(|number| Face::new(tile, contact(number)));
+    let kind = setup.kind(tile.bodies.kind[two.body]);
+    let presses = tile.contacts.contacts[other].points().iter().any(|point| point.normal_impulse > 0.0);
+    if presses && kind.form != Form::Round || dot(one.normal, two.normal) > ONE_NORMAL {
+        return false;
+    }
+    let level = min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius);
+    let between = (tile.bodies.position[two.of] - tile.bodies.position[one.of]).as_vec2() - one.points[0];
+    two.points[..two.count].iter().all(|&point| dot(point + between, one.normal) < level)
+}
+
+/// Where a static is touched.
+struct Face {
+    body: usize,
+    of: usize,
+    /// Out of it.
+    normal: Vec2,
+    /// On its surface, from its center.
+    points: [Vec2; 2],
+    count: usize,
+}
+
+impl Face {
+    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair)) -> Self {
+        let is_first = a as usize >= tile.owned + tile.ghosts();
+        let (body, of, way, center) = if is_first { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
+        let normal = contact.normal * way;
+        let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
+        Self { body: body as usize, of: of as usize, normal, points, count: contact.point_count() }
+    }
+}
+
+/// Looks again for those contacts of a body that are behind others, each on the way that the first of these leaves.
+fn mend_of_one(tile: &mut Tile, contacts: &mut Contacts, run: Range<usize>, setup: &Setup, gone: &mut Vec<usize>) {
+    let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
+    let all = run.clone().map(|number| Stopped::new(tile, contact(number), setup));
+    let Some(all) = all.collect::<Option<Vec<_>>>() else { return };
+    let stopped = |number: usize| &all[number - run.start];
+    let again = run.clone().filter_map(|other| {
+        let before = |&first: &usize| {
+            stopped(first).order() < stopped(other).order() && is_behind(tile, contacts, [first, other], setup)
+        };
+        let sooner = |one, two| if stopped(two).order() < stopped(one).order() { two } else { one };
+        let first = run.clone().filter(before).reduce(sooner)?;
+        Some((other, stopped(first).touch(tile, contact(other), setup)))
+    });
+    for (number, found) in again.collect::<Vec<_>>() {
+        match found {
+            Some(found) => (tile.contacts.contacts[number], contacts.separation[number]) = found,
+            None => gone.push(number),
+        }
+    }
+}
