@@ -15,7 +15,7 @@ mod parallel;
 pub(crate) mod sleep;
 #[cfg(test)]
 mod tests;
-mod union_find;
+pub(crate) mod union_find;
 
 use crate::model::params::IslandSearch;
 use crate::parallel::team::Team;

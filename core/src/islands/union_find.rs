@@ -17,14 +17,7 @@ impl UnionFind {
         // As long as sets are joined, these are the parents.
         roots.clear();
         roots.extend(0..nodes as u32);
-        for &[a, b] in links {
-            let (a, b) = (root_of(roots, a), root_of(roots, b));
-            if a < b {
-                roots[b as usize] = a;
-            } else {
-                roots[a as usize] = b;
-            }
-        }
+        links.iter().for_each(|&link| join(roots, link));
 
         self.size.clear();
         self.size.resize(nodes, 0);
@@ -42,9 +35,16 @@ impl UnionFind {
     }
 }
 
+/// Joins the sets of two numbers.
+#[inline]
+pub(crate) fn join(parents: &mut [u32], link: [u32; 2]) {
+    let [a, b] = link.map(|number| root_of(parents, number));
+    parents[a.max(b) as usize] = a.min(b);
+}
+
 /// The lowest number in the set of `i`.
 #[inline]
-fn root_of(parents: &mut [u32], mut i: u32) -> u32 {
+pub(crate) fn root_of(parents: &mut [u32], mut i: u32) -> u32 {
     loop {
         let parent = parents[i as usize];
         if parent == i {

@@ -1,7 +1,7 @@
 //! The bounce of one contact: what becomes of its points once the solver has stopped them.
 
 use super::group::{PointRows, Sides, Totals};
-use crate::model::math::{clamp, max};
+use crate::model::math::{clamp, max, min};
 use crate::parallel::lanes::Quad;
 
 /// What becomes of a point that pressed in the step.
@@ -9,9 +9,11 @@ use crate::parallel::lanes::Quad;
 pub(crate) enum Answer {
     /// No more than the solver did.
     Rest,
+    /// No more than that, and less if it would part: what throws one of its bodies back is not to pull at the other.
+    Hold,
     /// It came in fast, and parts.
     Part(Parting),
-    /// Both bodies flew, and came no nearer, or slowly. Where more pressed than takes this speed, in m/s, it was a blow within the step,
+    /// Both bodies flew, and came no nearer, or slowly. Where what pressed takes more than this speed, in m/s, it was a blow within the step,
     /// which is passed on in the next one, as one between bodies that come in fast.
     NotYet(f32),
 }
@@ -79,14 +81,15 @@ impl Sides {
                 return acted;
             }
         }
-        let mut acted = false;
+        let (mut acted, is_blow) = (false, self.is_blow(points, totals, lane, answers, velocity));
         for ((point, totals), answer) in points.iter_mut().zip(totals).zip(answers) {
             let (pressed, rows) = (&mut totals.normal[lane], self.normal_rows(point, lane, velocity));
             let wanted = match answer {
                 Answer::Part(parting) if *pressed > 0.0 => {
                     point.normal_mass[lane] * (parting.speed - self.speed(rows, lane, velocity))
                 }
-                Answer::NotYet(most) if *pressed > most * point.normal_mass[lane] => -*pressed,
+                Answer::NotYet(_) if is_blow => -*pressed,
+                Answer::Hold if *pressed > 0.0 => min(0.0, -point.normal_mass[lane] * self.speed(rows, lane, velocity)),
                 _ => continue,
             };
             let impulse = max(wanted, -*pressed);
@@ -100,6 +103,25 @@ impl Sides {
             }
         }
         acted
+    }
+
+    /// Whether what pressed at the points of a contact was a blow within the step: at one of them, all of it.
+    fn is_blow(
+        &self,
+        points: &[PointRows],
+        totals: &[Totals],
+        lane: usize,
+        answers: [Answer; 2],
+        velocity: &[Quad],
+    ) -> bool {
+        let rows = |point: &PointRows| self.normal_rows(point, lane, velocity);
+        points.iter().zip(answers).any(|(point, answer)| {
+            let Answer::NotYet(most) = answer else { return false };
+            let own = rows(point);
+            let all = points.iter().zip(totals);
+            let taken: f32 = all.map(|(point, totals)| speed_given(own, rows(point)) * totals.normal[lane]).sum();
+            taken > most
+        })
     }
 
     /// Lets friction of the whole step be what the point's normal impulses of the whole step allow, as far as it slides yet.
@@ -148,11 +170,8 @@ impl Sides {
         velocity: &mut [Quad],
     ) -> Option<bool> {
         let rows = points.map(|point| self.normal_rows(point, lane, velocity));
-        let [[one_a, one_b], [two_a, two_b]] = rows;
-        let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-        // How much speed an impulse at one of them gives each.
-        let own = [product(one_a, one_a) + product(one_b, one_b), product(two_a, two_a) + product(two_b, two_b)];
-        let other = product(one_a, two_a) + product(one_b, two_b);
+        let own = rows.map(|rows| speed_given(rows, rows));
+        let other = speed_given(rows[0], rows[1]);
         let determinant = own[0] * own[1] - other * other;
         let lacks = [0, 1].map(|k| speeds[k] - self.speed(rows[k], lane, velocity));
         let back = [-*pressed[0], -*pressed[1]];
@@ -182,4 +201,10 @@ impl Sides {
         }
         Some(true)
     }
+}
+
+/// How much speed an impulse along some rows gives along others.
+fn speed_given([one_a, one_b]: [[f32; 3]; 2], [two_a, two_b]: [[f32; 3]; 2]) -> f32 {
+    let product = |u: [f32; 3], v: [f32; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    product(one_a, two_a) + product(one_b, two_b)
 }

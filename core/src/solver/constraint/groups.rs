@@ -33,6 +33,10 @@ pub(crate) struct Groups {
     pub(super) bounces_at_once: Vec<Bounce>,
     /// For each body whether something held it as the step began, where that was asked.
     pub(super) held: Vec<Option<bool>>,
+    /// For each body a lower one that a blow may go on to, or come from, or itself.
+    pub(super) on: Vec<u32>,
+    /// For each body whether a blow comes to it, and of those that it goes on to, and that know of this one as the lowest, to any.
+    pub(super) struck: Vec<[bool; 2]>,
 }
 
 /// A contact that may bounce.

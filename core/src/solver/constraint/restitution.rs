@@ -4,6 +4,7 @@ use super::bounce::{Answer, Parting};
 use super::columns::Columns;
 use super::groups::{Bounce, Groups, Lane};
 use super::rows::Source;
+use crate::islands::union_find::{join, root_of};
 use crate::model::kind::KindRow;
 use crate::model::math::{dot, max, min, right_perp, turn};
 use crate::model::params::Exchange;
@@ -17,6 +18,9 @@ const PASSES_OFF_STATICS: usize = 200;
 
 /// The part of the speed at which a contact closed that a pass may leave wrong.
 const EXACT: f32 = 1e-5;
+
+/// What takes so many times the speed at which bodies came nearer is more than that takes, however the solver rounds.
+const SURELY: f32 = 1.001;
 
 /// In so many steps gravity gives what lies in a pile the speed at which it may come nearer and part.
 const STILL: f32 = 4.0;
@@ -32,6 +36,7 @@ impl Groups {
             let kinds = source.kinds_of(i);
             let restitution = max(kinds[0].material.restitution, kinds[1].material.restitution);
             if restitution > 0.0 && self.is_solved(i as u32) {
+                let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
                 let mut answers = [Answer::Rest; 2];
                 let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
@@ -40,20 +45,25 @@ impl Groups {
                     *answer = if closing > threshold {
                         Answer::Part(Parting { closing, slip, speed: restitution * closing })
                     } else if source.holds(i, point, closing) {
-                        Answer::Rest
+                        Answer::Hold
                     } else {
-                        Answer::NotYet(max(closing, 0.0) + source.fall(i))
+                        Answer::NotYet(SURELY * max(closing, 0.0) + source.fall(i))
                     };
                 }
                 if answers != [Answer::Rest; 2] {
-                    let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
                     let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
                     let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
                     bounces.push(Bounce { contact: i as u32, closing: fastest, off_static, answers });
                 }
             }
         }
-        self.leave_held(source);
+        if self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
+            self.leave_held(source);
+            self.leave_unstruck(source);
+        } else {
+            self.bounces.clear();
+            self.bounces_at_once.clear();
+        }
         self.bouncing.extend(self.bounces.iter().map(|bounce| bounce.contact));
         let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
@@ -74,8 +84,7 @@ impl Groups {
     fn leave_held(&mut self, source: Source<'_>) {
         let Self { bounces, bounces_at_once, held, .. } = self;
         let sides = |contact: usize| source.contacts.bodies[contact].map(|body| body as usize);
-        let is_not_yet = |answer: &Answer| matches!(answer, Answer::NotYet(_));
-        let asked = bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.answers.iter().any(is_not_yet));
+        let asked = bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on());
         let mut asked = asked.peekable();
         if asked.peek().is_none() {
             return;
@@ -96,11 +105,39 @@ impl Groups {
             }
         }
         let is_held = |bounce: &Bounce| sides(bounce.contact as usize).iter().any(|&body| held[body] == Some(true));
-        for bounces in [bounces, bounces_at_once] {
-            for bounce in bounces.iter_mut().filter(|bounce| is_held(bounce)) {
-                bounce.answers.iter_mut().filter(|answer| is_not_yet(answer)).for_each(|answer| *answer = Answer::Rest);
+        [bounces, bounces_at_once].into_iter().for_each(|bounces| leave(bounces, is_held));
+    }
+
+    /// And those that no blow comes to, from one to the next, from where something comes in fast: who comes slowly is stopped, with all that
+    /// lies on him. Passed on, that would come as slowly in each step, and be stopped as often.
+    ///
+    /// What only holds is left out of it all, but beside what parts.
+    fn leave_unstruck(&mut self, source: Source<'_>) {
+        let Self { bounces, bounces_at_once, on, struck, .. } = self;
+        let moving = |bounce: &Bounce| {
+            let contact = bounce.contact as usize;
+            let sides = source.contacts.bodies[contact].into_iter().zip(source.kinds_of(contact));
+            sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
+        };
+        on.clear();
+        on.extend(0..source.tile.bodies.len() as u32);
+        for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
+            let mut moving = moving(bounce);
+            if let (Some(one), Some(other)) = (moving.next(), moving.next()) {
+                join(on, [one, other]);
             }
-            bounces.retain(|bounce| bounce.answers != [Answer::Rest; 2]);
+        }
+        struck.clear();
+        struck.resize(source.tile.bodies.len(), [false; 2]);
+        for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.parts()) {
+            for body in moving(bounce) {
+                (struck[body as usize][0], struck[root_of(on, body) as usize][1]) = (true, true);
+            }
+        }
+        let mut is_unstruck = |bounce: &Bounce| !moving(bounce).any(|body| struck[root_of(on, body) as usize][1]);
+        for bounces in [bounces, bounces_at_once] {
+            leave(bounces, &mut is_unstruck);
+            bounces.retain(|bounce| bounce.passes_on() || moving(bounce).any(|body| struck[body as usize][0]));
         }
     }
 
@@ -122,6 +159,29 @@ impl Groups {
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
         bounce(&bounces[own], lanes, at_once, bodies);
+    }
+}
+
+/// Has those points hold that are not to bounce yet.
+fn leave(bounces: &mut [Bounce], mut whose: impl FnMut(&Bounce) -> bool) {
+    for bounce in bounces.iter_mut().filter(|bounce| whose(bounce)) {
+        bounce.answers.iter_mut().filter(|answer| answer.passes_on()).for_each(|answer| *answer = Answer::Hold);
+    }
+}
+
+impl Bounce {
+    fn parts(&self) -> bool {
+        self.answers.iter().any(|answer| matches!(answer, Answer::Part(_)))
+    }
+
+    fn passes_on(&self) -> bool {
+        self.answers.iter().any(Answer::passes_on)
+    }
+}
+
+impl Answer {
+    fn passes_on(&self) -> bool {
+        matches!(self, Self::NotYet(_))
     }
 }
 
