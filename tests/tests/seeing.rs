@@ -332,7 +332,7 @@ fn a_page_tells_of_a_run_and_needs_no_other_file() {
 #[test]
 fn a_page_says_what_is_missing_and_refuses_what_is_no_run() {
     let desk = desk(SMALL);
-    let ended = atoll(desk.path(), "run world.toml --out a --quiet --record-every 6");
+    let ended = atoll(desk.path(), "run world.toml --out a --quiet --record-every 3 --checkpoint-every 3");
     assert_eq!(ended.code, Some(0), "{ended}");
     let run = desk.path().join("a");
     // As a killed run leaves it, with a hostile remark in its configuration.
@@ -366,3 +366,13 @@ fn a_page_says_what_is_missing_and_refuses_what_is_no_run() {
     refused("report a --out p.html", ".parquet");
     assert!(!desk.path().join("p.html").exists());
 }
+    fs::write(run.join("log.csv"), "step,time\n0,0.0\n6,O.1\n").unwrap();
+    refused("report a --out p.html", "log.csv is damaged: line 3 is no row of this log; remove it, or bring back");
+    fs::remove_file(run.join("log.csv")).unwrap();
+    // Of step 6, of which nothing is drawn.
+    let middle = run.join("rank-00000/steps-0000000006-0000000006.parquet");
+    let good = fs::read(&middle).unwrap();
+    let bad: Vec<u8> = good.iter().enumerate().map(|(at, byte)| if at == 600 { !byte } else { *byte }).collect();
+    fs::write(&middle, bad).unwrap();
+    refused("report a --out p.html", "the bytes of step 6 are not those that were written");
+    fs::write(&middle, good).unwrap();

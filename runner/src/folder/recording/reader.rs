@@ -177,6 +177,15 @@ impl Recording {
     /// What is wrong with the file that tells of tiles, if anything is: then they are not known.
     pub(crate) fn damage(&self) -> Option<&str> {
         self.tilings.damage()
+    /// Reads all records, as nothing but that shows whether they are whole.
+    ///
+    /// # Errors
+    /// If a file is damaged.
+    pub(crate) fn check(&self) -> Result<(), RecordingError> {
+        let mut rows = Vec::new();
+        self.steps.iter().try_for_each(|&step| self.read(step, &mut rows))
+    }
+
     }
 
     /// The tiles with which a step was made, if they follow the bodies.
