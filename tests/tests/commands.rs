@@ -372,7 +372,7 @@ fn what_is_refused_is_not_kept_and_a_run_goes_on_from_there() {
     assert_eq!((kept("skipped"), kept("whole")), (of(&[0, 1, 3, 4]), of(&[0, 1, 3, 4])));
     // A run that it ends goes on with the lines after it, and so does one that is driven.
     let refused = "line 3 (\"again\"): step 3: there is no body 40; mend it, or leave out what cannot be done by \
-                   --skip-refused, and go on with `atoll run --resume ";
+                   --skip-refused; to go on without it, or with --commands and what was mended: `atoll run --resume ";
     let ended = program::run(&mut start("filed", &["--commands", &bad]));
     assert!(ended.code == Some(2) && ended.complaints().len() == 1 && ended.stderr.contains(refused), "{ended}");
     assert_eq!(kept("filed"), of(&[0, 1, 3, 4]));
