@@ -217,7 +217,7 @@ mod tests {
             assert!(error.contains(expected) && !error.contains('\n'), "{error}");
         }
         for (physics, expected) in [
-            ("gravity = 9", "world.toml: physics.gravity = 9: must be two numbers, such as [0, -10]"),
+            ("gravity = 9", "world.toml: physics.gravity = 9: must be two numbers of at most 3.4e38, such as [0, -10]"),
             ("gravty = [0, 9]", "world.toml: physics.gravty = [0, 9]: unknown key; did you mean physics.gravity?"),
             ("substeps = 100", "world.toml: physics.substeps = 100: must be within 1 to 64"),
             ("margin_cap = 0.01", "world.toml: physics.margin_cap = 0.01: must be finite and at least margin_floor"),
