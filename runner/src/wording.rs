@@ -3,6 +3,7 @@
 use atoll_core::Shape;
 use glam::Vec2;
 use std::fmt::{self, Write as _};
+use toml::Value;
 
 /// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
 /// control characters becomes a space.
@@ -48,6 +49,12 @@ pub(crate) fn nearest_by<'a>(words: impl Iterator<Item = &'a str>, likeness: imp
 /// What to add to a refusal of a word, if another is like it.
 pub(crate) fn did_you_mean(suggestion: &Option<String>) -> String {
     suggestion.as_ref().map(|word| format!("; did you mean {word}?")).unwrap_or_default()
+}
+
+/// A number as TOML has it, with an exponent where it would be long.
+pub(crate) fn exponential(number: f64) -> String {
+    let is_long = number.is_finite() && number != 0.0 && !(1e-5..1e9).contains(&number.abs());
+    if is_long { format!("{number:e}") } else { Value::Float(number).to_string() }
 }
 
 /// A number with as few digits as it takes, up to four behind the point.

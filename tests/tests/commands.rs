@@ -258,7 +258,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
     for (text, expected) in [
         ("{\"step\": 3, \"remove\": 40}\n", "line 2: step 3: there is no body 40; mend it, or leave out"),
         ("{\"step\": 3, \"remove\": [50, 50]}\n", "line 2: step 3: there is no body 50"),
-        ("{\"step\": 3, \"remove\": 2}\n", "line 2: step 3: there is no body 2"),
+        ("{\"step\": 3, \"remove\": 2}\n", "line 2: step 3: 2 is a static, and stays as it is; name a body; mend it"),
         ("{\"step\": 3, \"add\": {\"id\": 41, \"x\": 1, \"y\": 1}}\n", "line 2: step 3: there is a body 41 already"),
         (
             "{\"step\": 3, \"add\": {\"id\": 0, \"x\": 1, \"y\": 1}}\n",
@@ -300,7 +300,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
             "what was said: line 1: step 0: add, x = 1e10: must be within -1e9 to 1e9 m",
         ),
         ("{\"remve\": 40}\n", "what was said: line 1: step 0: unknown field `remve`, expected one of"),
-        ("{\"remove\": 2}\n", "what was said: line 1: step 0: there is no body 2"),
+        ("{\"remove\": 2}\n", "what was said: line 1: step 0: 2 is a static, and stays as it is; name a body"),
         ("{\"until\": 3, \"remove\": 40}\n", "what was said: line 1: step 0: until stands by itself"),
     ] {
         let (heard, mut said) = std::io::pipe().unwrap();
@@ -372,7 +372,7 @@ fn what_is_refused_is_not_kept_and_a_run_goes_on_from_there() {
     assert_eq!((kept("skipped"), kept("whole")), (of(&[0, 1, 3, 4]), of(&[0, 1, 3, 4])));
     // A run that it ends goes on with the lines after it, and so does one that is driven.
     let refused = "line 3 (\"again\"): step 3: there is no body 40; mend it, or leave out what cannot be done by \
-                   --skip-refused, and go on with `atoll run --resume ";
+                   --skip-refused; to go on without it, or with --commands and what was mended: `atoll run --resume ";
     let ended = program::run(&mut start("filed", &["--commands", &bad]));
     assert!(ended.code == Some(2) && ended.complaints().len() == 1 && ended.stderr.contains(refused), "{ended}");
     assert_eq!(kept("filed"), of(&[0, 1, 3, 4]));

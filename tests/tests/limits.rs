@@ -82,6 +82,10 @@ fn a_world_beyond_the_limit_on_memory_is_refused() {
     let told = "atoll: too large for the limit on a process (ulimit -v): 20000000 bodies need about ";
     assert!(ended.code == Some(2) && ended.stderr.starts_with(told), "{ended}");
     assert!(ended.complaints().len() == 1 && !folder.path().join("exported").exists(), "{ended}");
+    std::fs::write(folder.path().join("world.json"), format!("{{{}", " ".repeat(60 << 20))).unwrap();
+    let ended = limited("-v 1000000", "scene import $DIR/world.json --out $DIR/imported", folder.path());
+    let told = "atoll: too large for the limit on a process (ulimit -v): the bodies of ";
+    assert!(ended.code == Some(2) && ended.stderr.starts_with(told), "{ended}");
 }
 
 /// Four thousand boxes within half a meter: each would touch all others.

@@ -303,6 +303,7 @@ fn every_fault_is_told_in_a_line_of_its_own() {
     rows[5] = "1,2,3".to_owned();
     rows[8] = rows[7].clone();
     rows[9] = "700000,3,1,1,0".to_owned();
+    rows[11] = rows[12].clone();
     let (_folder, path) = files(&world(["", ""], ""), &rows);
     // The text is wrong in several places as well.
     let text =
@@ -318,7 +319,7 @@ fn every_fault_is_told_in_a_line_of_its_own() {
         "row 4 (line 5), x = NaN: must be a finite number",
         "row 6 (line 7): 3 values where the first line names 5 columns",
         "row 10 (line 11), kind = 3: there are kinds 0 to 1",
-        "row 9, id = 59: the body of row 8 has this id as well",
+        "row 9, id = 59: the body of row 8 has this id as well; give each its own, or leave the column id out; there are 1 more",
     ];
     for (line, expected) in told.iter().zip(expected) {
         assert!(line.contains(expected), "{ended}");

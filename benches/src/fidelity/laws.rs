@@ -11,7 +11,8 @@ use glam::{DVec2, Vec2};
 /// A case.
 pub(super) struct Law {
     pub(super) name: String,
-    pub(super) theory: f64,
+    /// What theory says, which may take a while to reckon.
+    pub(super) theory: Box<dyn Fn() -> f64>,
     /// For how many moments within a step it is measured.
     pub(super) phases: u32,
     /// The world at a number of steps per second; surfaces meet after that part of a step.
@@ -81,7 +82,7 @@ fn wall(velocity: Vec2, spin: f32, restitution: f32) -> Law {
     let of = if restitution > 0.0 { format!(" of restitution {restitution}") } else { String::new() };
     Law {
         name: format!("a disc{of} meets a wall at {velocity} m/s, turning at {spin} rad/s: spin after"),
-        theory: f64::from(spin - 2.0 * pull / RADIUS),
+        theory: Box::new(move || f64::from(spin - 2.0 * pull / RADIUS)),
         phases: PHASES,
         start: Box::new(start),
         read: |course| Ok(course.after(0.1)?[0].angular_velocity.into()),
@@ -103,7 +104,7 @@ fn discs(apart: f32) -> Law {
     };
     Law {
         name: format!("two discs meet at 10 m/s, {apart} m beside each other: spin after"),
-        theory: f64::from(2.0 * pull / RADIUS),
+        theory: Box::new(move || f64::from(2.0 * pull / RADIUS)),
         phases: PHASES,
         start: Box::new(start),
         read: |course| Ok(course.after(0.1)?[0].angular_velocity.abs().into()),
@@ -115,7 +116,7 @@ fn pair() -> Law {
     let Law { start, .. } = discs(0.2);
     Law {
         name: "the same, 0.2 m: angular momentum, by what it was".to_owned(),
-        theory: 1.0,
+        theory: Box::new(move || 1.0),
         phases: PHASES,
         start,
         read: |course| {
@@ -153,7 +154,7 @@ fn corner((width, height): (f32, f32), degrees: f32, velocity: Vec2) -> Law {
     let how = if slides { ", and slides on" } else { "" };
     Law {
         name: format!("a box lands on a corner, turned by {degrees} degrees{how}: spin after"),
-        theory: f64::from(arm.perp_dot(impulse) / inertia),
+        theory: Box::new(move || f64::from(arm.perp_dot(impulse) / inertia)),
         phases: PHASES,
         start: Box::new(start),
         read: |course| Ok(course.after(3.0 / course.hertz)?[0].angular_velocity.into()),
@@ -177,7 +178,7 @@ fn incline(name: &str, degrees: f32, friction: f32, shape: Shape) -> Law {
     };
     Law {
         name: format!("{name} {degrees} degrees, friction {friction}: acceleration"),
-        theory: if rolls { 10.0 * sine / 1.5 } else { 10.0 * (sine - f64::from(friction) * cosine) },
+        theory: Box::new(move || if rolls { 10.0 * sine / 1.5 } else { 10.0 * (sine - f64::from(friction) * cosine) }),
         phases: PHASES,
         start: Box::new(start),
         read: |course| {
@@ -205,7 +206,7 @@ fn bounce(name: &str, shape: &Shape, restitution: f32) -> Law {
     };
     Law {
         name: format!("a {name} of restitution {restitution} bounces: height by that of its fall"),
-        theory: f64::from(restitution * restitution),
+        theory: Box::new(move || f64::from(restitution * restitution)),
         phases: PHASES,
         start: Box::new(start),
         read: |course| {

@@ -103,8 +103,7 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
     };
     recording.damage().iter().for_each(|damage| complain(damage));
     let (steps, files) = (recording.steps(), recording.files());
-    let mut rows = Vec::new();
-    steps.iter().try_for_each(|&step| recording.read(step, &mut rows))?;
+    recording.check()?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
     let shapes = recording.stage().map_or("no shapes".to_owned(), shapes);

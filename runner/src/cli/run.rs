@@ -17,7 +17,7 @@ use crate::launch;
 use crate::plan::{Commands, Plan};
 #[cfg(feature = "iceoryx2")]
 use crate::rank::StopFlag;
-use crate::rank::{Host, Observer, check_commands, check_logs};
+use crate::rank::{Host, Observer, TraceSteps, check_commands, check_logs};
 use crate::summary::{Summary, timings, trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -138,12 +138,24 @@ fn is_begun(args: &RunArgs) -> bool {
 
 /// Works out what the arguments ask for; `goes_on` says that the run was begun before.
 fn plan(args: &RunArgs, config: &Config, goes_on: bool) -> Result<Plan, RunError> {
+    check_trace(args, config.run.steps)?;
     match folder(args) {
         Some(folder) if goes_on => Plan::going_on(config, folder),
         Some(folder) => Plan::beginning(config, folder),
         None => Plan::new(config),
     }
     .and_then(|plan| Ok(Plan { log: args.log.clone(), commands: commands(args, goes_on)?, ..plan }))
+}
+
+/// Refuses to trace steps of which the run makes none.
+fn check_trace(args: &RunArgs, steps: u64) -> Result<(), RunError> {
+    match &args.trace_steps {
+        Some(TraceSteps::Range(range)) if range.start >= steps => {
+            let reason = format!("the last step that is to be made is {}, counted from 0; choose others", steps - 1);
+            Err(RunError::Unsuitable { option: format!("--trace-steps {}..{}", range.start, range.end), reason })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What the run is told to do, and was.

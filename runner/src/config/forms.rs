@@ -162,7 +162,12 @@ pub(super) struct Hertz;
 
 impl Form for Hertz {
     fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
-        keep(settings.float(key)?.map(|hertz| 1.0 / hertz), &mut config.params.dt);
+        let dt = settings.float(key)?.map(f32::recip);
+        // The physics tells of others that cannot be.
+        if dt == Some(f32::INFINITY) {
+            return Err(settings.refusal(key, "positive and finite, and at least 1e-38"));
+        }
+        keep(dt, &mut config.params.dt);
         Ok(())
     }
 

@@ -1,12 +1,12 @@
 //! Forms of what a configuration says of its scene, which may be in files of its own.
 
-use super::error::ConfigError;
+use super::error::{ConfigError, Given, Origin};
 use super::forms::{Form, keep, whole};
 use super::keys::{self, KEYS, MOST_BODIES};
 use super::read;
 use super::sections::Config;
 use super::settings::{Settings, one_of};
-use crate::scene::{FileSpec, SceneFile, SceneKind};
+use crate::scene::{FileSpec, SceneError, SceneFile, SceneKind};
 use toml::Value;
 
 /// The kind of scene, from which everything else that is usual follows: it stands first.
@@ -43,7 +43,14 @@ fn in_files(settings: &mut Settings) -> Result<Config, ConfigError> {
         let spec = FileSpec::of_begun(path.to_string_lossy().into_owned(), digest);
         return Ok(Config::usual(SceneKind::File(spec)));
     }
-    let spec = FileSpec::open(&path)?;
+    let is_here = matches!(settings.given(PATH), Some(Given { origin: Origin::Set, .. }));
+    let spec = FileSpec::open(&path).map_err(|error| match error {
+        SceneError::Read { file, what, reason } if !is_here && !path.exists() => {
+            let reason = format!("{reason}; if it was moved, say where it is: --set scene.path=PATH");
+            SceneError::Read { file, what, reason }
+        }
+        error => error,
+    })?;
     let file = spec.file()?;
     let mut config = Config::usual(SceneKind::File(spec));
     read_physics(&file, &mut config)?;
@@ -193,7 +200,7 @@ mod tests {
             (WORLD, "", &[][..], "c.toml: scene.path is missing: must be the path of a scene, such as \"world.toml\""),
             (WORLD, "path = 3\n", &[], "c.toml: scene.path = 3: must be a path"),
             (WORLD, "path = \"\"\n", &[], "c.toml: scene.path = \"\": must be a path"),
-            (WORLD, "path = \"none.toml\"\n", &[], "none.toml: cannot read this scene: "),
+            (WORLD, "path = \"none.toml\"\n", &[], "; if it was moved, say where it is: --set scene.path=PATH"),
             (
                 WORLD,
                 path,
@@ -217,7 +224,7 @@ mod tests {
             assert!(error.contains(expected) && !error.contains('\n'), "{error}");
         }
         for (physics, expected) in [
-            ("gravity = 9", "world.toml: physics.gravity = 9: must be two numbers, such as [0, -10]"),
+            ("gravity = 9", "world.toml: physics.gravity = 9: must be two numbers of at most 3.4e38, such as [0, -10]"),
             ("gravty = [0, 9]", "world.toml: physics.gravty = [0, 9]: unknown key; did you mean physics.gravity?"),
             ("substeps = 100", "world.toml: physics.substeps = 100: must be within 1 to 64"),
             ("margin_cap = 0.01", "world.toml: physics.margin_cap = 0.01: must be finite and at least margin_floor"),

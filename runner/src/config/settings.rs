@@ -2,7 +2,7 @@
 
 use super::error::{ConfigError, Given, Origin};
 use super::spelling;
-use crate::wording::nearest;
+use crate::wording::{exponential, nearest};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -205,7 +205,7 @@ impl Settings {
             [x, y] => Some([value_as_f32(x)?, value_as_f32(y)?]),
             _ => None,
         };
-        self.get(key, "two numbers, such as [0, -10]", pair)
+        self.get(key, "two numbers of at most 3.4e38, such as [0, -10]", pair)
     }
 
     /// `"auto"` or a whole number from one on; `None` stands for auto.
@@ -310,6 +310,11 @@ fn value_as_f32(value: &Value) -> Option<f32> {
 
 /// A value as TOML would write it, on one line.
 fn one_line(value: &Value) -> String {
+    match value {
+        Value::Float(number) => return exponential(*number),
+        Value::Array(all) => return format!("[{}]", all.iter().map(one_line).collect::<Vec<_>>().join(", ")),
+        _ => {}
+    }
     let text: Vec<String> = value.to_string().lines().map(|line| line.trim().to_owned()).collect();
     text.join(" ")
 }

@@ -3,7 +3,7 @@
 use super::durable::{create_folder_durably, remove_if_there, sync_folder, write_durably};
 use super::{FolderError, RunFolder};
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::process;
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -143,6 +143,7 @@ impl RunFolder {
     /// # Errors
     /// If the folder here is another one: hosts of a cluster must see the same files.
     pub fn share(&self, token: &[u8], patience: Duration) -> Result<Claim, FolderError> {
+        const SAME: &str = "every process of a run must see the same folder";
         let deadline = Instant::now() + patience;
         let reason = loop {
             let reason = match self.token() {
@@ -150,15 +151,16 @@ impl RunFolder {
                     let lock = self.open_lock().ok().filter(|lock| lock.lock_shared().is_ok());
                     return Ok(Claim { _lock: lock });
                 }
-                Ok(_) => "it is not the folder that rank 0 writes to".to_owned(),
-                Err(error) => error.to_string(),
+                Ok(_) => format!("it is not the folder that rank 0 writes to; {SAME}"),
+                Err(error) if error.kind() == ErrorKind::NotFound => format!("{error}; {SAME}"),
+                Err(error) => format!("its file lock cannot be read: {error}"),
             };
             if Instant::now() > deadline {
                 break reason;
             }
             sleep(POLL);
         };
-        Err(self.refusal(format!("{reason}; every process of a run must see the same folder")))
+        Err(self.refusal(reason))
     }
 
     fn open_lock(&self) -> io::Result<File> {
@@ -193,6 +195,10 @@ mod tests {
                 "{told}"
             );
         }
+        let other = RunFolder::new("--out", &folder.path().join("other"));
+        fs::create_dir_all(other.lock()).unwrap();
+        let told = other.share(&token, Duration::ZERO).unwrap_err().to_string();
+        assert!(told.contains("other: its file lock cannot be read: ") && !told.contains("same folder"), "{told}");
         let told = run.hold(None).unwrap_err().to_string();
         assert!(told.contains("another run is writing there"), "{told}");
         drop(claim);

@@ -52,6 +52,9 @@ pub struct Ended {
     /// How many of them were missing at its end.
     #[serde(default)]
     pub bodies_lost: i64,
+    /// How many tiles there were at its end.
+    #[serde(default, skip_serializing)]
+    pub(crate) tile_count: Option<u64>,
 }
 
 impl Ended {
@@ -86,7 +89,7 @@ mod tests {
         let [state_hash, contact_hash] = ["00ff", "ff00"].map(|hash| Some(hash.to_owned()));
         let whole = r#"{"steps": 7, "more": 1, "interrupted": false, "state_hash": "00ff", "contact_hash": "ff00",
             "bodies": 9, "bodies_lost": -1}"#;
-        let expected = Ended { steps: 7, interrupted: false, state_hash, contact_hash, bodies: 9, bodies_lost: -1 };
+        let expected = Ended { steps: 7, state_hash, contact_hash, bodies: 9, bodies_lost: -1, ..Ended::default() };
         assert_eq!(read(whole), Ok(expected));
         let short = Ended { steps: 8, interrupted: true, ..Ended::default() };
         assert_eq!(read(r#"{"steps": 8, "interrupted": true}"#), Ok(short));

@@ -14,6 +14,9 @@ const LOCK: &str = "lock";
 /// The name of what says what is run.
 pub(super) const CONFIGURATION: &str = "run.toml";
 
+/// How its last line begins.
+const LAST_LINE: &str = "\nlog_every = ";
+
 /// The name of what is done while it runs.
 const COMMANDS: &str = "commands.jsonl";
 
@@ -159,6 +162,11 @@ impl RunFolder {
     /// If none was, or it is damaged.
     pub fn begun(&self) -> Result<Config, FolderError> {
         self.check_begun()?;
+        let text = fs::read_to_string(self.configuration()).unwrap_or_default();
+        // What wrote no log yet wrote no such line.
+        if self.log().is_file() && !text.contains(LAST_LINE) {
+            return Err(self.bad_configuration("its end is missing"));
+        }
         let config = Config::load_begun(&self.configuration());
         config.map_err(|error| self.bad_configuration(&error.to_string()))
     }
@@ -260,6 +268,16 @@ mod tests {
         let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
         assert_eq!(left, ["lock", "notes", "run.toml"]);
+    }
+
+    #[test]
+    fn a_configuration_without_its_end_is_damaged() {
+        let (_folder, run) = folder(&["run.toml", "log.csv"]);
+        run.begun().unwrap();
+        let whole = fs::read_to_string(run.configuration()).unwrap();
+        fs::write(run.configuration(), whole.split_once("[output]").unwrap().0).unwrap();
+        let told = run.begun().unwrap_err().to_string();
+        assert!(told.contains("its run.toml is damaged: its end is missing; bring back a good copy of it"), "{told}");
     }
 
     #[test]

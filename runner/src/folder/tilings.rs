@@ -140,11 +140,16 @@ impl Tilings {
         let bad = text.split_inclusive('\n').nth(all.len()).filter(|line| line.ends_with('\n') || is_empty);
         let bad = bad.map(|_| format!("line {} cannot be read", all.len() + 1));
         let damage = missing.or(bad).or_else(|| is_empty.then(|| "it is empty".to_owned()));
-        let damage = damage.map(|reason| {
-            let path = path.display();
-            format!("{path}: {reason}, so tiles are not shown as they were; bring back a good copy of it")
-        });
-        Self { all, damage }
+        Self { all, damage: damage.map(|reason| told(path, &reason)) }
+    }
+
+    /// That the last of them are so many tiles, as the run is known to have ended with.
+    pub(crate) fn check_last(&mut self, path: &Path, count: u64) {
+        let found = self.all.last().map_or(0, |(_, partition)| partition.tiles() as u64);
+        if found != count {
+            let reason = || format!("it ends with {found} tiles, and the run ended with {count}");
+            self.damage.get_or_insert_with(|| told(path, &reason()));
+        }
     }
 
     /// What is wrong with their file, if anything is, and how to mend it.
@@ -157,6 +162,10 @@ impl Tilings {
         let before = self.all.partition_point(|(after, _)| *after < step).max(1);
         self.all.get(before - 1).map(|(_, partition)| partition)
     }
+}
+
+fn told(path: &Path, reason: &str) -> String {
+    format!("{}: {reason}, so tiles are not shown as they were; bring back a good copy of it", path.display())
 }
 
 #[cfg(test)]
@@ -208,6 +217,13 @@ mod tests {
         fs::write(&path, fs::read_to_string(&path).unwrap() + "{\"after\":9").unwrap();
         assert_eq!(found([0, 1, 64, 65, 128, 129]), [0, 1, 1, 2, 2, 2].map(Some));
         assert_eq!(damage(), None);
+        let ended = |count| {
+            let mut tilings = read();
+            tilings.check_last(&path, count);
+            tilings.damage().map(str::to_owned)
+        };
+        assert_eq!(ended(5), None);
+        assert!(ended(8).unwrap().contains("it ends with 5 tiles, and the run ended with 8, so"));
         fs::write(&path, "{\"after\":0,\"levels\":\"q\"}\n").unwrap();
         assert!(damage().unwrap().contains("line 1 cannot be read, so tiles are not shown as they were"));
     }

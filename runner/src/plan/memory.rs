@@ -56,8 +56,15 @@ pub(super) fn check(
 /// If there is no room for them.
 pub(crate) fn check_list(bodies: u64) -> Result<(), RunError> {
     // They are sorted by keys of at most half their size.
-    let needed = bodies.saturating_mul(size_of::<Body>() as u64 * 3 / 2);
-    let what = || format!("{bodies} bodies");
+    check_held(&format!("{bodies} bodies"), bodies.saturating_mul(size_of::<Body>() as u64 * 3 / 2))
+}
+
+/// Refuses so many bytes to be held by this process for something, before it tries to.
+///
+/// # Errors
+/// If there is no room for them.
+pub(crate) fn check_held(what: &str, needed: u64) -> Result<(), RunError> {
+    let what = || what.to_owned();
     within_machine(needed, what)?;
     within_limit(needed.saturating_add(PROCESS), left_of_limit(), what)
 }

@@ -11,7 +11,7 @@ pub(crate) mod tiles;
 pub(crate) use assignment::Assignment;
 pub(crate) use commands::Commands;
 pub(crate) use holding::Holding;
-pub(crate) use memory::check_list;
+pub(crate) use memory::{check_held, check_list};
 
 use crate::config::{Config, OutputConfig, TransportKind};
 use crate::error::RunError;

@@ -69,6 +69,14 @@ impl SceneError {
         Self::bad(file, Place::default(), reason)
     }
 
+    /// That so much more is wrong in the same way.
+    pub(super) fn and_more(mut self, more: usize) -> Self {
+        if let (Self::Bad { reason, .. }, 1..) = (&mut self, more) {
+            reason.push_str(&format!("; there are {more} more like this"));
+        }
+        self
+    }
+
     /// Where something is wrong and what, for what is in no file.
     pub(super) fn without_file(self) -> String {
         match self {

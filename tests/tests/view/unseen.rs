@@ -110,7 +110,7 @@ fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
     std::fs::write(&acts, "{\"step\": 3, \"remove\": 777777}\n").unwrap();
     for way in Way::all() {
         let mut command = way.command(if way == Way::Local { 1 } else { 2 }, "configs/quickstart.toml");
-        let served = Served::start(command.args(small(4_000_000_000)).args(["--view", "--skip-refused"]));
+        let served = Served::start(command.args(small(4_000_000_000)).arg("--view"));
         let mut page = Page::open(&served);
         page.wish(&json!({ "do": "command", "line": "{\"remove\": 999999}" }));
         let note = heard(&mut page, "note")["text"].as_str().unwrap().to_owned();

@@ -33,6 +33,9 @@ pub enum ShapeError {
     /// Points on one line.
     #[error("its points lie on one line; give three that do not, or two and a radius for a capsule")]
     Flat,
+    /// A capsule that is hardly more than a line.
+    #[error("its radius is less than a ten thousandth of its length; give a greater one, or a box")]
+    Thin,
     /// Parts of a compound.
     #[error("a compound of {count} parts; use 1 to {MOST_PARTS}")]
     Parts {

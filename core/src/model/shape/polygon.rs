@@ -38,9 +38,11 @@ impl Polygon {
             return Err(ShapeError::Corners { count: corners.len() });
         }
         let size = size(&corners);
-        let is_flat = corners.len() < 3;
-        if is_flat && (corners.len() < 2 || f64::from(radius) <= FLAT * size) {
-            return Err(ShapeError::Flat);
+        match corners.len() {
+            2 if f64::from(radius) > FLAT * size => {}
+            2 if radius > 0.0 => return Err(ShapeError::Thin),
+            0..=2 => return Err(ShapeError::Flat),
+            _ => {}
         }
         let center = Mass::of_rounded(&corners, radius.into()).center;
         let center = if center.length() <= CENTERED * size { DVec2::ZERO } else { center };

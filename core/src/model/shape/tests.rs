@@ -154,6 +154,7 @@ fn what_is_no_shape_is_refused() {
     assert_eq!(error(&[], 1.0), ShapeError::Flat);
     assert_eq!(error(&[(0.0, 0.0), (0.0, 0.0)], 1.0), ShapeError::Flat);
     assert_eq!(error(&[(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)], 0.0), ShapeError::Flat);
+    assert_eq!(error(&[(0.0, 0.0), (1.0, 0.0)], 1e-5), ShapeError::Thin);
     assert_eq!(error(&[(0.0, 0.0), (1.0, f32::NAN), (2.0, 2.0)], 0.0), ShapeError::NotFinite);
     assert_eq!(error(&[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], -0.1), ShapeError::NotFinite);
     assert_eq!(error(&around(9), 0.0), ShapeError::Corners { count: 9 });

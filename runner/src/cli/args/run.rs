@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// Options of `atoll run`.
 #[derive(Default, Debug, Args)]
-#[command(allow_negative_numbers = true, group = ArgGroup::new("logged").multiple(true))]
+#[command(allow_negative_numbers = true, groups = ["logged", "commanded"].map(|name| ArgGroup::new(name).multiple(true)))]
 pub struct RunArgs {
     /// The configuration, a TOML file such as configs/quickstart.toml. May be left out with --resume.
     #[arg(required_unless_present = "resume")]
@@ -43,7 +43,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "DIR", groups = ["folder", "logged"])]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder from its newest snapshot. With CONFIG, begin it there if there is none yet.
-    #[arg(long, value_name = "DIR", groups = ["folder", "logged"])]
+    #[arg(long, value_name = "DIR", groups = ["folder", "logged", "commanded"])]
     pub resume: Option<PathBuf>,
     /// Record every so many steps [default: the configuration's, else never].
     #[arg(long, value_name = "K", requires = "folder")]
@@ -59,13 +59,13 @@ pub struct RunArgs {
     pub restarts: u32,
     /// Do what this file says while it runs, a line of JSON for each command; with - what comes in on standard input, so that
     /// another program drives the run. docs/worlds.md tells what there is to say. With --resume, from where it goes on.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = "commanded")]
     pub commands: Option<PathBuf>,
     /// Write answers and events to this file, a line of JSON for each; with - to standard output, and no closing report.
     #[arg(long, value_name = "FILE")]
     pub answers: Option<PathBuf>,
     /// Leave out commands that cannot be done, and go on.
-    #[arg(long)]
+    #[arg(long, requires = "commanded")]
     pub skip_refused: bool,
     /// Let a page in the browser look while it goes on; its address is told.
     #[arg(long)]
@@ -162,6 +162,10 @@ mod tests {
             (
                 "c.toml --log-every 5",
                 "the following required arguments were not provided: <--log <FILE>|--out <DIR>|--r",
+            ),
+            (
+                "c.toml --skip-refused",
+                "the following required arguments were not provided: <--resume <DIR>|--commands <FILE>>; see",
             ),
             ("c.toml --overwrite", "the following required arguments were not provided: --out <DIR>; see"),
             ("--overwrite --resume d", "the argument '--overwrite' cannot be used with '--resume <DIR>'; see"),

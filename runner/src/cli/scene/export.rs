@@ -9,7 +9,7 @@ use crate::folder::RunFolder;
 use crate::folder::recording::Row;
 use crate::look::frame::Frame;
 use crate::look::recorded::Recorded;
-use crate::plan::check_list;
+use crate::plan::{check_held, check_list};
 use crate::scene::file::write::World;
 use crate::scene::{Scene, SceneFile};
 use atoll_core::{Body, Command, GlobalId, KindId, Rot};
@@ -61,6 +61,9 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
     if let Some(gravity) = gravity_of_commands(&folder, step)? {
         config.params.gravity = gravity;
     }
+    // As they are recorded and as bodies, which are sorted.
+    let (rows, each) = (recorded.recording().rows(step), size_of::<Row>() + size_of::<Body>() * 3 / 2);
+    check_held(&format!("{rows} bodies"), rows.saturating_mul(each as u64))?;
     let mut frame = Frame::default();
     recorded.read(step, &mut frame)?;
     let (setting, [low, high]) = (recorded.setting(), recorded.recording().facts().domain);

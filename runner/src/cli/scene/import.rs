@@ -4,6 +4,7 @@ use super::super::args::SceneImportArgs;
 use super::super::console::complain;
 use super::target::Target;
 use crate::error::{Exit, RunError};
+use crate::plan::check_held;
 use crate::scene::import;
 
 /// Does it.
@@ -13,7 +14,8 @@ use crate::scene::import;
 pub(super) fn run(args: &SceneImportArgs) -> Result<Exit, RunError> {
     let SceneImportArgs { from, out, bodies_as, lossy, overwrite } = args;
     let target = Target::check(out, *bodies_as, *overwrite, from)?;
-    let mut imported = import::read(from)?;
+    let room = |needed| check_held(&format!("the bodies of {}", from.display()), needed);
+    let mut imported = import::read(from, room)?;
     if let Some(left_out) = imported.left_out() {
         if !lossy {
             let reason = format!("there is no counterpart for {left_out}; leave these out with --lossy");

@@ -101,6 +101,9 @@ impl Recording {
         let config = Config::load_begun(&folder.join(CONFIGURATION));
         let follow = config.is_ok_and(|config| config.run.retiling.is_some());
         recording.tilings = Tilings::read(&folder.join(TILINGS), domain, tiles, follow);
+        if let Some(count) = recording.ended.as_ref().and_then(|ended| ended.tile_count).filter(|_| follow) {
+            recording.tilings.check_last(&folder.join(TILINGS), count);
+        }
         (recording.steps, recording.incomplete) =
             recording.find_complete(recording.ended.as_ref().map(|ended| ended.steps))?;
         if recording.steps.is_empty() { Err(nothing()) } else { Ok(recording) }
@@ -172,6 +175,15 @@ impl Recording {
                 stage,
             )
         }))
+    }
+
+    /// Reads all records, as nothing but that shows whether they are whole.
+    ///
+    /// # Errors
+    /// If a file is damaged.
+    pub(crate) fn check(&self) -> Result<(), RecordingError> {
+        let mut rows = Vec::new();
+        self.steps.iter().try_for_each(|&step| self.read(step, &mut rows))
     }
 
     /// What is wrong with the file that tells of tiles, if anything is: then they are not known.

@@ -12,6 +12,7 @@ mod times;
 
 use super::compare::{self, Comparison};
 use crate::error::RunError;
+use crate::folder::recording::Recording;
 use html::Text;
 use pictures::Pictures;
 use source::Source;
@@ -40,7 +41,10 @@ impl Report {
             [a, b] if a.recording.is_some() && b.recording.is_some() => {
                 Some(compare::compare(&a.folder, &b.folder, None, done)?)
             }
-            _ => None,
+            _ => {
+                sources.iter().filter_map(|source| source.recording.as_ref()).try_for_each(Recording::check)?;
+                None
+            }
         };
         let pictures = sources.iter().map(pictures::draw).collect::<Result<_, _>>()?;
         Ok(Self { sources, pictures, comparison })

@@ -5,7 +5,7 @@ use super::columns::Columns;
 use crate::config::Config;
 use crate::error::RunError;
 use crate::folder::recording::{Recording, RecordingError};
-use crate::folder::{Ended, RunFolder};
+use crate::folder::{Ended, Rows, RunFolder};
 use serde_json::Value;
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -41,9 +41,10 @@ impl Source {
     pub(super) fn read(path: &Path) -> Result<Self, RunError> {
         let folder = RunFolder::new("report", path);
         let config = folder.begun()?;
-        let unreadable = |name: &str, error: &dyn std::fmt::Display| -> RunError {
-            folder.refusal(format!("{name}: {error}; remove it, or bring back a good copy of it")).into()
-        };
+        let refusal = |reason: String| folder.refusal(format!("{reason}; remove it, or bring back a good copy of it"));
+        let unreadable =
+            |name: &str, error: &dyn std::fmt::Display| RunError::from(refusal(format!("{name}: {error}")));
+        Rows::find(&folder.log(), None, None).map_err(|error| refusal(error.to_string()))?;
         let text = fs::read_to_string(folder.configuration()).map_err(|error| unreadable("run.toml", &error))?;
         let table = |name: &str| match fs::read_to_string(path.join(name)) {
             Ok(text) => Columns::parse(&text).map(Some).map_err(|error| unreadable(name, &error)),

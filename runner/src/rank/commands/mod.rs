@@ -124,7 +124,8 @@ impl Commander {
                 .map(|folder| Kept::new(folder.clone(), before.map_or(0, |(_, lines)| lines.len()))),
             refused: BTreeSet::new(),
             remedy: folder.map_or(String::new(), |folder| {
-                format!(", and go on with `atoll run --resume {}`", folder.path().display())
+                let path = folder.path().display();
+                format!("; to go on without it, or with --commands and what was mended: `atoll run --resume {path}`")
             }),
             refusal: None,
             followed: Followed::default(),

@@ -123,6 +123,9 @@ fn outcome(command: &Command, present: &Present, world: &World) -> Result<Option
         }
         Command::Add(body) => *body,
         command => match subject(command) {
+            Some(id) if world.is_static(id) => {
+                return Err(format!("{id} is a static, and stays as it is; name a body"));
+            }
             Some(id) => of(id).ok_or_else(|| format!("there is no body {id}"))?,
             None => return Ok(None),
         },

@@ -1,7 +1,8 @@
 //! Figures over time: a row after each of some steps, to which every rank brings a part of fixed size, and which rank 0 writes.
 //!
 //! Rows are written after every so many steps, after the last that is made, and after each with a snapshot, so that whoever goes
-//! on from there finds everything that was counted until then. They are durable before rank 0's part of that snapshot is there.
+//! on from there finds everything that was counted until then; but not after one that a refused command follows, as no figures were
+//! taken in that. They are durable before rank 0's part of that snapshot is there.
 
 mod row;
 
@@ -134,7 +135,8 @@ impl Log {
             let last = rows.and_then(|rows| rows.steps).map(|(_, last)| last);
             match last {
                 None => file.add(start).map_err(|error| not_written(&path, &error))?,
-                Some(last) if resumed.is_some_and(|resumed| last < resumed) => {
+                // Of a step after which a refused command ended the run there is none.
+                Some(last) if resumed.is_some_and(|resumed| last < resumed - resumed % self.every) => {
                     let from = resumed.unwrap_or_default();
                     observer.note(&format!("{}: no rows from step {last} to {from}", path.display()));
                 }

@@ -23,7 +23,7 @@ pub(crate) struct Found {
 
 impl SceneFile {
     /// Looks at all of a scene. Tells of a fault in each of its tables and rows; of ids that are there twice and of crowds at one place once all are
-    /// known, and of those only one. Takes 24 bytes for each body.
+    /// known, and of those one, and how many more there are. Takes 24 bytes for each body.
     ///
     /// # Errors
     /// If there is something wrong that keeps the rows from being read.
@@ -88,7 +88,8 @@ impl SceneFile {
     /// What is wrong with all bodies together: an id that is there twice, a crowd at one place. Sorts both.
     fn of_all(&self, ids: &mut [GlobalId], places: &mut [[u64; 2]]) -> [Option<SceneError>; 2] {
         ids.sort_unstable();
-        let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| self.doubled(pair[0]));
+        let mut doubled = ids.chunk_by(|a, b| a == b).filter(|alike| alike.len() > 1);
+        let twice = doubled.next().map(|alike| self.doubled(alike[0]).and_more(doubled.count()));
         [twice, self.crowd(places)]
     }
 }

@@ -1,7 +1,7 @@
 //! Reading a table of TOML key by key: every key must be known, and every value of its form.
 
 use super::super::{Place, SceneError};
-use crate::wording::{did_you_mean, nearest};
+use crate::wording::{did_you_mean, exponential, nearest};
 use glam::{DVec2, Vec2};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -154,9 +154,7 @@ fn short(value: &Value) -> String {
     let text = match value {
         Value::Table(_) => "{...}".to_owned(),
         Value::Array(_) => "[...]".to_owned(),
-        Value::Float(number) if number.is_finite() && *number != 0.0 && !(1e-5..1e9).contains(&number.abs()) => {
-            format!("{number:e}")
-        }
+        Value::Float(number) => exponential(*number),
         _ => value.to_string(),
     };
     if text.chars().count() > 60 { text.chars().take(57).chain("...".chars()).collect() } else { text }

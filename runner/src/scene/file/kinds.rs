@@ -1,16 +1,19 @@
 //! Kinds as scenes and commands say them: a shape, what it is made of, how it moves, and whom it touches.
 
 use super::super::SceneError;
-use super::entries::{Entries, float, keep, number, pair};
+use super::entries::{Entries, float, keep, number, pair, place};
 use super::row::is_turn;
 use atoll_core::{Dynamics, Filter, Kind, Material, Part, Rot, Shape};
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
 /// Of more points no polygon is made: finding those that are its corners takes long.
 const MOST_POINTS: usize = 1000;
+
+/// So much of the size of a shape may be lost where its points are rounded to 32 bits.
+const ROUNDED: f64 = 1e-4;
 
 /// What a shape may be.
 const SHAPES: &str = "\"box\" or \"circle\"; or give polygon, capsule or parts in its place";
@@ -169,13 +172,31 @@ fn convex(entries: &mut Entries<'_>) -> Result<Option<Shape>, SceneError> {
         let capsule = Shape::capsule(x, y);
         return capsule.map(Some).map_err(|error| entries.refuse("capsule", error.to_string()));
     }
-    let points = |value: &Value| value.as_array()?.iter().map(pair).collect::<Option<Vec<Vec2>>>();
+    let points = |value: &Value| value.as_array()?.iter().map(point).collect::<Option<Vec<DVec2>>>();
     let Some(points) = entries.get("polygon", POINTS, points)? else { return Ok(None) };
     if points.len() > MOST_POINTS {
         return Err(entries.refuse("polygon", format!("it has {} points; give its corners alone", points.len())));
     }
     let radius = amount(entries, "radius", "a number, at least 0, in meters", 0.0)?;
-    Shape::polygon(&points, radius).map(Some).map_err(|error| entries.refuse("polygon", error.to_string()))
+    Shape::polygon(&in_32_bits(&points, radius), radius)
+        .map(Some)
+        .map_err(|error| entries.refuse("polygon", error.to_string()))
+}
+
+/// A point that 32 bits can hold, in 64.
+fn point(value: &Value) -> Option<DVec2> {
+    pair(value).and_then(|_| place(value))
+}
+
+/// Points of something that reaches so far around each, rounded: as they are where hardly anything is lost by that, else as they are
+/// seen from the first.
+fn in_32_bits(points: &[DVec2], reach: f32) -> Vec<Vec2> {
+    let first = points.first().copied().unwrap_or_default();
+    let seen_from = |origin: DVec2| points.iter().map(|&point| (point - origin).as_vec2()).collect::<Vec<_>>();
+    let rounded = seen_from(DVec2::ZERO);
+    let size = points.iter().map(|point| point.distance(first)).fold(reach.into(), f64::max);
+    let lost = points.iter().zip(&rounded).map(|(point, rounded)| point.distance(rounded.as_dvec2()));
+    if lost.fold(0.0, f64::max) > ROUNDED * size { seen_from(first) } else { rounded }
 }
 
 /// A compound.
@@ -183,7 +204,7 @@ fn parts(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
     const FORM: &str = "a list such as [{ circle = 0.5, at = [1.0, 0.0] }, { box = [2.0, 1.0], angle = 0.5 }]";
     let tables = |value| Value::as_array(value)?.iter().map(Value::as_table).collect::<Option<Vec<_>>>();
     let tables = entries.get("parts", FORM, tables)?.unwrap_or_default();
-    let mut parts = Vec::with_capacity(tables.len());
+    let (mut parts, mut places) = (Vec::with_capacity(tables.len()), Vec::with_capacity(tables.len()));
     for (number, table) in tables.into_iter().enumerate() {
         let mut part = entries.within(&format!("parts {number}"), table);
         let none =
@@ -195,11 +216,15 @@ fn parts(entries: &mut Entries<'_>) -> Result<Shape, SceneError> {
         if shape.is_none() {
             part.value("radius");
         }
-        let position = part.get("at", "[x, y], in meters", pair)?.unwrap_or_default();
+        places.push(part.get("at", "[x, y], in meters", point)?.unwrap_or_default());
         let rotation = turn(&mut part)?;
         part.finish()?;
         let shape = shape.ok_or_else(none)?;
-        parts.push(Part { shape, position, rotation });
+        parts.push(Part { shape, position: Vec2::ZERO, rotation });
+    }
+    let reach = parts.iter().map(|part| part.shape.bounding_radius()).fold(0.0, f32::max);
+    for (part, position) in parts.iter_mut().zip(in_32_bits(&places, reach)) {
+        part.position = position;
     }
     Shape::compound(parts).map_err(|error| entries.refuse("parts", error.to_string()))
 }

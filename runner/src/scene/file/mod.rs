@@ -320,13 +320,14 @@ impl SceneFile {
     pub(super) fn crowd(&self, places: &mut [[u64; 2]]) -> Option<SceneError> {
         places.sort_unstable();
         let crowds = places.chunk_by(|a, b| a == b).filter(|crowd| crowd.len() > MOST_AT_A_PLACE);
+        let others = crowds.clone().count().saturating_sub(1);
         let crowd = crowds.max_by_key(|crowd| crowd.len())?;
         let ([x, y], count) = (crowd[0].map(f64::from_bits), crowd.len());
         let reason = format!(
             "{count} bodies have their center at {x:?}, {y:?}, where every two of them would be a contact, and at most {MOST_AT_A_PLACE} \
              may: give each a place of its own, with all digits that tell it from the others"
         );
-        Some(SceneError::whole(self.bodies_path().unwrap_or(&self.path), reason))
+        Some(SceneError::whole(self.bodies_path().unwrap_or(&self.path), reason).and_more(others))
     }
 
     /// That not all of its bodies came into the world.

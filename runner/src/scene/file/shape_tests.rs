@@ -129,10 +129,13 @@ fn shapes_are_read_as_they_are_said() {
     // Wherever its points are, it is around its center of mass.
     let triangle = Shape::polygon(&points(&[(-1.0, -1.0), (2.0, -1.0), (-1.0, 2.0)]), 0.0).unwrap();
     assert_eq!(shape("polygon = [[5, 5], [8, 5], [5, 8], [5.5, 5.5]]"), triangle);
+    assert_eq!(shape("polygon = [[3e8, 5e8], [300000003, 5e8], [3e8, 500000003]]"), triangle);
     assert_eq!(shape("polygon = [[4, 0], [6, 0]]\nradius = 0.25"), Shape::capsule(2.0, 0.25).unwrap());
     let Shape::Compound(pair) = shape("parts = [{ circle = 1 }, { box = [1, 1], at = [4, 0], angle = 0.5 }]") else {
         panic!("a compound")
     };
+    let far = "parts = [{ circle = 1, at = [3e8, 0] }, { box = [1, 1], at = [300000004, 0], angle = 0.5 }]";
+    assert_eq!(shape(far), Shape::Compound(pair.clone()));
     let apart = pair.parts()[1].position - pair.parts()[0].position;
     assert!((apart - Vec2::new(4.0, 0.0)).length() < 1e-6 && pair.parts()[1].rotation == Rot::from_angle(0.5));
     let of =
@@ -220,6 +223,7 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("circle = 0.1\ndensity = 1e-50", "[[kinds]] 0, density = 1e-50: must be a positive number, in kg/m^2"),
         ("box = [1]", "box = [...]: must be [width, height], both positive"),
         ("capsule = [1, -1]", "capsule = [...]: must be [length, radius], both positive"),
+        ("capsule = [1, 1e-5]", "capsule = [...]: its radius is less than a ten thousandth of its length; give a"),
         ("capsule = [1, 1]\nradius = 1", "radius = 1: unknown key"),
         ("polygon = 3", "polygon = 3: must be points in meters"),
         ("polygon = [[0, 0], [1, 0], [0, nan]]", "polygon = [...]: must be points in meters"),

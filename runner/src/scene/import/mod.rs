@@ -30,20 +30,28 @@ pub(crate) struct Imported {
     left_out: BTreeMap<&'static str, u64>,
 }
 
-/// Reads a file of another program.
+/// What reading a file takes at most, as a multiple of its length: measured, with JSON that has no blanks, and with lines of atoms.
+const NEEDED: [u64; 2] = [24, 8];
+
+/// Reads a file of another program. `room` is told how many bytes that takes, and says whether there are as many.
 ///
 /// # Errors
-/// If it cannot be read, or is none of those that are known.
-pub(crate) fn read(path: &Path) -> Result<Imported, SceneError> {
+/// If there are not, it cannot be read, or is none of those that are known.
+pub(crate) fn read<E: From<SceneError>>(path: &Path, room: impl FnOnce(u64) -> Result<(), E>) -> Result<Imported, E> {
+    let text = text(path)?;
+    let is_json = text.trim_start().starts_with('{');
+    room(NEEDED[usize::from(!is_json)] * text.len() as u64)?;
+    Ok(if is_json { rube::read(path, &text) } else { lammps::read(path, &text) }?)
+}
+
+fn text(path: &Path) -> Result<String, SceneError> {
     const WHAT: &str = "this world";
     let data = fs::metadata(path).map_err(|error| SceneError::read(path, WHAT, error))?;
     if !data.is_file() || data.len() > LONGEST {
         return Err(SceneError::read(path, WHAT, "it is no regular file of at most 4 GiB; name one"));
     }
     let bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
-    let text =
-        String::from_utf8(bytes).map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))?;
-    if text.trim_start().starts_with('{') { rube::read(path, &text) } else { lammps::read(path, &text) }
+    String::from_utf8(bytes).map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))
 }
 
 /// Whether a file of another program can be read; whatever it is, it is refused in one line or makes a world.
@@ -51,7 +59,7 @@ pub(crate) fn read(path: &Path) -> Result<Imported, SceneError> {
 /// # Errors
 /// As with reading it.
 pub fn check(path: &Path) -> Result<(), SceneError> {
-    read(path).map(drop)
+    read(path, |_| Ok(())).map(drop)
 }
 
 impl Imported {

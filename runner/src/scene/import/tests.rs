@@ -27,7 +27,8 @@ fn read_text(text: &str) -> Result<Imported, String> {
     let folder = tempdir().unwrap();
     let path = folder.path().join("world.data");
     fs::write(&path, text).unwrap();
-    read(&path).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+    read(&path, |_| Ok(()))
+        .map_err(|error: SceneError| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
 }
 
 #[test]
