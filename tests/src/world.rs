@@ -5,7 +5,7 @@
 
 use atoll_core::{
     Blueprint, Body, Exchange, Facts, GlobalId, Hashes, Kind, KindId, Loopback, Material, Params, Partition, Rot,
-    Shape, StaticBody, StepReport, TileId, World, finish, step,
+    Segment, Shape, StaticBody, StepReport, TileId, World, finish, step,
 };
 use glam::{DVec2, Vec2};
 
@@ -103,6 +103,17 @@ impl Scene {
         let kind = Kind::new(Shape::rectangle(width, height), material);
         self.statics.push(StaticBody { rotation: Rot::from_angle(angle), ..StaticBody::new(id, kind, position) });
         id
+    }
+
+    /// Adds a segment, solid on its right, between two corners seen from a place, and those before and after.
+    ///
+    /// # Panics
+    /// If that is none.
+    pub fn segment(&mut self, place: DVec2, [from, to]: [Vec2; 2], [before, after]: [Option<Vec2>; 2]) {
+        let (segment, middle) = Segment::new(before, from, to, after).expect("a segment");
+        let kind = Kind::new(Shape::Segment(segment), Material::default());
+        let id = GlobalId(self.statics.len() as u64);
+        self.statics.push(StaticBody::new(id, kind, place + middle.as_dvec2()));
     }
 
     /// Adds a body with the next free name.

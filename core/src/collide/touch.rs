@@ -185,8 +185,7 @@ impl<'a> Approach<'a> {
         let is_near = nearest < setup.params.speculative_distance;
         let time = if is_near { setup.params.dt + setup.h } else { setup.params.dt };
         let (then, touches) = self.first_touch(&now, reach, time);
-        let at = if then.manifold.is_distance() { now } else { then };
-        if touches || is_near { self.contact(&self.over_corner(at), known, setup) } else { None }
+        if touches || is_near { self.contact(&self.over_corner(then), known, setup) } else { None }
     }
 
     /// As it is, or where two corners meet that overlap by less than is worth a stumble, and hardly come nearer across: the moment with

@@ -17,8 +17,7 @@ pub(crate) struct Piece {
     pub(crate) side: Option<Side>,
 }
 
-/// How a segment goes on: unit vectors that its normals may turn to at its ends. A joint of a chain that juts out belongs to the segment
-/// that it ends.
+/// How a segment goes on at its ends.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Side {
     pub(crate) start: Joint,
@@ -28,10 +27,12 @@ pub(crate) struct Side {
 /// An end of a segment.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Joint {
-    /// Contacts here may have any normal between the segment's and this one.
-    Open(Vec2),
+    /// It does not: contacts here may have any normal between the segment's and this one.
+    Free(Vec2),
+    /// It juts out, and the next segment has this normal. Contacts with one between these belong to the segment that the joint ends.
+    Convex { normal: Vec2, is_end: bool },
     /// Nothing touches it here but along the segment's normal.
-    Closed,
+    Concave,
 }
 
 impl Piece {
@@ -66,11 +67,11 @@ impl Piece {
         let out = piece.outline.normal(0);
         let along = -(out.perp());
         let joint = |other: Option<Vec2>, end: Vec2, is_end: bool| {
-            let Some(other) = other else { return Joint::Open(if is_end { along } else { -along }) };
+            let Some(other) = other else { return Joint::Free(if is_end { along } else { -along }) };
             let way = (if is_end { other - end } else { end - other }).as_dvec2();
             let normal = way.perp().normalize_or_zero().as_vec2();
             let juts_out = dot(normal, along) * if is_end { 1.0 } else { -1.0 } > 1e-4;
-            if is_end && juts_out { Joint::Open(normal) } else { Joint::Closed }
+            if juts_out { Joint::Convex { normal, is_end } } else { Joint::Concave }
         };
         piece.side = Some(Side { start: joint(segment.before(), from, false), end: joint(segment.after(), to, true) });
         piece

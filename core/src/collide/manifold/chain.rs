@@ -7,7 +7,7 @@ use super::Manifold;
 use super::convex::clip;
 use crate::model::contact::ContactPoint;
 use crate::model::convex::Convex;
-use crate::model::math::dot;
+use crate::model::math::{dot, max};
 use crate::model::piece::{Joint, Side};
 use glam::Vec2;
 
@@ -47,15 +47,22 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         return over;
     }
     let (mut touched, mut nearest): (AtEnd, AtEnd) = (None, None);
+    // How far from a joint what comes out there, and not along the segment's normal.
+    let mut beyond = f32::NEG_INFINITY;
     for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
         let (outward, distance, _) = other.nearest(end);
         let normal = -outward;
+        let far = if other.count() == 1 { 0.0 } else { SAME };
+        let is_out = |limit: Vec2| is_before || dot(center - end, limit) >= 0.0;
         let may = match joint {
-            Joint::Open(limit) => {
-                let other_side = is_before || dot(center - end, limit) >= 0.0;
-                other_side && is_between(normal, [n, limit], if other.count() == 1 { 0.0 } else { SAME })
+            Joint::Free(limit) => is_out(limit) && is_between(normal, [n, limit], [far, -far]),
+            Joint::Convex { normal: limit, is_end } => {
+                if turned(n, normal, limit) >= far {
+                    beyond = max(beyond, distance);
+                }
+                is_end && is_out(limit) && is_between(normal, [n, limit], [far, far])
             }
-            Joint::Closed => false,
+            Joint::Concave => false,
         };
         let separation = distance - radius;
         let at_end = |feature| Manifold::single(normal, end + normal * (0.5 * separation), separation, feature);
@@ -70,6 +77,8 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     }
     let is_far = |manifold: &Manifold| manifold.nearest().is_some_and(|nearest| nearest.separation > FAR);
     match (over, touched.filter(|(_, at_end)| !is_far(at_end)), nearest) {
+        // What lies over an edge is deep in the wall below it, and touches what is before the edge.
+        (Some(_), None, Some((_, nearest))) if lowest <= 0.0 && beyond > lowest => nearest,
         // Both are ways out.
         (Some(over), Some((distance, at_end)), _) => {
             if lowest <= 0.0 && distance <= lowest {
@@ -107,8 +116,13 @@ fn of_corner(corner: Vec2, height: f32, n: Vec2, radius: f32, feature: u32) -> M
     Manifold::single(n, corner - n * (height - 0.5 * separation), separation, feature)
 }
 
-/// Whether a unit vector lies between two others, nearer to each other than half a turn, and so far from both.
-fn is_between(v: Vec2, [one, other]: [Vec2; 2], far: f32) -> bool {
-    let way = if one.perp_dot(other) < 0.0 { -1.0 } else { 1.0 };
-    way * one.perp_dot(v) >= far && way * v.perp_dot(other) >= far
+/// Whether a unit vector lies between two others, nearer to each other than half a turn, and so far from each.
+fn is_between(v: Vec2, [one, other]: [Vec2; 2], [from_one, from_other]: [f32; 2]) -> bool {
+    turned(one, v, other) >= from_one && turned(other, v, one) >= from_other
+}
+
+/// How far a unit vector is turned from one to another: the sine of that angle.
+fn turned(from: Vec2, v: Vec2, to: Vec2) -> f32 {
+    let way = if from.perp_dot(to) < 0.0 { -1.0 } else { 1.0 };
+    way * from.perp_dot(v)
 }
