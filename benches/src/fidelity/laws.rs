@@ -35,6 +35,7 @@ pub(super) fn laws() -> Vec<Law> {
     laws.push(pair());
     laws.extend([20.0, 35.0].map(|degrees| corner((1.0, 1.0), degrees, Vec2::new(0.0, -3.0))));
     laws.push(corner((1.0, 0.6), -34.0, Vec2::new(10.0, -3.0)));
+    laws.extend([4.0, 16.0].map(heavy));
     laws.push(incline("a box slides down", 30.0, 0.3, Shape::rectangle(1.0, 1.0)));
     laws.push(incline("a disc rolls down", 20.0, FRICTION, Shape::circle(0.5)));
     for (name, shape) in [("disc", Shape::circle(RADIUS)), ("flat box", Shape::rectangle(0.5, 0.5))] {
@@ -158,6 +159,33 @@ fn corner((width, height): (f32, f32), degrees: f32, velocity: Vec2) -> Law {
         phases: PHASES,
         start: Box::new(start),
         read: |course| Ok(course.after(3.0 / course.hertz)?[0].angular_velocity.into()),
+    }
+}
+
+/// What lies between a heavy body and the floor is stopped with it, and throws nothing back.
+fn heavy(ratio: f32) -> Law {
+    let start = move |hertz: f64, phase: f64| {
+        let high = 1.5 + 10.0 / hertz * (2.0 + phase);
+        let square = |density: f32, high: f64, speed: f32| {
+            let material = Material { density, ..rough(FRICTION) };
+            (Shape::rectangle(1.0, 1.0), material, DVec2::new(0.0, high), Rot::IDENTITY, Vec2::new(0.0, -speed), 0.0)
+        };
+        world(hertz, -10.0, vec![floor(rough(FRICTION))], &[square(1.0, 0.5, 0.0), square(ratio, high, 10.0)])
+    };
+    Law {
+        name: format!(
+            "a box falls at 10 m/s on one of 1/{ratio} of its mass on the floor: part of its speed that is gone"
+        ),
+        theory: Box::new(|| 1.0),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| {
+            let mut fastest = f64::NEG_INFINITY;
+            for _ in 0..30 {
+                fastest = fastest.max(course.after(1.0 / 60.0)?[1].velocity.y.into());
+            }
+            Ok(1.0 - fastest / 10.0)
+        },
     }
 }
 

@@ -42,11 +42,12 @@ pub(crate) struct Hit {
 }
 
 /// A contact, as seen from one of its bodies.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Touching {
     /// The other.
     id: u64,
-    points: [[Number<f64>; 2]; 2],
+    /// One or two.
+    points: Vec<[Number<f64>; 2]>,
     impulse: Number<f32>,
 }
 
@@ -116,7 +117,9 @@ impl Part {
                 let contact = |contact: atoll_core::ContactView| {
                     let [a, b] = contact.bodies;
                     let other = if a == *id { b } else { a };
-                    Touching { id: other.0, points: contact.points.map(point), impulse: Number(contact.normal_impulse) }
+                    let mut points = contact.points.map(point).to_vec();
+                    points.dedup();
+                    Touching { id: other.0, points, impulse: Number(contact.normal_impulse) }
                 };
                 let is_there = world.is_static(*id) || world.get(*id).is_some();
                 Self::Touching(is_there.then(|| world.touching(*id).into_iter().map(contact).collect()))

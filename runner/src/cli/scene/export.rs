@@ -74,7 +74,7 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
         domain: (low, high),
         physics: config.unusual_physics(),
         kinds: &setting.kinds,
-        names: &[],
+        names: &setting.names,
         statics: &statics,
     };
     target.write(&world, frame.bodies.iter().map(body).collect())
