@@ -36,6 +36,7 @@ pub(super) fn laws() -> Vec<Law> {
     laws.extend([20.0, 35.0].map(|degrees| corner((1.0, 1.0), degrees, Vec2::new(0.0, -3.0))));
     laws.push(corner((1.0, 0.6), -34.0, Vec2::new(10.0, -3.0)));
     laws.extend([4.0, 16.0].map(heavy));
+    laws.push(seam());
     laws.push(incline("a box slides down", 30.0, 0.3, Shape::rectangle(1.0, 1.0)));
     laws.push(incline("a disc rolls down", 20.0, FRICTION, Shape::circle(0.5)));
     for (name, shape) in [("disc", Shape::circle(RADIUS)), ("flat box", Shape::rectangle(0.5, 0.5))] {
@@ -186,6 +187,29 @@ fn heavy(ratio: f32) -> Law {
             }
             Ok(1.0 - fastest / 10.0)
         },
+    }
+}
+
+/// Where one box of a floor ends and the next begins, nothing is felt.
+fn seam() -> Law {
+    let material = Material { friction: 0.0, restitution: 1.0, ..Material::default() };
+    let start = move |hertz: f64, phase: f64| {
+        let tile = |k: u64| {
+            let kind = Kind::new(Shape::rectangle(10.0, 2.0), material);
+            StaticBody::new(GlobalId(k), kind, DVec2::new(10.0 * k as f64 - 5.0, -1.0))
+        };
+        let direction = DVec2::new(0.5, -0.75_f64.sqrt());
+        let place = DVec2::new(-0.1, f64::from(RADIUS)) - direction * (10.0 / hertz * (2.0 + phase));
+        let disc = (Shape::circle(RADIUS), material, place, Rot::IDENTITY, (direction * 10.0).as_vec2(), 0.0);
+        world(hertz, 0.0, vec![tile(0), tile(1)], &[disc])
+    };
+    Law {
+        name: "an elastic disc lands at 10 m/s and 60 degrees, 0.1 m before a seam of the floor: speed along it"
+            .to_owned(),
+        theory: Box::new(|| 5.0),
+        phases: PHASES,
+        start: Box::new(start),
+        read: |course| Ok(course.after(0.2)?[0].velocity.x.into()),
     }
 }
 
