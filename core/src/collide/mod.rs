@@ -7,7 +7,7 @@ pub(crate) mod narrow_phase;
 pub(crate) mod passage;
 mod piece_boxes;
 pub(crate) mod proxies;
-mod seams;
+pub(crate) mod seams;
 mod touch;
 mod wide_boxes;
 mod wide_moments;

@@ -24,7 +24,7 @@ const LEVEL_BY_SIZE: f32 = 0.02;
 const ONE_NORMAL: f32 = 0.999_99;
 
 /// Looks again for those contacts of a tile that are behind others.
-pub(super) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
+pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let mut gone = Vec::new();
     let mut first = 0;
     while let Some(run) = next_of_several(tile, first) {

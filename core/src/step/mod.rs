@@ -4,6 +4,7 @@ mod hold;
 pub(crate) mod phase;
 pub(crate) mod stage;
 
+use crate::collide::seams;
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
 use crate::exchange::verdict::Verdict;
 use crate::exchange::{far, migrate};
@@ -195,6 +196,7 @@ fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::NarrowPhase, |b| {
         let Detection { narrow_phase, proxies, pairs, .. } = &mut *b.detection;
         narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, &mut b.work.contacts);
+        seams::mend(b.tile, &mut b.work.contacts, b.setup);
     });
 }
 

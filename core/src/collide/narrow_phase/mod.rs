@@ -10,7 +10,6 @@ pub(crate) use contacts::Contacts;
 use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
-use crate::collide::seams;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::WideBoxes;
 use crate::collide::wide_moments::{PointOutlook, Search};
@@ -46,21 +45,8 @@ pub(crate) struct NarrowPhase {
 
 impl NarrowPhase {
     /// Finds the contacts of a tile among candidate pairs: from here on it remembers these.
+    /// Each pair is looked at as if it were alone (but see [`seams`](super::seams)).
     pub(crate) fn find(
-        &mut self,
-        tile: &mut Tile,
-        proxies: &Proxies,
-        candidates: &[Pair],
-        setup: &Setup,
-        team: Team,
-        contacts: &mut Contacts,
-    ) {
-        self.find_each(tile, proxies, candidates, setup, team, contacts);
-        seams::mend(tile, contacts, setup);
-    }
-
-    /// The same, each pair as if it were alone.
-    fn find_each(
         &mut self,
         tile: &mut Tile,
         proxies: &Proxies,

@@ -29,6 +29,10 @@ impl Stopped {
     /// The body of a pair that has such a contact, and of which the other is a static. None where nothing is known of them.
     pub(in crate::collide) fn new(tile: &Tile, (bodies, contact): (Pair, &Contact), setup: &Setup) -> Option<Self> {
         let (pair, dt) = (Approach::of_contact(tile, bodies, contact, setup), setup.params.dt);
+        // Speeds that overflow tell of no other moment.
+        if !pair.far(dt).is_finite() {
+            return None;
+        }
         let body = if pair.a.moves() { &pair.a } else { &pair.b };
         let (mut velocity, mut angular_velocity) = (body.velocity, body.angular_velocity);
         let (at, order, separation);
@@ -93,14 +97,13 @@ impl Stopped {
 impl Approach<'_> {
     /// The moment in which they touch, if that is within so many seconds.
     fn meets(&self, dt: f32, setup: &Setup) -> Option<Moment> {
-        let far = self.far(dt);
-        let reach = setup.params.speculative_distance + far;
+        let reach = setup.params.speculative_distance + self.far(dt);
         let mut at = self.at(0.0, reach);
         // Who glides along must not seem to touch what the search did not come to the end of.
         for _ in 0..SEARCHES {
             let nearest = at.manifold.nearest()?.separation;
             let is_distance = at.manifold.is_distance();
-            if (nearest < NEAR || far.is_infinite()) && !is_distance {
+            if nearest < NEAR && !is_distance {
                 return Some(at);
             }
             let touches;
