@@ -47,7 +47,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         return over;
     }
     let (mut touched, mut nearest): (AtEnd, AtEnd) = (None, None);
-    // How far from a joint what comes out there, and not along the segment's normal.
+    // How far from a joint what comes out there rather along the normal of the next segment.
     let mut beyond = f32::NEG_INFINITY;
     for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
         let (outward, distance, _) = other.nearest(end);
@@ -57,7 +57,7 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         let may = match joint {
             Joint::Free(limit) => is_out(limit) && is_between(normal, [n, limit], [far, -far]),
             Joint::Convex { normal: limit, is_end } => {
-                if turned(n, normal, limit) >= far {
+                if turned(n, normal, limit) >= far && dot(normal, limit) >= dot(normal, n) {
                     beyond = max(beyond, distance);
                 }
                 is_end && is_out(limit) && is_between(normal, [n, limit], [far, far])
