@@ -121,3 +121,31 @@ fn edges_of_chains_are_no_obstacles() {
         end(&cliff, shape, [-1.0, 0.0, 0.5], 10.0, 200);
     }
 }
+
+/// Whatever corner it lands on first, and whichever of the two edges that is nearer to.
+#[test]
+fn a_plank_comes_to_rest_on_a_plateau() {
+    for (length, thickness, top) in [(1.0, 0.05, 0.7), (1.0, 0.1, 0.9), (4.0, 0.4, 2.8)] {
+        for spin in [-1.0, 2.0] {
+            let mut scene = Scene::new(MIDDLE, -10.0);
+            scene.half = DVec2::splat(12.0);
+            let half = 0.5 * top;
+            let points =
+                [(-10.0, -1.0), (-half - 0.2, -1.0), (-half, 0.0), (half, 0.0), (half + 0.2, -1.0), (10.0, -1.0)];
+            let points = points.map(Vec2::from);
+            for k in 0..5 {
+                let beside = [k.checked_sub(1), Some(k + 2)].map(|k| points.get(k?).copied());
+                scene.segment(MIDDLE, [points[k], points[k + 1]], beside);
+            }
+            let kind = scene.kind(Shape::rectangle(length, thickness), Material::default());
+            let id = scene.body(kind, MIDDLE + DVec2::new(0.02, 0.5), Vec2::ZERO);
+            scene.bodies[0].angular_velocity = spin;
+            let mut sim = scene.start_on((1, 1), Exchange::Step);
+            sim.run(500);
+            let (body, what) = (sim.body(id), format!("{length} x {thickness} m on {top} m, spin {spin}"));
+            let high = body.position.y - MIDDLE.y - 0.5 * f64::from(thickness);
+            assert!(body.angular_velocity.abs() < 1e-3, "{what}: still turns at {} rad/s", body.angular_velocity);
+            assert!(high.abs() < 1e-3, "{what}: rests {high} m too high");
+        }
+    }
+}

@@ -98,12 +98,16 @@ fn mend_of_one(tile: &mut Tile, contacts: &mut Contacts, run: Range<usize>, setu
         };
         let sooner = |one, two| if stopped(two).order() < stopped(one).order() { two } else { one };
         let first = run.clone().filter(before).reduce(sooner)?;
-        Some((other, stopped(first).touch(tile, contact(other), setup)))
+        Some((first, other, stopped(first).touch(tile, contact(other), setup)))
     });
-    for (number, found) in again.collect::<Vec<_>>() {
-        match found {
-            Some(found) => (tile.contacts.contacts[number], contacts.separation[number]) = found,
-            None => gone.push(number),
+    for (first, other, found) in again.collect::<Vec<_>>() {
+        // What is relied upon must be there just so.
+        for (number, found) in [(first, stopped(first).by()), (other, found)] {
+            match found {
+                Some(found) => (tile.contacts.contacts[number], contacts.separation[number]) = found,
+                None if number == other => gone.push(number),
+                None => {}
+            }
         }
     }
 }

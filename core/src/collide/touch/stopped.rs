@@ -23,6 +23,8 @@ pub(in crate::collide) struct Stopped {
     /// From then on.
     velocity: Vec2,
     angular_velocity: f32,
+    /// The contact that stops it, and the separation of its points now.
+    by: Option<(Contact, [f32; 2])>,
 }
 
 impl Stopped {
@@ -35,7 +37,7 @@ impl Stopped {
         }
         let body = if pair.a.moves() { &pair.a } else { &pair.b };
         let (mut velocity, mut angular_velocity) = (body.velocity, body.angular_velocity);
-        let (at, order, separation);
+        let (at, order, separation, by);
         if let Some(then) = pair.meets(dt, setup) {
             let [speed, turn, closing] = pair.stop(&then)?;
             separation = then.manifold.nearest()?.separation;
@@ -44,6 +46,7 @@ impl Stopped {
             order = [then.time + left, if is_now { separation } else { 0.0 }];
             velocity += pair.out(&then) * speed;
             angular_velocity += turn;
+            by = pair.contact(&then, Some(contact), setup);
             at = then;
         } else {
             at = pair.at(0.0, f32::INFINITY);
@@ -51,14 +54,20 @@ impl Stopped {
                 [at, pair.at(dt, f32::INFINITY)].map(|at| at.manifold.nearest().map(|point| point.separation));
             separation = min(now?, then?);
             order = [f32::INFINITY, separation];
+            by = None;
         }
         let lift = pair.out(&at) * max(2.0 * NEAR - separation, 0.0);
-        Some(Self { time: at.time, order, lift, velocity, angular_velocity })
+        Some(Self { time: at.time, order, lift, velocity, angular_velocity, by })
     }
 
     /// Ascending from who stops it first.
     pub(in crate::collide) fn order(&self) -> [f32; 2] {
         self.order
+    }
+
+    /// The contact that stops it, and the separation of its points now, if they touch within the step.
+    pub(in crate::collide) fn by(&self) -> Option<(Contact, [f32; 2])> {
+        self.by
     }
 
     /// The contact, and the separation of its points now, that the body makes with another static on its way from there, if it touches that
