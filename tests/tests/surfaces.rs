@@ -133,7 +133,7 @@ fn a_plank_comes_to_rest_on_a_plateau() {
             let points =
                 [(-10.0, -1.0), (-half - 0.2, -1.0), (-half, 0.0), (half, 0.0), (half + 0.2, -1.0), (10.0, -1.0)];
             let points = points.map(Vec2::from);
-            for k in 0..5 {
+            for k in 0..points.len() - 1 {
                 let beside = [k.checked_sub(1), Some(k + 2)].map(|k| points.get(k?).copied());
                 scene.segment(MIDDLE, [points[k], points[k + 1]], beside);
             }
