@@ -232,11 +232,7 @@ fn out_of_range_and_of_the_wrong_type() {
         ("physics", "hertz = -60", "test.toml: physics.hertz = -60: must be positive and finite"),
         ("physics", "hertz = nan", "test.toml: physics.hertz = nan: must be positive and finite"),
         ("physics", "hertz = inf", "test.toml: physics.hertz = inf: must be positive and finite"),
-        (
-            "physics",
-            "hertz = 1e39",
-            "test.toml: physics.hertz = 1000000000000000000000000000000000000000.0: must be a number of at most",
-        ),
+        ("physics", "hertz = 1e39", "test.toml: physics.hertz = 1e39: must be a number of at most"),
         ("physics", "substeps = 0", "test.toml: physics.substeps = 0: must be within 1 to 64"),
         ("physics", "substeps = 65", "test.toml: physics.substeps = 65: must be within 1 to 64"),
         (
