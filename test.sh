@@ -181,7 +181,7 @@ begin_aarch64
 step "${for_speed[@]}"
 # With assertions, and as Rust alone compiles it: each crate by itself, its documentation, and what calculates, with every choice
 # that there is for that (golden). What programs do around that is the same in both profiles.
-calculates=(borders collisions configs driven fast golden hostile library physics reported scenes shapes sleep snapshots strategies)
+calculates=(borders collisions configs driven fast golden hostile library physics reported scenes shapes sleep snapshots strategies surfaces)
 step cargo test --workspace --lib "${calculates[@]/#/--test=}"
 step cargo test --workspace --doc
 
