@@ -7,9 +7,7 @@ use crate::parallel::lanes::Quad;
 /// What becomes of a point that pressed in the step.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Answer {
-    /// No more than the solver did.
-    Rest,
-    /// No more than that, and less if it would part: what throws one of its bodies back is not to pull at the other.
+    /// No more than the solver did, and less if it would part: what throws one of its bodies back is not to pull at the other.
     Hold,
     /// It came in fast, and parts.
     Part(Parting),

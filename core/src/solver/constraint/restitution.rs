@@ -36,8 +36,7 @@ impl Groups {
             let kinds = source.kinds_of(i);
             let restitution = max(kinds[0].material.restitution, kinds[1].material.restitution);
             if restitution > 0.0 && self.is_solved(i as u32) {
-                let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
-                let mut answers = [Answer::Rest; 2];
+                let mut answers = [Answer::Hold; 2];
                 let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
                     let [closing, slip] = source.meeting_speeds(i, point);
@@ -50,11 +49,10 @@ impl Groups {
                         Answer::NotYet(SURELY * max(closing, 0.0) + source.fall(i))
                     };
                 }
-                if answers != [Answer::Rest; 2] {
-                    let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
-                    let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-                    bounces.push(Bounce { contact: i as u32, closing: fastest, off_static, answers });
-                }
+                let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
+                let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
+                let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
+                bounces.push(Bounce { contact: i as u32, closing: fastest, off_static, answers });
             }
         }
         if self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
@@ -79,7 +77,7 @@ impl Groups {
         self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
     }
 
-    /// Has points rest that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
+    /// Has points hold that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
     /// what lies above: without it that would be thrown down, and what bounces off would have more energy than there was.
     fn leave_held(&mut self, source: Source<'_>) {
         let Self { bounces, bounces_at_once, held, .. } = self;
