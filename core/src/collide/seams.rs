@@ -29,6 +29,11 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let mut first = 0;
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
+        let normal = |number: usize| tile.contacts.contacts[number].normal;
+        // A long body may lie on many.
+        if run.clone().all(|number| normal(number) == normal(run.start)) {
+            continue;
+        }
         if run.clone().any(|i| run.clone().any(|k| is_behind(tile, contacts, [i, k], setup))) {
             mend_of_one(tile, contacts, run, setup, &mut gone);
         }

@@ -142,10 +142,7 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
 /// it the compiler would take many minutes over them.
 #[inline(never)]
 pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-    let mut pair = Approach::new(tile, pair, setup);
-    if !(pair.a.kind.form.is_simple() && pair.b.kind.form.is_simple()) {
-        pair.pieces = Some([&pair.a.kind.pieces[0], &pair.b.kind.pieces[0]]);
-    }
+    let pair = Approach::of_pieces(tile, pair, [0, 0], setup);
     if pair.pass_by(setup) { None } else { pair.touch(known, pair.far(setup.params.dt), setup) }
 }
 
@@ -158,12 +155,12 @@ impl<'a> Approach<'a> {
         Self { a, b, offset, between, pieces: None, features: 0 }
     }
 
-    /// Of those that a contact is of, two pieces if they have some.
-    fn of_contact(tile: &Tile, pair: Pair, contact: &Contact, setup: &'a Setup) -> Self {
+    /// Of two pieces, if they have some.
+    fn of_pieces(tile: &Tile, pair: Pair, [a, b]: [usize; 2], setup: &'a Setup) -> Self {
         let mut pair = Self::new(tile, pair, setup);
         if !(pair.a.kind.form.is_simple() && pair.b.kind.form.is_simple()) {
-            let [a, b] = contact.piece_numbers();
-            (pair.pieces, pair.features) = (Some([&pair.a.kind.pieces[a], &pair.b.kind.pieces[b]]), contact.pieces());
+            pair.pieces = Some([&pair.a.kind.pieces[a], &pair.b.kind.pieces[b]]);
+            pair.features = Contact::features_of(a as u32, b as u32);
         }
         pair
     }

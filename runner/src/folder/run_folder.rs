@@ -162,9 +162,9 @@ impl RunFolder {
     /// If none was, or it is damaged.
     pub fn begun(&self) -> Result<Config, FolderError> {
         self.check_begun()?;
-        let text = fs::read_to_string(self.configuration()).unwrap_or_default();
+        let is_cut = || !fs::read_to_string(self.configuration()).unwrap_or_default().contains(LAST_LINE);
         // What wrote no log yet wrote no such line.
-        if self.log().is_file() && !text.contains(LAST_LINE) {
+        if self.log().is_file() && is_cut() {
             return Err(self.bad_configuration("its end is missing"));
         }
         let config = Config::load_begun(&self.configuration());

@@ -30,7 +30,7 @@ pub(in crate::collide) struct Stopped {
 impl Stopped {
     /// The body of a pair that has such a contact, and of which the other is a static. None where nothing is known of them.
     pub(in crate::collide) fn new(tile: &Tile, (bodies, contact): (Pair, &Contact), setup: &Setup) -> Option<Self> {
-        let (pair, dt) = (Approach::of_contact(tile, bodies, contact, setup), setup.params.dt);
+        let (pair, dt) = (Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup), setup.params.dt);
         // Speeds that overflow tell of no other moment.
         if !pair.far(dt).is_finite() {
             return None;
@@ -78,7 +78,7 @@ impl Stopped {
         (bodies, contact): (Pair, &Contact),
         setup: &Setup,
     ) -> Option<(Contact, [f32; 2])> {
-        let mut pair = Approach::of_contact(tile, bodies, contact, setup);
+        let mut pair = Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup);
         let (offset, turned) = (pair.offset, [pair.a.turning(self.time), pair.b.turning(self.time)]);
         pair.offset += pair.between * self.time;
         for (side, turned) in [&mut pair.a, &mut pair.b].into_iter().zip(turned) {
