@@ -105,14 +105,16 @@ fn mend_of_one(tile: &mut Tile, contacts: &mut Contacts, run: Range<usize>, setu
         let first = run.clone().filter(before).reduce(sooner)?;
         Some((first, other, stopped(first).touch(tile, contact(other), setup)))
     });
-    for (first, other, found) in again.collect::<Vec<_>>() {
-        // What is relied upon must be there just so.
-        for (number, found) in [(first, stopped(first).by()), (other, found)] {
-            match found {
-                Some(found) => (tile.contacts.contacts[number], contacts.separation[number]) = found,
-                None if number == other => gone.push(number),
-                None => {}
-            }
+    let again: Vec<_> = again.collect();
+    let mut write = |number: usize, found| (tile.contacts.contacts[number], contacts.separation[number]) = found;
+    // What is relied upon must be there just so, unless it is itself behind another.
+    for (first, found) in again.iter().filter_map(|&(first, _, _)| Some((first, stopped(first).by()?))) {
+        write(first, found);
+    }
+    for (_, other, found) in again {
+        match found {
+            Some(found) => write(other, found),
+            None => gone.push(other),
         }
     }
 }
