@@ -26,7 +26,7 @@ const SAMPLED: usize = 13;
 /// What the broad phase knows of every body of a tile, a column for each number.
 #[derive(Default, Debug)]
 pub(crate) struct Proxies {
-    /// Center, in meters from the tile's corner.
+    /// Center, in meters from a place that all share.
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
     /// The greater half extent of the AABB grown by the body's margin, with room for the rounding of local coordinates.
@@ -54,18 +54,19 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies, of which so many are owned and so many more ghosts. Local coordinates
-    /// count from the low corner of its `rectangle`.
+    /// count from `origin`, which had best be near most of them, as they are rounded.
     pub(crate) fn load(
         &mut self,
         bodies: &Bodies,
         [owned, ghosts]: [usize; 2],
         rectangle: &Region,
+        origin: DVec2,
         setup: &Setup,
         team: Team,
     ) {
         let (total, dynamic) = (bodies.len(), owned + ghosts);
         let mean = mean(&bodies.velocity[..dynamic]);
-        let load = Load { bodies, dynamic, corner: rectangle.min, mean, setup };
+        let load = Load { bodies, dynamic, origin, mean, setup };
         self.outline.resize(total, [0.0; 4]);
         let mut rest = [&mut self.x, &mut self.y, &mut self.extent, &mut self.radius].map(|column| {
             column.resize(total, 0.0);
@@ -154,6 +155,22 @@ impl Proxies {
 /// Rounding of a local coordinate, as part of it.
 const SLACK: f32 = 4.0 * f32::EPSILON;
 
+/// A place amid some bodies: the median of a few of them, on each axis.
+pub(crate) fn amid(positions: &[DVec2]) -> DVec2 {
+    const MOST: usize = 15;
+    let count = positions.len().min(MOST);
+    if count == 0 {
+        return DVec2::ZERO;
+    }
+    let median = |axis: usize| {
+        let mut sample = [0.0; MOST];
+        let sample = &mut sample[..count];
+        sample.iter_mut().enumerate().for_each(|(i, place)| *place = positions[i * positions.len() / count][axis]);
+        *sample.select_nth_unstable_by(count / 2, f64::total_cmp).1
+    };
+    DVec2::new(median(0), median(1))
+}
+
 /// About the mean of some velocities. Any vector would do, and what is not finite would not.
 fn mean(velocities: &[Vec2]) -> Vec2 {
     let (mut sum, mut count) = (Vec2::ZERO, 0.0_f32);
@@ -169,7 +186,7 @@ fn mean(velocities: &[Vec2]) -> Vec2 {
 struct Load<'a> {
     bodies: &'a Bodies,
     dynamic: usize,
-    corner: DVec2,
+    origin: DVec2,
     mean: Vec2,
     setup: &'a Setup,
 }
@@ -236,7 +253,7 @@ impl Load<'_> {
         }
         let [x, y, extent, radius] = columns;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let ([local_x, local_y], params) = (V::seen_from(self.corner.to_array(), &places), &self.setup.params);
+        let ([local_x, local_y], params) = (V::seen_from(self.origin.to_array(), &places), &self.setup.params);
         let ([vx, vy], [c, s]) = (V::load_pairs(&velocities), V::load_pairs(&rotations));
         let [width, height, rounding, bound] = V::load_quads(&kinds);
         let velocity = Vectors::new(vx, vy);

@@ -4,6 +4,7 @@ mod hold;
 pub(crate) mod phase;
 pub(crate) mod stage;
 
+use crate::collide::proxies::amid;
 use crate::collide::seams;
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
 use crate::exchange::verdict::Verdict;
@@ -179,7 +180,12 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
         let (tile, proxies, counts) = (&b.tile, &mut b.detection.proxies, [b.tile.owned, b.tile.ghosts()]);
-        proxies.load(&tile.bodies, counts, &tile.rectangle, b.setup, b.team);
+        // A quadtree stays from step to step, and so does what it counts from.
+        let origin = match tile.quadtree {
+            Some(_) => tile.rectangle.min,
+            None => amid(&tile.bodies.position[..counts[0] + counts[1]]),
+        };
+        proxies.load(&tile.bodies, counts, &tile.rectangle, origin, b.setup, b.team);
         proxies.pair_ghosts(tile, b.setup);
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(proxies, &b.tile.bodies.id);

@@ -7,19 +7,32 @@
 //! holds only bodies larger than the last.
 //!
 //! What counts as small is chosen by estimated cost from a histogram of sizes.
+//!
+//! Bodies may be anywhere, and closer together than a tile has room for. Where a cell holds many because most cells are far from
+//! everybody, only those are kept that hold somebody; and where bodies are closer than was estimated, they are parted anew by what
+//! was counted.
 
 use super::Pair;
+use super::cells::{Cells, Dense, Layout, Sparse};
 use super::search::{Search, Sorted, emit};
 use crate::collide::proxies::Proxies;
 use crate::model::math;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
 use crate::parallel::team::Team;
+#[cfg(test)]
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 1024;
 
 /// Up to this many bodies are simply tried against each other.
 const FEW: usize = 24;
+
+/// From this many bodies in a cell on, those cells alone are looked for that hold somebody.
+const CROWD: f64 = 16.0;
+
+/// Bodies are closer together than was estimated where so many times as many are in a cell.
+const CLOSER: f64 = 4.0;
 
 /// Of many bodies, sizes are counted of one of so many: a number that nothing is likely to repeat after.
 const SAMPLED: usize = 7;
@@ -39,8 +52,13 @@ pub(crate) struct Grid {
     /// For each body of the level its cell; and where each cell begins in `sorted`.
     cell: Vec<u32>,
     start: Vec<u32>,
+    /// Those cells that hold somebody, where most are empty.
+    sparse: Sparse,
     /// Bodies of this level in cell order.
     sorted: Sorted,
+    /// Bodies looked at.
+    #[cfg(test)]
+    pub(super) looks: AtomicUsize,
 }
 
 /// The bodies that one level sorts into cells: all of a tile, or those too large for the level before.
@@ -52,56 +70,6 @@ pub(super) struct Level<'a> {
     pub(super) extent: &'a [f32],
     pub(super) radius: &'a [f32],
     pub(super) body: &'a [u32],
-}
-
-/// Where the cells lie. One column and one row of empty cells surround the others, so that neighbours always exist.
-#[derive(Clone, Copy)]
-struct Layout {
-    origin: [f32; 2],
-    per_meter: f32,
-    columns: usize,
-    rows: usize,
-}
-
-impl Layout {
-    /// Cells at least `cell` wide over the given box, no more than about two per body.
-    fn new(low: [f32; 2], high: [f32; 2], cell: f32, bodies: usize) -> Self {
-        let (width, height) = (high[0] - low[0], high[1] - low[1]);
-        let widest = |cell: f32| (f64::from(width / cell) + 1.0) * (f64::from(height / cell) + 1.0);
-        let mut cell = cell;
-        while widest(cell) > 2.0 * bodies as f64 + 64.0 {
-            cell *= 1.25;
-        }
-        let per_meter = 1.0 / cell;
-        let count = |size: f32| (size * per_meter) as usize + 1;
-        Self { origin: low, per_meter, columns: count(width) + 2, rows: count(height) + 2 }
-    }
-
-    fn cells(&self) -> usize {
-        self.columns * self.rows
-    }
-
-    /// Bodies outside the box are held in its outermost cells: never further from a neighbour than they are.
-    #[inline(always)]
-    fn column(&self, x: f32) -> usize {
-        self.place(x, 0, self.columns) as usize
-    }
-
-    #[inline(always)]
-    fn row(&self, y: f32) -> usize {
-        self.place(y, 1, self.rows) as usize
-    }
-
-    #[inline(always)]
-    fn cell(&self, x: f32, y: f32) -> u32 {
-        self.place(y, 1, self.rows) * self.columns as u32 + self.place(x, 0, self.columns)
-    }
-
-    #[inline(always)]
-    fn place(&self, v: f32, axis: usize, count: usize) -> u32 {
-        // By way of a signed number, which processors make eight of at once.
-        math::clamp((v - self.origin[axis]) * self.per_meter, 0.0, (count - 3) as f32) as i32 as u32 + 1
-    }
 }
 
 impl Grid {
@@ -147,66 +115,126 @@ impl Grid {
         if level.body.len() <= FEW {
             return self.larger.extend_from_slice(level.body);
         }
-        let most = choose_limit(level, proxies);
-        let small = proxies.lanes.run(Part { level, most, large: &mut self.large });
+        let mut room = f64::from(proxies.size[0]) * f64::from(proxies.size[1]);
+        let mut most = choose_limit(level, proxies, room);
+        let binned = loop {
+            let binned = self.bin(level, most, proxies);
+            if binned.crowd <= CLOSER * (1.0 + binned.bodies * binned.layout.area() / room) {
+                break binned;
+            }
+            room = binned.bodies * binned.layout.area() / binned.crowd;
+            let less = choose_limit(level, proxies, room);
+            if less >= most {
+                break binned;
+            }
+            most = less;
+        };
         self.larger.extend(self.large.iter().map(|&i| level.body[i as usize]));
-        let layout = self.bin(level, &small, proxies);
-        self.pair_small(&layout, proxies, team, pairs);
-        self.pair_large(&layout, proxies, small.greatest, pairs);
+        if binned.is_sparse {
+            self.pair(&self.sparse, &binned, proxies, team, pairs);
+        } else {
+            self.pair(&Dense::new(&self.start, &binned.layout), &binned, proxies, team, pairs);
+        }
     }
 
-    /// Sorts the small bodies of a level by cell.
-    fn bin(&mut self, level: &Level<'_>, small: &Small, proxies: &Proxies) -> Layout {
+    /// Sorts by cell those bodies of a level that extend no more than this, and leaves the others in `large`.
+    fn bin(&mut self, level: &Level<'_>, most: f32, proxies: &Proxies) -> Binned {
+        let small = proxies.lanes.run(Part { level, most, large: &mut self.large });
+        let (cell, count) = (2.0 * small.greatest * 1.001, level.body.len());
+        let bodies = (count - self.large.len()) as f64;
         // Bodies far outside the tile share its outermost cells: one stray must not make all cells coarse.
-        let Small { mut low, mut high, greatest } = *small;
-        for axis in 0..2 {
-            let (least, most) = (-proxies.size[axis], 2.0 * proxies.size[axis]);
-            (low[axis], high[axis]) = (math::clamp(low[axis], least, most), math::clamp(high[axis], least, most));
-        }
-        let layout = Layout::new(low, high, 2.0 * greatest * 1.001, level.body.len());
+        let inside = |corner: [f32; 2]| {
+            [0, 1].map(|axis| math::clamp(corner[axis], -proxies.size[axis], 2.0 * proxies.size[axis]))
+        };
+        let few = Layout::few(inside(small.low), inside(small.high), cell, count);
+        let crowd = self.fill_all(level, &few, proxies) / bodies;
+        let all = Layout::new(small.low, small.high, cell);
+        let is_sparse = crowd > CROWD && few != all;
+        let (layout, crowd) = if is_sparse { (all, self.fill_some(level, most, &all) / bodies) } else { (few, crowd) };
+        self.sorted.fill(level, &self.cell, &mut self.start, self.large.len());
+        Binned { layout, greatest: small.greatest, bodies, crowd, is_sparse }
+    }
+
+    /// Tells the small bodies of a level their cells, and where each of these begins. Returns the sum of the squares of how many there
+    /// are in each.
+    fn fill_all(&mut self, level: &Level<'_>, layout: &Layout, proxies: &Proxies) -> f64 {
         self.cell.clear();
         self.cell.resize(level.body.len(), 0);
-        proxies.lanes.run(Bin { level, layout, cell: &mut self.cell });
+        proxies.lanes.run(Bin { level, layout: *layout, cell: &mut self.cell });
         // The large ones lie behind all others.
         self.large.iter().for_each(|&i| self.cell[i as usize] = layout.cells() as u32);
         self.start.clear();
         self.start.resize(layout.cells() + 3, 0);
         // Counted two places ahead: after the running sum `start[c + 1]` is where cell c begins, and once the bodies
         // are laid out, where it ends: then `start[c]` is where it begins.
-        self.cell.iter().for_each(|&cell| self.start[cell as usize + 2] += 1);
+        let mut met = 0;
+        for &cell in &self.cell {
+            let count = &mut self.start[cell as usize + 2];
+            met += u64::from(*count);
+            *count += 1;
+        }
+        let large = self.large.len() as u64;
+        let squares = 2 * met + self.cell.len() as u64 - large * large;
         let mut sum = 0;
         for start in &mut self.start {
             sum += *start;
             *start = sum;
         }
-        self.sorted.fill(level, &self.cell, &mut self.start, self.large.len());
-        layout
+        squares as f64
     }
 
-    fn pair_small(&self, layout: &Layout, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
+    /// As [`fill_all`](Self::fill_all), of those cells alone that hold somebody.
+    fn fill_some(&mut self, level: &Level<'_>, most: f32, layout: &Layout) -> f64 {
+        let is_small = |&i: &u32| level.extent[i as usize] <= most;
+        let place = |i: u32| [layout.column(level.x[i as usize]), layout.row(level.y[i as usize])];
+        let small = (0..level.body.len() as u32).filter(is_small).map(|i| (i, place(i)));
+        self.sparse.fill(small, |i, cell| self.cell[i as usize] = cell);
+        self.large.iter().for_each(|&i| self.cell[i as usize] = self.sparse.len() as u32);
+        self.start.clear();
+        self.start.push(0);
+        self.start.extend_from_slice(self.sparse.start());
+        let counts = self.sparse.start().windows(2).map(|two| u64::from(two[1] - two[0]));
+        counts.map(|count| count * count).sum::<u64>() as f64
+    }
+
+    /// Pairs the small bodies among themselves, and with the larger ones.
+    fn pair(&self, cells: &impl Cells, binned: &Binned, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
         let (sorted, pairing, lanes) = (&self.sorted, proxies.pairing, proxies.lanes);
+        #[cfg(test)]
+        self.looks.fetch_add(sorted.looks(cells), Relaxed);
         team.append(pairs, sorted.len, GRAIN, |places, pairs| {
-            Search { sorted, pairing, lanes, places, pairs }.neighbours(&self.start, layout.columns);
+            Search { sorted, pairing, lanes, places, pairs }.neighbours(cells);
         });
-    }
-
-    fn pair_large(&self, layout: &Layout, proxies: &Proxies, limit: f32, pairs: &mut Vec<Pair>) {
+        let Binned { layout, greatest, .. } = binned;
         for &body in &self.larger {
             let i = body as usize;
             let (x, y, slack, half) = (proxies.x[i], proxies.y[i], proxies.slack(i), proxies.half(i));
-            let [reach_x, reach_y] = half.map(|half| half + slack + limit);
+            let [reach_x, reach_y] = half.map(|half| half + slack + greatest);
             let columns = layout.column(x - reach_x)..=layout.column(x + reach_x);
-            for row in layout.row(y - reach_y)..=layout.row(y + reach_y) {
-                let first = self.start[row * layout.columns + columns.start()] as usize;
-                let end = self.start[row * layout.columns + columns.end() + 1] as usize;
-                for &other in &self.sorted.body[first..end] {
+            let rows = layout.row(y - reach_y)..=layout.row(y + reach_y);
+            cells.each_run(columns, rows, |places| {
+                #[cfg(test)]
+                self.looks.fetch_add(places.len(), Relaxed);
+                for &other in &self.sorted.body[places] {
                     if proxies.overlap([body, other]) {
-                        emit(pairs, proxies.pairing, body, other);
+                        emit(pairs, pairing, body, other);
                     }
                 }
-            }
+            });
         }
     }
+}
+
+/// The small bodies of a level, sorted by cell.
+struct Binned {
+    layout: Layout,
+    is_sparse: bool,
+    /// The greatest half extent.
+    greatest: f32,
+    /// How many there are.
+    bodies: f64,
+    /// How many there are in the cell of a body, on the average.
+    crowd: f64,
 }
 
 /// Parts the bodies of a level: those that extend no more than this are small.
@@ -309,13 +337,13 @@ struct Class {
     area: f64,
 }
 
-/// The greatest half extent that may count as small: the one of least estimated work.
+/// The greatest half extent that may count as small: the one of least estimated work, with so many m^2 of room.
 ///
-/// Sizes are counted in classes half an octave wide. With n small bodies spread over an area A, cells of side 2u give
+/// Sizes are counted in classes half an octave wide. With n small bodies spread over an area A of room, cells of side 2u give
 /// about 9/2 n (2u)^2 / A candidates per small body, and a large body of half extents v, w meets
 /// n (2u + 2v) (2u + 2w) / A. The constants are nanoseconds, measured: the search among small bodies compares eight at
 /// once.
-fn choose_limit(level: &Level<'_>, proxies: &Proxies) -> f32 {
+fn choose_limit(level: &Level<'_>, proxies: &Proxies, room: f64) -> f32 {
     const CLASSES: usize = 64;
     /// The class of the smallest float we tell apart, 2^-16 m.
     const FIRST: u32 = (127 - 16) << 1;
@@ -333,12 +361,11 @@ fn choose_limit(level: &Level<'_>, proxies: &Proxies) -> f32 {
         class.extents += of * f64::from(x + y);
         class.area += of * f64::from(x * y);
     }
-    let area = f64::from(proxies.size[0]) * f64::from(proxies.size[1]);
     let mut best = (f64::INFINITY, CLASSES - 1);
     let mut small = 0.0;
     for limit in (0..CLASSES).filter(|&class| classes[class].count > 0.0) {
         small += classes[limit].count;
-        let (u, density) = (f64::from(classes[limit].greatest), small / area);
+        let (u, density) = (f64::from(classes[limit].greatest), small / room);
         let mut cost = small * (10.0 + 0.4 * 4.5 * density * 4.0 * u * u);
         for large in &classes[limit + 1..] {
             let covered = 4.0 * (large.count * u * u + u * large.extents + large.area);

@@ -5,6 +5,7 @@
 //! are none may be among them. That test reads the bodies' own bits, not the tile's local coordinates, so two tiles that both see
 //! a pair agree on it.
 
+mod cells;
 pub(crate) mod grid;
 pub(crate) mod quadtree;
 #[allow(unsafe_code)]

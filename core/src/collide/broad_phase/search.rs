@@ -6,6 +6,7 @@
 //! [`Cull`](crate::collide::cull::Cull) does, which has the last word.
 
 use super::Pair;
+use super::cells::Cells;
 use super::grid::Level;
 use crate::parallel::lanes::LaneSet;
 #[cfg(target_arch = "x86_64")]
@@ -49,6 +50,13 @@ impl Sorted {
             (to_body[place], to_cell[place]) = (body, cell);
         }
     }
+
+    /// How many bodies a search looks at.
+    #[cfg(test)]
+    pub(super) fn looks(&self, cells: &impl Cells) -> usize {
+        let runs = |place: usize| cells.runs(self.cell[place] as usize, place);
+        (0..self.len).flat_map(runs).map(|(first, end)| end - first).sum()
+    }
 }
 
 /// A search for the pairs among sorted bodies.
@@ -75,27 +83,20 @@ pub(super) fn emit(pairs: &mut Vec<Pair>, pairing: usize, a: u32, b: u32) {
     }
 }
 
-/// Where the two runs of a body lie that hold all its neighbours not yet met.
-#[inline(always)]
-fn runs(start: &[u32], columns: usize, cell: usize, place: usize) -> [(usize, usize); 2] {
-    let above = cell + columns;
-    [(place + 1, start[cell + 2] as usize), (start[above - 1] as usize, start[above + 2] as usize)]
-}
-
 impl Search<'_> {
-    /// Every pair of neighbours of which one, the first in cell order, is among `places`. `start` holds where each cell begins, `columns` how many cells a row has.
-    pub(super) fn neighbours(self, start: &[u32], columns: usize) {
+    /// Every pair of neighbours of which one, the first in cell order, is among `places`.
+    pub(super) fn neighbours(self, cells: &impl Cells) {
         #[cfg(target_arch = "x86_64")]
         match self.lanes.set() {
             // SAFETY: the processor has AVX-512, or these lanes would not be there.
-            Set::Avx512 => return unsafe { self.neighbours_avx512(start, columns) },
+            Set::Avx512 => return unsafe { self.neighbours_avx512(cells) },
             // SAFETY: the processor has AVX2, or these lanes would not be there.
-            Set::Avx2 => return unsafe { self.neighbours_avx2(start, columns) },
+            Set::Avx2 => return unsafe { self.neighbours_avx2(cells) },
             Set::Portable => {}
         }
         let Sorted { body, cell, .. } = self.sorted;
         for place in self.places.clone() {
-            for (first, end) in runs(start, columns, cell[place] as usize, place) {
+            for (first, end) in cells.runs(cell[place] as usize, place) {
                 for other in first..end {
                     if self.may_touch(place, other) {
                         emit(self.pairs, self.pairing, body[place], body[other]);
@@ -116,7 +117,7 @@ impl Search<'_> {
 /// Vectors of the processor, for the search.
 #[cfg(target_arch = "x86_64")]
 mod wide {
-    use super::{MORE, PADDING, Pair, Search, runs};
+    use super::{Cells, MORE, PADDING, Pair, Search};
     use std::arch::x86_64::*;
 
     /// Room for so many more pairs, and where they go.
@@ -154,7 +155,7 @@ mod wide {
 
     impl Search<'_> {
         #[target_feature(enable = "avx2,popcnt")]
-        pub(super) fn neighbours_avx2(self, start: &[u32], columns: usize) {
+        pub(super) fn neighbours_avx2(self, around: &impl Cells) {
             let Self { sorted, pairing, places, pairs, .. } = self;
             // One length for all: each place is checked once, not once per column.
             let padded = sorted.len + PADDING;
@@ -164,7 +165,7 @@ mod wide {
             for place in places {
                 let (x, y) = (_mm256_set1_ps(xs[place]), _mm256_set1_ps(ys[place]));
                 let (radius, body) = (_mm256_set1_ps(radii[place]), _mm256_set1_epi32(bodies[place] as i32));
-                for (mut first, end) in runs(start, columns, cells[place] as usize, place) {
+                for (mut first, end) in around.runs(cells[place] as usize, place) {
                     loop {
                         let all = first..first + 8;
                         // SAFETY: each of these slices has eight numbers.
@@ -206,7 +207,7 @@ mod wide {
         }
 
         #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq,popcnt")]
-        pub(super) fn neighbours_avx512(self, start: &[u32], columns: usize) {
+        pub(super) fn neighbours_avx512(self, around: &impl Cells) {
             let Self { sorted, pairing, places, pairs, .. } = self;
             let padded = sorted.len + PADDING;
             let (xs, ys, radii) = (&sorted.x[..padded], &sorted.y[..padded], &sorted.radius[..padded]);
@@ -218,7 +219,7 @@ mod wide {
             for place in places {
                 let (x, y) = (_mm512_set1_ps(xs[place]), _mm512_set1_ps(ys[place]));
                 let (radius, body) = (_mm512_set1_ps(radii[place]), _mm512_set1_epi32(bodies[place] as i32));
-                let [(mut a, end_a), (mut b, end_b)] = runs(start, columns, cells[place] as usize, place);
+                let [(mut a, end_a), (mut b, end_b)] = around.runs(cells[place] as usize, place);
                 loop {
                     let (all_a, all_b) = (a..a + 8, b..b + 8);
                     let both = |column: &[f32]| {

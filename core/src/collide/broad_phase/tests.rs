@@ -60,7 +60,8 @@ impl Stuffed {
             tile.bodies.push(*body);
         }
         let mut proxies = Proxies::default();
-        proxies.load(&tile.bodies, [tile.owned, tile.ghosts()], &tile.rectangle, &setup, Team::ALONE);
+        let counts = [tile.owned, tile.ghosts()];
+        proxies.load(&tile.bodies, counts, &tile.rectangle, tile.rectangle.min, &setup, Team::ALONE);
         Self { setup, tile, proxies }
     }
 
@@ -267,6 +268,45 @@ fn a_heap_upon_one_spot_pairs_everybody() {
     let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.5)], vec![body(0, DVec2::ONE); 30], 1.0, vec![]);
     assert_eq!(tile.by_grid(&mut grid).len(), 30 * 29 / 2);
     assert_eq!(tile.by_quadtree(&mut quadtree).len(), 30 * 29 / 2);
+}
+
+/// Bodies side by side in ten squares far apart, one of which is of larger ones.
+#[test]
+fn what_bodies_cost_does_not_grow_with_their_distance() {
+    let cost = |far: f64| {
+        let square = |i: u32| (i / 400, DVec2::new(f64::from(i % 20), f64::from(i % 400 / 20)));
+        let bodies = (0..4_000).map(square).map(|(square, place)| {
+            let corner = DVec2::new(f64::from(square % 3), -f64::from(square)) * far;
+            body((square == 3) as usize, corner + 0.1 * place)
+        });
+        let tile = Stuffed::new(Vec2::splat(10.0), vec![circle(0.05), circle(0.3)], bodies.collect(), 1.0, vec![]);
+        let mut grid = Grid::default();
+        let pairs = tile.by_grid(&mut grid);
+        assert_eq!(pairs, tile.brute_force());
+        (pairs.len(), grid.looks.into_inner())
+    };
+    let (pairs, looks) = cost(3.0);
+    for far in [30.0, 300.0, 3_000.0] {
+        let (as_many, looks_there) = cost(far);
+        assert_eq!(as_many, pairs);
+        assert!(looks_there < 2 * looks, "{far} m apart {looks_there} bodies are looked at, 3 m apart {looks}");
+    }
+}
+
+/// Small bodies in a corner of a tile that has room for many times as many, some large ones among them.
+#[test]
+fn what_is_crowded_is_not_taken_for_what_the_tile_has_room_for() {
+    let looks = |size: f32| {
+        let place = |i: u32| DVec2::new(f64::from(i % 60), f64::from(i / 60)) * 0.1;
+        let bodies = (0..3_600).map(|i| body((i % 180 == 77) as usize, place(i)));
+        let kinds = vec![circle(0.05), circle(1.0)];
+        let tile = Stuffed::new(Vec2::splat(size), kinds, bodies.collect(), 1.0, vec![]);
+        let mut grid = Grid::default();
+        assert_eq!(tile.by_grid(&mut grid), tile.brute_force());
+        grid.looks.into_inner()
+    };
+    let (close, wide) = (looks(6.0), looks(10_000.0));
+    assert!(wide < 2 * close, "{wide} bodies are looked at in a wide tile, {close} where there is no more room");
 }
 
 #[test]
