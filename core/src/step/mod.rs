@@ -4,6 +4,7 @@ mod hold;
 pub(crate) mod phase;
 pub(crate) mod stage;
 
+use crate::collide::broad_phase::Field;
 use crate::collide::proxies::amid;
 use crate::collide::seams;
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
@@ -195,7 +196,10 @@ fn collide(bench: &mut Bench<'_>) {
         let Detection { grid, proxies, pairs, .. } = &mut *b.detection;
         pairs.clear();
         match &b.tile.quadtree {
-            None => grid.find_pairs(proxies, b.team, pairs),
+            None => {
+                let field = Field { proxies, bodies: &b.tile.bodies, setup: b.setup, team: b.team };
+                grid.find_pairs(field, pairs);
+            }
             Some(quadtree) => quadtree.find_pairs(proxies, b.team, pairs),
         }
     });

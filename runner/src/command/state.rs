@@ -79,12 +79,17 @@ impl State {
             Command::SetGravity(gravity) => self.gravity = Some(gravity.to_array()),
             Command::AddKind(ref kind) => self.kinds.push(KindText::new(kind)),
             Command::Force { id, force, torque, steps } => {
-                self.forces.retain(|push| push.until > step);
                 let until = step.saturating_add(steps);
                 self.forces.push(Push { id: id.0, force: force.to_array(), torque, until });
             }
             Command::SetVelocity { .. } | Command::Impulse { .. } | Command::SetKind { .. } | Command::Wake(_) => {}
         }
+    }
+
+    /// Forgets what was of the steps before `step` alone, which are made.
+    pub(crate) fn pass(&mut self, step: u64) {
+        self.done = 0;
+        self.forces.retain(|push| push.until > step);
     }
 
     /// Makes the table of kinds and gravity what they were; before a world gets its tiles back.

@@ -51,6 +51,17 @@ impl Layout {
         self.place(y, 1, self.rows) as usize
     }
 
+    /// Between which heights everybody in a row is.
+    pub(super) fn heights(&self, row: usize) -> Range<f32> {
+        let cell = 1.0 / self.per_meter;
+        let edge = |row: usize| self.origin[1] + row as f32 * cell;
+        // Heights are rounded, and the outermost rows hold all beyond.
+        let more = 0.01 * cell + 8.0 * f32::EPSILON * self.origin[1].abs();
+        let low = if row <= 1 { f32::NEG_INFINITY } else { edge(row - 1) - more };
+        let high = if row + 2 >= self.rows { f32::INFINITY } else { edge(row) + more };
+        low..high
+    }
+
     #[inline(always)]
     pub(super) fn cell(&self, x: f32, y: f32) -> u32 {
         self.place(y, 1, self.rows) * self.columns as u32 + self.place(x, 0, self.columns)
@@ -69,8 +80,13 @@ pub(super) trait Cells: Sync {
     /// of the row above.
     fn runs(&self, cell: usize, place: usize) -> [(usize, usize); 2];
 
-    /// Tells of everybody in some columns of some rows, a run at a time.
-    fn each_run(&self, columns: RangeInclusive<usize>, rows: RangeInclusive<usize>, tell: impl FnMut(Range<usize>));
+    /// Tells of everybody in some rows, of each of which some columns are wanted, a run at a time.
+    fn each_run(
+        &self,
+        rows: RangeInclusive<usize>,
+        columns: impl Fn(usize) -> RangeInclusive<usize>,
+        tell: impl FnMut(Range<usize>),
+    );
 }
 
 /// Every cell of a layout, numbered row by row.
@@ -95,12 +111,15 @@ impl Cells for Dense<'_> {
 
     fn each_run(
         &self,
-        columns: RangeInclusive<usize>,
         rows: RangeInclusive<usize>,
+        columns: impl Fn(usize) -> RangeInclusive<usize>,
         mut tell: impl FnMut(Range<usize>),
     ) {
-        for first in rows.map(|row| row * self.columns) {
-            tell(self.start[first + columns.start()] as usize..self.start[first + columns.end() + 1] as usize);
+        for row in rows {
+            let (first, columns) = (row * self.columns, columns(row));
+            if !columns.is_empty() {
+                tell(self.start[first + columns.start()] as usize..self.start[first + columns.end() + 1] as usize);
+            }
         }
     }
 }
@@ -174,15 +193,18 @@ impl Cells for Sparse {
 
     fn each_run(
         &self,
-        columns: RangeInclusive<usize>,
         rows: RangeInclusive<usize>,
+        columns: impl Fn(usize) -> RangeInclusive<usize>,
         mut tell: impl FnMut(Range<usize>),
     ) {
         let from = |key| self.keys.partition_point(|&other| other < key);
         let mut row = *rows.start();
         while row <= *rows.end() {
-            let (first, end) = (from(key(*columns.start(), row)), from(key(columns.end() + 1, row)));
-            tell(self.start[first] as usize..self.start[end] as usize);
+            let columns = columns(row);
+            let end = from(key(columns.end() + 1, row));
+            if !columns.is_empty() {
+                tell(self.start[from(key(*columns.start(), row))] as usize..self.start[end] as usize);
+            }
             // Rows without anybody are passed over.
             row = self.keys.get(end).map_or(usize::MAX, |key| ((key >> 32) as usize).max(row + 1));
         }

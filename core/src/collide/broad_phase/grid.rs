@@ -12,13 +12,13 @@
 //! everybody, only those are kept that hold somebody; and where bodies are closer than was estimated, they are parted anew by what
 //! was counted.
 
-use super::Pair;
 use super::cells::{Cells, Dense, Layout, Sparse};
 use super::search::{Search, Sorted, emit};
+use super::slant::Slant;
+use super::{Field, Pair};
 use crate::collide::proxies::Proxies;
 use crate::model::math;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
-use crate::parallel::team::Team;
 #[cfg(test)]
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -74,7 +74,8 @@ pub(super) struct Level<'a> {
 
 impl Grid {
     /// Appends every pair, and some that are none (see the contract in [`super`]).
-    pub(crate) fn find_pairs(&mut self, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
+    pub(crate) fn find_pairs(&mut self, field: Field<'_>, pairs: &mut Vec<Pair>) {
+        let proxies = field.proxies;
         let count = proxies.len();
         let known = self.everybody.len();
         self.everybody.extend(known as u32..count.max(known) as u32);
@@ -86,7 +87,7 @@ impl Grid {
             radius: &proxies.radius,
             body: &everybody[..count],
         };
-        self.pair_level(&all, proxies, team, pairs);
+        self.pair_level(&all, field, pairs);
         while self.larger.len() > FEW {
             std::mem::swap(&mut self.larger, &mut self.rest);
             let rest = std::mem::take(&mut self.rest);
@@ -96,7 +97,7 @@ impl Grid {
                 to.extend(rest.iter().map(|&body| from[body as usize]));
             }
             let [x, y, extent, radius] = columns.each_ref().map(|column| &column[..]);
-            self.pair_level(&Level { x, y, extent, radius, body: &rest }, proxies, team, pairs);
+            self.pair_level(&Level { x, y, extent, radius, body: &rest }, field, pairs);
             (self.rest, self.columns) = (rest, columns);
         }
         for (i, &a) in self.larger.iter().enumerate() {
@@ -110,7 +111,8 @@ impl Grid {
     }
 
     /// Pairs the small bodies of a level among themselves, and with those too large for it, whom it leaves in `larger`.
-    fn pair_level(&mut self, level: &Level<'_>, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
+    fn pair_level(&mut self, level: &Level<'_>, field: Field<'_>, pairs: &mut Vec<Pair>) {
+        let proxies = field.proxies;
         self.larger.clear();
         if level.body.len() <= FEW {
             return self.larger.extend_from_slice(level.body);
@@ -131,9 +133,9 @@ impl Grid {
         };
         self.larger.extend(self.large.iter().map(|&i| level.body[i as usize]));
         if binned.is_sparse {
-            self.pair(&self.sparse, &binned, proxies, team, pairs);
+            self.pair(&self.sparse, &binned, field, pairs);
         } else {
-            self.pair(&Dense::new(&self.start, &binned.layout), &binned, proxies, team, pairs);
+            self.pair(&Dense::new(&self.start, &binned.layout), &binned, field, pairs);
         }
     }
 
@@ -152,7 +154,8 @@ impl Grid {
         let is_sparse = crowd > CROWD && few != all;
         let (layout, crowd) = if is_sparse { (all, self.fill_some(level, most, &all) / bodies) } else { (few, crowd) };
         self.sorted.fill(level, &self.cell, &mut self.start, self.large.len());
-        Binned { layout, greatest: small.greatest, bodies, crowd, is_sparse }
+        let Small { greatest, reach, .. } = small;
+        Binned { layout, is_sparse, greatest, reach, bodies, crowd }
     }
 
     /// Tells the small bodies of a level their cells, and where each of these begins. Returns the sum of the squares of how many there
@@ -198,25 +201,39 @@ impl Grid {
     }
 
     /// Pairs the small bodies among themselves, and with the larger ones.
-    fn pair(&self, cells: &impl Cells, binned: &Binned, proxies: &Proxies, team: Team, pairs: &mut Vec<Pair>) {
+    fn pair(&self, cells: &impl Cells, binned: &Binned, field: Field<'_>, pairs: &mut Vec<Pair>) {
+        let Field { proxies, team, .. } = field;
         let (sorted, pairing, lanes) = (&self.sorted, proxies.pairing, proxies.lanes);
         #[cfg(test)]
         self.looks.fetch_add(sorted.looks(cells), Relaxed);
         team.append(pairs, sorted.len, GRAIN, |places, pairs| {
             Search { sorted, pairing, lanes, places, pairs }.neighbours(cells);
         });
-        let Binned { layout, greatest, .. } = binned;
+        let Binned { layout, greatest, reach, .. } = binned;
         for &body in &self.larger {
             let i = body as usize;
             let (x, y, slack, half) = (proxies.x[i], proxies.y[i], proxies.slack(i), proxies.half(i));
             let [reach_x, reach_y] = half.map(|half| half + slack + greatest);
-            let columns = layout.column(x - reach_x)..=layout.column(x + reach_x);
+            let slant = Slant::of(i, &field);
+            let columns = |row: usize| {
+                let (low, high) = match &slant {
+                    None => (-reach_x, reach_x),
+                    Some(slant) => {
+                        let heights = layout.heights(row);
+                        let span = slant.span(heights.start - y..heights.end - y, *reach);
+                        (math::max(-reach_x, span.start), math::min(reach_x, span.end))
+                    }
+                };
+                layout.column(x + low)..=if low <= high { layout.column(x + high) } else { 0 }
+            };
             let rows = layout.row(y - reach_y)..=layout.row(y + reach_y);
-            cells.each_run(columns, rows, |places| {
+            cells.each_run(rows, columns, |places| {
                 #[cfg(test)]
                 self.looks.fetch_add(places.len(), Relaxed);
                 for &other in &self.sorted.body[places] {
-                    if proxies.overlap([body, other]) {
+                    let (k, seen) = (other as usize, |at: usize| [proxies.x[at] - x, proxies.y[at] - y]);
+                    let comes_to = |slant: &Slant| slant.comes_to(seen(k), proxies.radius[k]);
+                    if proxies.overlap([body, other]) && slant.as_ref().is_none_or(comes_to) {
                         emit(pairs, pairing, body, other);
                     }
                 }
@@ -229,8 +246,9 @@ impl Grid {
 struct Binned {
     layout: Layout,
     is_sparse: bool,
-    /// The greatest half extent.
+    /// The greatest half extent, and the greatest radius.
     greatest: f32,
+    reach: f32,
     /// How many there are.
     bodies: f64,
     /// How many there are in the cell of a body, on the average.
@@ -244,11 +262,12 @@ struct Part<'a> {
     large: &'a mut Vec<u32>,
 }
 
-/// The small bodies of a level: the box around their centers, and the greatest extent.
+/// The small bodies of a level: the box around their centers, the greatest extent, and the greatest radius.
 struct Small {
     low: [f32; 2],
     high: [f32; 2],
     greatest: f32,
+    reach: f32,
 }
 
 /// Blocks of eight among which large bodies are looked for at once.
@@ -259,12 +278,12 @@ impl Kernel for Part<'_> {
 
     #[inline(always)]
     fn run<V: Lanes>(self) -> Small {
-        let Self { level: Level { x, y, extent, .. }, most, large } = self;
+        let Self { level: Level { x, y, extent, radius, .. }, most, large } = self;
         large.clear();
         let (infinity, edge) = (V::splat(f32::INFINITY), V::splat(most));
         let nothing = V::splat(f32::NEG_INFINITY);
-        let (mut low_x, mut low_y, mut high_x, mut high_y, mut greatest) =
-            (infinity, infinity, nothing, nothing, nothing);
+        let (mut low_x, mut low_y, mut high_x, mut high_y) = (infinity, infinity, nothing, nothing);
+        let (mut greatest, mut reach) = (nothing, nothing);
         for first in (0..x.len()).step_by(BLOCKS * LANES) {
             let end = x.len().min(first + BLOCKS * LANES);
             let mut largest = nothing;
@@ -276,6 +295,7 @@ impl Kernel for Part<'_> {
                 high_x = beyond.if_positive(nothing, x).max(high_x);
                 high_y = beyond.if_positive(nothing, y).max(high_y);
                 greatest = beyond.if_positive(nothing, extent).max(greatest);
+                reach = beyond.if_positive(nothing, eight(radius, i)).max(reach);
                 largest = extent.max(largest);
             }
             if fold(largest, math::max) > most {
@@ -286,6 +306,7 @@ impl Kernel for Part<'_> {
             low: [fold(low_x, math::min), fold(low_y, math::min)],
             high: [fold(high_x, math::max), fold(high_y, math::max)],
             greatest: fold(greatest, math::max),
+            reach: fold(reach, math::max),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The grid, and the quadtree, against trying every pair.
 
-use super::Pair;
 use super::grid::Grid;
 use super::quadtree::Quadtree;
+use super::{Field, Pair};
 use crate::collide::proxies::Proxies;
 use crate::exchange::record::Unseen;
 use crate::model::body::{Body, StaticBody};
@@ -85,6 +85,21 @@ impl Stuffed {
         overlap && square <= within * 1.0001
     }
 
+    /// Whether the grid must name a pair, in plain numbers: not if it is far from one of the two as seen from who does not turn.
+    pub(in crate::collide) fn must_be_named(&self, [a, b]: Pair) -> bool {
+        let (bodies, offset) = (&self.tile.bodies, self.offset([a, b]));
+        let is_pair = self.is_pair([a, b]);
+        let (a, b) = (a as usize, b as usize);
+        let goes = self.setup.params.dt * (bodies.velocity[b] - bodies.velocity[a]).length();
+        let [reach_a, reach_b] = [a, b].map(|body| self.proxies.outline(body)[2]);
+        let is_clear = |of: usize, offset: Vec2| {
+            let kind = self.setup.kind(bodies.kind[of]);
+            let seen = bodies.rotation[of].unrotate(offset).abs() - kind.extent - kind.radius;
+            seen.max_element() > (reach_a + reach_b - kind.bounding_radius + goes) * 1.0001
+        };
+        is_pair && !is_clear(a, offset) && !is_clear(b, -offset)
+    }
+
     /// Every two bodies of which one is owned, the lower first.
     fn twos(&self) -> impl Iterator<Item = Pair> {
         let bodies = self.tile.bodies.len() as u32;
@@ -92,13 +107,17 @@ impl Stuffed {
     }
 
     pub(super) fn brute_force(&self) -> BTreeSet<Pair> {
-        self.twos().filter(|&pair| self.is_pair(pair)).collect()
+        self.twos().filter(|&pair| self.must_be_named(pair)).collect()
+    }
+
+    fn field(&self) -> Field<'_> {
+        Field { proxies: &self.proxies, bodies: &self.tile.bodies, setup: &self.setup, team: Team::ALONE }
     }
 
     /// What the grid finds, whatever it found before.
     fn by_grid(&self, grid: &mut Grid) -> BTreeSet<Pair> {
         let mut found = Vec::new();
-        grid.find_pairs(&self.proxies, Team::ALONE, &mut found);
+        grid.find_pairs(self.field(), &mut found);
         self.pairs_among(found)
     }
 
@@ -125,7 +144,7 @@ impl Stuffed {
         for &[low, high] in &all {
             assert!(low < high && (low as usize) < self.tile.owned, "{low}, {high} is no pair of an owned body");
         }
-        all.into_iter().filter(|&pair| self.is_pair(pair)).collect()
+        all.into_iter().filter(|&pair| self.must_be_named(pair)).collect()
     }
 
     /// What everybody finds; refuses if they disagree.
@@ -230,7 +249,7 @@ proptest! {
     #[test]
     fn no_two_bodies_touch_that_are_no_pair(tile in any_tile(40, 3)) {
         let (bodies, params) = (&tile.tile.bodies, &tile.setup.params);
-        for pair in tile.twos().filter(|&pair| !tile.is_pair(pair)) {
+        for pair in tile.twos().filter(|&pair| !tile.must_be_named(pair)) {
             let [a, b] = pair.map(|index| index as usize);
             let slow = |body: usize| bodies.velocity[body].length() * params.dt < params.margin_cap;
             if !(slow(a) && slow(b)) {
@@ -307,6 +326,34 @@ fn what_is_crowded_is_not_taken_for_what_the_tile_has_room_for() {
     };
     let (close, wide) = (looks(6.0), looks(10_000.0));
     assert!(wide < 2 * close, "{wide} bodies are looked at in a wide tile, {close} where there is no more room");
+}
+
+/// A slope is no more of a burden than a floor, though half of the world is in the rectangle around it.
+#[test]
+fn walls_that_lean_pair_only_with_what_is_near_them() {
+    let looks = |angle: f32| {
+        let place = |i: u32| DVec2::new(f64::from(i % 60), f64::from(i / 60)) * 0.2;
+        let bodies = (0..3_600).map(|i| body(0, place(i)));
+        let wall = |k: u32| StaticBody {
+            id: GlobalId(u64::from(k)),
+            kind: rectangle(12.0, 0.01),
+            position: DVec2::splat(6.0 + f64::from(k)),
+            rotation: Rot::from_angle(angle),
+            path: None,
+        };
+        let (kinds, walls) = (vec![circle(0.05)], (0..8).map(wall).collect());
+        let tile = Stuffed::new(Vec2::splat(12.0), kinds, bodies.collect(), 1.0, walls);
+        let (mut grid, mut found) = (Grid::default(), Vec::new());
+        grid.find_pairs(tile.field(), &mut found);
+        assert_eq!(tile.by_each(), tile.brute_force());
+        (grid.looks.into_inner(), found.len())
+    };
+    let (level, pairs) = looks(0.0);
+    for angle in [0.7, 2.0, -0.3] {
+        let (leaning, pairs_leaning) = looks(angle);
+        assert!(leaning < 2 * level, "{leaning} bodies are looked at by walls at {angle} rad, {level} by floors");
+        assert!(pairs_leaning < 3 * pairs, "{pairs_leaning} pairs with walls at {angle} rad, {pairs} with floors");
+    }
 }
 
 #[test]

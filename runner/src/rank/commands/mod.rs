@@ -467,7 +467,7 @@ impl Commander {
         halo: &mut RankHalo<Counting<T>>,
     ) -> Result<(), RankError> {
         self.crowds = Crowds::default();
-        self.state.done = 0;
+        self.state.pass(world.step_count());
         if !Event::ALL.iter().any(|&event| self.state.tells(event)) {
             return Ok(());
         }
