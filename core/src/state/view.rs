@@ -56,27 +56,40 @@ impl<'a> TileView<'a> {
 
     /// The contacts of its bodies that the last step solved. What touches across an edge is solved, and shown, by both tiles.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + use<'a> {
+        self.contacts_of(|_| true)
+    }
+
+    /// Those of bodies at certain places among owned, ghosts and statics.
+    pub(crate) fn contacts_of<M>(&self, is_meant: M) -> impl Iterator<Item = ContactView> + use<'a, M>
+    where
+        M: Fn(usize) -> bool,
+    {
         let tile = self.tile;
-        tile.contacts.iter().take(tile.contacts.own()).map(move |(key, contact)| {
-            let [low, high] = [key.low(), key.high()].map(|slot| tile.index(slot));
-            // Body A is the one with the lower name, whichever slot it has.
-            let [a, b] = if tile.bodies.id[low] < tile.bodies.id[high] { [low, high] } else { [high, low] };
-            // Ghosts are where they were when the step began: what is owned here knows better.
-            let (from, turned, offset) = if a < tile.owned {
-                (a, contact.rotation_a.to(tile.bodies.rotation[a]), Vec2::ZERO)
-            } else {
-                (b, contact.rotation_b.to(tile.bodies.rotation[b]), contact.offset)
-            };
-            let place = |anchor: Vec2| tile.bodies.position[from] + turned.rotate(anchor - offset).as_dvec2();
-            let points = contact.points();
-            ContactView {
-                bodies: [tile.bodies.id[a], tile.bodies.id[b]],
-                owned: [a, b].map(|i| (i < tile.owned).then_some(i)),
-                points: [points[0], points[points.len() - 1]].map(|point| place(point.anchor)),
-                normal_impulse: points.iter().map(|point| point.normal_impulse).sum(),
-                is_border: key.is_border(),
-            }
-        })
+        let own = tile.contacts.iter().take(tile.contacts.own());
+        let placed =
+            own.map(move |(key, contact)| (key, contact, [key.low(), key.high()].map(|slot| tile.index(slot))));
+        placed.filter(move |(.., places)| places.iter().any(|&place| is_meant(place))).map(
+            move |(key, contact, places)| {
+                let [low, high] = places;
+                // Body A is the one with the lower name, whichever slot it has.
+                let [a, b] = if tile.bodies.id[low] < tile.bodies.id[high] { [low, high] } else { [high, low] };
+                // Ghosts are where they were when the step began: what is owned here knows better.
+                let (from, turned, offset) = if a < tile.owned {
+                    (a, contact.rotation_a.to(tile.bodies.rotation[a]), Vec2::ZERO)
+                } else {
+                    (b, contact.rotation_b.to(tile.bodies.rotation[b]), contact.offset)
+                };
+                let place = |anchor: Vec2| tile.bodies.position[from] + turned.rotate(anchor - offset).as_dvec2();
+                let points = contact.points();
+                ContactView {
+                    bodies: [tile.bodies.id[a], tile.bodies.id[b]],
+                    owned: [a, b].map(|i| (i < tile.owned).then_some(i)),
+                    points: [points[0], points[points.len() - 1]].map(|point| place(point.anchor)),
+                    normal_impulse: points.iter().map(|point| point.normal_impulse).sum(),
+                    is_border: key.is_border(),
+                }
+            },
+        )
     }
 }
 

@@ -114,6 +114,8 @@ pub(crate) struct Setup {
     pub(crate) statics: Vec<Body>,
     /// How each of them moves; empty where none does.
     paths: Vec<Option<Path>>,
+    /// The rows of those that do.
+    going: Vec<u32>,
     /// For each of them whether its surface moves; empty where none does.
     driving: Vec<bool>,
     /// Where they stand.
@@ -178,6 +180,8 @@ impl Setup {
         }
         let any_moves = blueprint.statics.iter().any(|fixed| fixed.path.is_some());
         let paths = if any_moves { blueprint.statics.iter().map(|fixed| fixed.path).collect() } else { Vec::new() };
+        let going =
+            (0..).zip(&blueprint.statics).filter(|(_, fixed)| fixed.path.is_some()).map(|(row, _)| row).collect();
         let drives = |fixed: &StaticBody| fixed.path.is_some() || fixed.kind.material.surface_speed != 0.0;
         let any_drives = blueprint.statics.iter().any(drives);
         let driving = if any_drives { blueprint.statics.iter().map(drives).collect() } else { Vec::new() };
@@ -214,6 +218,7 @@ impl Setup {
             dynamic_kinds,
             statics,
             paths,
+            going,
             driving,
             terrain,
             static_names,
@@ -390,6 +395,16 @@ impl Setup {
     /// All statics as a step begins, by their rows.
     pub(crate) fn statics_at(&self, step: u64) -> impl Iterator<Item = Body> + '_ {
         (0..self.statics.len() as u32).map(move |row| self.static_at(row, step))
+    }
+
+    /// Those that move, as a step begins.
+    pub(crate) fn statics_that_go(&self, step: u64) -> impl Iterator<Item = Body> + '_ {
+        self.going.iter().map(move |&row| self.static_at(row, step))
+    }
+
+    /// Those that never do.
+    pub(crate) fn statics_that_stay(&self) -> impl Iterator<Item = Body> + '_ {
+        (0..).zip(&self.statics).filter(|&(row, _)| self.path(row).is_none()).map(|(_, &body)| body)
     }
 
     /// Whether the surface of any static moves.

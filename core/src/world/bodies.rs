@@ -7,7 +7,6 @@ use crate::model::error::SetupError;
 use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::{Kind, KindRow};
 use crate::model::names::Names;
-use crate::state::questions::Index;
 use crate::tiling::tile::Tile;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -156,15 +155,10 @@ impl World {
         self.changed = true;
     }
 
-    /// The tile that owns a body, if it is one of this world's and was there in the last step.
-    pub(crate) fn tile_of(&self, id: GlobalId) -> Option<&Tile> {
+    /// The tile that owns a body, and its place there, if it is one of this world's and was there in the last step.
+    pub(crate) fn owned(&self, id: GlobalId) -> Option<(&Tile, usize)> {
         let Place { tile, at } = self.locator.get_or_init(|| Locator::new(&self.tiles)).find(id, &self.tiles)?;
-        Some(&self.tiles[tile as usize]).filter(|tile| (at as usize) < tile.owned)
-    }
-
-    /// What questions are answered by, made if anything has changed.
-    pub(crate) fn questions(&self, index: impl FnOnce() -> Index) -> &Index {
-        self.questions.get_or_init(|| Box::new(index()))
+        Some((&self.tiles[tile as usize], at as usize)).filter(|&(tile, at)| at < tile.owned)
     }
 
     /// Where a body is, for who is about to change it.
@@ -189,13 +183,13 @@ impl World {
     /// Something is there to be settled, or is otherwise than the last step left it.
     pub(super) fn note_change(&mut self) {
         self.is_unsettled = true;
-        self.questions.take();
+        self.questions.forget();
     }
 
     /// After a step: bodies that went from tile to tile are found in their new ones.
     pub(super) fn follow_bodies(&mut self) {
         self.removed.clear();
-        self.questions.take();
+        self.questions.forget();
         let bodies = || self.tiles.iter().map(Tile::count).sum();
         let Some(locator) = self.locator.get_mut() else { return };
         if locator.is_stale(bodies()) {
@@ -212,6 +206,6 @@ impl World {
     pub(super) fn forget_places(&mut self) {
         self.locator.take();
         self.knows_names = false;
-        self.questions.take();
+        self.questions.forget();
     }
 }

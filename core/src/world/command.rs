@@ -189,7 +189,7 @@ impl World {
         let Some(Place { tile, at }) = self.look_up(id) else { return Ok(false) };
         let body = change(self, self.tiles[tile as usize].at(at))?;
         self.tiles[tile as usize].change_at(at, body);
-        self.questions.take();
+        self.questions.forget();
         Ok(true)
     }
 

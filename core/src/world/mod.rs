@@ -16,7 +16,7 @@ use crate::parallel::schedule::Schedule;
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
-use crate::state::questions::Index;
+use crate::state::questions::Questions;
 use crate::state::view::TileView;
 use crate::step::phase::Timings;
 use crate::step::stage::{Hand, Work};
@@ -53,8 +53,8 @@ pub struct World {
     removed: Noted,
     /// Where each body is, once anybody has asked.
     locator: OnceLock<Locator>,
-    /// What questions are answered by, once there was one since anything has changed.
-    questions: OnceLock<Box<Index>>,
+    /// What questions are answered by.
+    pub(crate) questions: Questions,
     /// What pushes at bodies for some steps.
     forces: Vec<Force>,
     /// One per thread.
@@ -136,7 +136,7 @@ impl World {
             greatest_name: setup.statics.iter().map(|fixed| fixed.id).max().unwrap_or_default(),
             removed: Noted::default(),
             locator: OnceLock::new(),
-            questions: OnceLock::new(),
+            questions: Questions::default(),
             forces: Vec::new(),
             hands: Vec::new(),
             schedule: Schedule::default(),

@@ -11,12 +11,13 @@ mod tests;
 mod tree;
 
 use crate::model::body::Body;
-use crate::model::id::GlobalId;
+use crate::model::id::{GlobalId, KindId};
 use crate::state::view::{ContactView, TileView};
-use crate::tiling::blueprint::Setup;
 use crate::world::World;
 use glam::DVec2;
 use outline::Outline;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tree::{Bounds, Tree};
 
 /// What a ray meets.
@@ -41,65 +42,82 @@ impl RayHit {
     }
 }
 
-/// Bodies and statics by place, as they are now.
-#[derive(Debug)]
-pub(crate) struct Index {
-    bodies: Tree,
-    statics: Tree,
+/// What questions to a world are answered by.
+#[derive(Default, Debug)]
+pub(crate) struct Questions {
+    /// How many there were since the bodies were otherwise.
+    asked: AtomicU32,
+    /// Bodies and statics that move, as they are now, once there were too many questions to look at all of them for each.
+    moving: OnceLock<Tree>,
+    /// Statics that stay where they are.
+    fixed: OnceLock<Tree>,
 }
 
-impl Index {
-    fn new(bodies: impl Iterator<Item = Body>, setup: &Setup, step: u64) -> Self {
-        let outline = |body: Body| Outline::new(&body, setup.kind(body.kind));
-        let statics = setup.statics_at(step).map(outline).collect();
-        Self { bodies: Tree::new(bodies.map(outline).collect()), statics: Tree::new(statics) }
-    }
+/// Sorting bodies by place takes as long as looking at all of them for about so many questions.
+const FEW: u32 = 16;
 
-    fn found(&self, bounds: Bounds, is_meant: impl Fn(&Outline) -> bool) -> Vec<GlobalId> {
-        let mut found = Vec::new();
-        for tree in [&self.bodies, &self.statics] {
-            tree.visit(bounds, |outline| {
-                if is_meant(outline) {
-                    found.push(outline.id);
-                }
-            });
-        }
-        found.sort_unstable();
-        found
+impl Questions {
+    /// Bodies are otherwise than they were.
+    pub(crate) fn forget(&mut self) {
+        self.moving.take();
+        self.asked = AtomicU32::new(0);
     }
 }
 
 impl World {
     /// The first body or static on the straight way from one point to another, in m. One around the first point is met at once.
     ///
-    /// The first question after a step, or after something changed, sorts all bodies by place; each one after it takes time that
-    /// grows with the logarithm of their number, and with how much lies near the way.
+    /// The first questions after a step, or after something changed, look at each body. Where there are more, these are sorted by
+    /// place; each one after that takes time that grows with the logarithm of their number, and with how much lies near the way.
     pub fn cast_ray(&self, from: DVec2, to: DVec2) -> Option<RayHit> {
-        let index = self.index();
         let mut best = None;
-        index.statics.cast_ray(from, to, &mut best);
-        index.bodies.cast_ray(from, to, &mut best);
+        self.fixed().cast_ray(from, to, &mut best);
+        match self.sorted() {
+            Some(tree) => tree.cast_ray(from, to, &mut best),
+            None => {
+                let way = to - from;
+                let per_length = 1.0 / way.length_squared().max(f64::MIN_POSITIVE);
+                let nearest = |place: DVec2| from + way * ((place - from).dot(way) * per_length).clamp(0.0, 1.0);
+                let hits = self.near(nearest).filter_map(|outline| outline.cast_ray(from, to));
+                best = hits.chain(best).reduce(RayHit::nearer);
+            }
+        }
         best
     }
 
     /// The bodies and statics that have a point in common with a rectangle between two corners, in m: their names, ascending.
     pub fn in_rectangle(&self, low: DVec2, high: DVec2) -> Vec<GlobalId> {
-        self.index().found(Bounds { low, high }, |outline| outline.meets_rectangle(low, high))
+        self.found(Bounds { low, high }, |outline| outline.meets_rectangle(low, high))
     }
 
     /// The bodies and statics that a point in m is in, or on: their names, ascending.
     pub fn at_point(&self, point: DVec2) -> Vec<GlobalId> {
-        self.index().found(Bounds { low: point, high: point }, |outline| outline.holds(point))
+        self.found(Bounds { low: point, high: point }, |outline| outline.holds(point))
+    }
+
+    fn found(&self, bounds: Bounds, is_meant: impl Fn(&Outline) -> bool) -> Vec<GlobalId> {
+        let mut found = Vec::new();
+        let mut look = |outline: &Outline| {
+            if is_meant(outline) {
+                found.push(outline.id);
+            }
+        };
+        self.fixed().visit(bounds, &mut look);
+        self.visit_moving(bounds, look);
+        found.sort_unstable();
+        found
     }
 
     /// The contacts that the last step solved of a body of this world, or of a static with this world's bodies, by the name of the
     /// other. Two touch as long as their surfaces are nearer than
     /// [`speculative_distance`](crate::Params::speculative_distance), or may come so near within the step.
     pub fn touching(&self, id: GlobalId) -> Vec<ContactView> {
-        let is_of = |contact: &ContactView| contact.bodies.contains(&id);
-        let mut found: Vec<ContactView> = match self.tile_of(id) {
-            Some(tile) => TileView::new(tile).contacts().filter(is_of).collect(),
-            None if self.is_static(id) => self.views().flat_map(|tile| tile.contacts().filter(is_of)).collect(),
+        let mut found: Vec<ContactView> = match self.owned(id) {
+            Some((tile, place)) => TileView::new(tile).contacts_of(|other| other == place).collect(),
+            None if self.is_static(id) => {
+                let is_of = |contact: &ContactView| contact.bodies.contains(&id);
+                self.views().flat_map(|tile| tile.contacts().filter(is_of)).collect()
+            }
             None => Vec::new(),
         };
         // Contacts of one pair stay in their order.
@@ -107,7 +125,46 @@ impl World {
         found
     }
 
-    fn index(&self) -> &Index {
-        self.questions(|| Index::new(self.bodies(), &self.setup, self.step))
+    /// Statics that stay where they are, by place.
+    fn fixed(&self) -> &Tree {
+        self.questions.fixed.get_or_init(|| {
+            let fixed = self.setup.statics_that_stay();
+            Tree::new(fixed.map(|body| self.outline(body)).collect())
+        })
+    }
+
+    /// Bodies, and statics that move.
+    fn moving(&self) -> impl Iterator<Item = Body> + '_ {
+        self.bodies().chain(self.setup.statics_that_go(self.step))
+    }
+
+    /// Visits those of them whose rectangles meet another, and maybe a few more.
+    fn visit_moving(&self, bounds: Bounds, mut visitor: impl FnMut(&Outline)) {
+        match self.sorted() {
+            Some(tree) => tree.visit(bounds, visitor),
+            None => self.near(|place| place.max(bounds.low).min(bounds.high)).for_each(|outline| visitor(&outline)),
+        }
+    }
+
+    /// These by place, if there are many questions.
+    fn sorted(&self) -> Option<&Tree> {
+        let Questions { asked, moving, .. } = &self.questions;
+        let sort = || moving.get_or_init(|| Tree::new(self.moving().map(|body| self.outline(body)).collect()));
+        (asked.fetch_add(1, Relaxed) >= FEW).then(sort)
+    }
+
+    /// Those of them whose bounding circle comes to the point that is `nearest` to its center, and maybe a few more.
+    fn near(&self, nearest: impl Fn(DVec2) -> DVec2) -> impl Iterator<Item = Outline> {
+        let is_near = move |place: DVec2, kind: KindId| {
+            let radius =
+                f64::from(self.setup.kind(kind).bounding_radius) * (1.0 + 1e-6) + 1e-14 * place.abs().max_element();
+            (nearest(place) - place).length_squared() <= radius * radius
+        };
+        let moving = self.moving().filter(move |body| is_near(body.position, body.kind));
+        moving.map(|body| self.outline(body))
+    }
+
+    fn outline(&self, body: Body) -> Outline {
+        Outline::new(&body, self.setup.kind(body.kind))
     }
 }

@@ -27,8 +27,9 @@ impl World {
             let kind = setup.kind(sensor.kind);
             let half = kind.half_extents(sensor.rotation).as_dvec2() * (1.0 + 1e-6);
             let bounds = Bounds { low: sensor.position - half, high: sensor.position + half };
-            self.index().bodies.visit(bounds, |outline| {
-                let body = self.get(outline.id).expect("the index is of this world's bodies");
+            self.visit_moving(bounds, |outline| {
+                // Statics that move are in no sensor.
+                let Some(body) = self.get(outline.id) else { return };
                 let other = setup.kind(body.kind);
                 if other.sensor || !kind.filter.admits(&other.filter) {
                     return;

@@ -66,6 +66,10 @@ fn answers_are_those_of_looking_at_each_body() {
             let all = outlines(&world);
             for number in 0..3400 {
                 let (from, mut to) = (far + any.place(), far + any.place());
+                // Few questions are answered by looking at each body, many by a tree.
+                if round % 2 == 0 && number % 5 == 0 {
+                    world.questions.forget();
+                }
                 match number % 4 {
                     0 => to.x = from.x,
                     1 => to.y = from.y,
