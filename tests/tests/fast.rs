@@ -56,6 +56,50 @@ fn a_disc_never_passes_a_thin_wall() {
     });
 }
 
+/// Defect: a rod that turned by nearly half a turn in a step had no contact with the wall that it flew through.
+#[test]
+fn what_spins_nearly_half_a_turn_a_step_never_passes_a_wall() {
+    for spin in [174.0, 180.0, 188.0] {
+        for start in 0..40 {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            scene.wall(MIDDLE, (0.02, 20.0), 0.0, Material::default());
+            let rod = scene.kind(Shape::rectangle(0.015, 0.15), Material::default());
+            let place = MIDDLE - DVec2::new(0.3 + 0.013 * f64::from(start), 0.0);
+            let id = scene.body(rod, place, Vec2::new(8.0, 0.5));
+            let body = scene.last();
+            (body.angular_velocity, body.rotation) = (spin, Rot::from_angle(0.3 * start as f32));
+            let mut sim = scene.start_on((1, 1), Exchange::Step);
+            sim.run(16);
+            let beyond = sim.body(id).position.x - MIDDLE.x;
+            assert!(beyond < 0.0, "start {start}, {spin} rad/s: {beyond} m beyond the middle of the wall");
+        }
+    }
+}
+
+/// Defect: what bounced had twice the speed that there may be, until the next step.
+#[test]
+fn nobody_is_ever_faster_than_the_limits_of_speed() {
+    for exchange in EXCHANGES {
+        let mut scene = Scene::new(MIDDLE, -30.0);
+        (scene.params.max_linear_speed, scene.params.max_angular_speed) = (6.0, 9.0);
+        let bouncy = Material { restitution: 1.0, ..Material::default() };
+        scene.wall(MIDDLE - DVec2::new(0.0, 3.0), (20.0, 1.0), 0.1, bouncy);
+        let kinds = [Shape::circle(0.2), Shape::rectangle(0.5, 0.2)].map(|shape| scene.kind(shape, bouncy));
+        for k in 0..60 {
+            let place = DVec2::new(0.6 * f64::from(k % 10) - 3.0, 0.5 * f64::from(k / 10) - 1.5);
+            scene.body(kinds[k as usize % 2], MIDDLE + place, Vec2::new(5.0 - 0.2 * k as f32, -2.0));
+        }
+        let mut sim = scene.start_on((2, 2), exchange);
+        for step in 0..90 {
+            sim.run(1);
+            for body in sim.bodies() {
+                let (speed, spin) = (body.velocity.length(), body.angular_velocity.abs());
+                assert!(speed < 6.0001 && spin <= 9.0, "{exchange:?}, step {step}: {speed} m/s, {spin} rad/s");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_disc_never_passes_a_wall_that_comes_to_meet_it() {
     each(&[0.0, 0.4], |what, place, grid, exchange, velocity, from| {

@@ -1,5 +1,6 @@
 //! Upright rectangles around the convex pieces of bodies, by which most pairs of pieces are seen to be apart.
 
+use crate::collide::broad_phase::Pair;
 use crate::model::id::KindId;
 use crate::model::math::{Rot, max};
 use crate::model::piece::Piece;
@@ -49,6 +50,8 @@ pub(super) struct PieceBoxes {
     /// For each body of the tile where its own begin; and their end. Where there are more than a few, those around groups of them follow.
     start: Vec<u32>,
     boxes: Vec<PieceBox>,
+    /// For each body whether it is near another.
+    is_near: Vec<bool>,
 }
 
 /// How many pieces make a group, of so many: about as many as there are groups.
@@ -86,28 +89,32 @@ impl OfBody<'_> {
 }
 
 impl PieceBoxes {
-    /// Places them around the bodies of several pieces as they are now, if there are any.
-    pub(super) fn place(&mut self, tile: &Tile, setup: &Setup, team: Team) {
+    /// Places them around those bodies of several pieces, as they are now, that are in pairs.
+    pub(super) fn place(&mut self, tile: &Tile, pairs: &[Pair], setup: &Setup, team: Team) {
         self.start.clear();
         self.boxes.clear();
         if !setup.compounds {
             return;
         }
-        let several = |kind: KindId| match &setup.kind(kind).pieces[..] {
-            all @ [_, _, ..] => all,
+        self.is_near.clear();
+        self.is_near.resize(tile.bodies.len(), false);
+        pairs.as_flattened().iter().for_each(|&body| self.is_near[body as usize] = true);
+        let (kinds, rotations, is_near) = (&tile.bodies.kind[..], &tile.bodies.rotation[..], &self.is_near[..]);
+        let several = |kind: KindId, is_near: bool| match &setup.kind(kind).pieces[..] {
+            all @ [_, _, ..] if is_near => all,
             _ => &[],
         };
-        let (kinds, rotations) = (&tile.bodies.kind[..], &tile.bodies.rotation[..]);
         let mut count = 0;
-        for &kind in kinds {
+        for (&kind, &is_near) in kinds.iter().zip(is_near) {
             self.start.push(count as u32);
-            let pieces = several(kind).len();
+            let pieces = several(kind, is_near).len();
             count += pieces + if pieces > FEW { pieces.div_ceil(group(pieces)) } else { 0 };
         }
         self.start.push(count as u32);
         team.append(&mut self.boxes, kinds.len(), GRAIN, |range, boxes| {
-            for (&kind, &rotation) in kinds[range.clone()].iter().zip(&rotations[range]) {
-                let (pieces, first) = (several(kind), boxes.len());
+            let of_each = kinds[range.clone()].iter().zip(&rotations[range.clone()]).zip(&is_near[range]);
+            for ((&kind, &rotation), &is_near) in of_each {
+                let (pieces, first) = (several(kind, is_near), boxes.len());
                 boxes.extend(pieces.iter().map(|piece| PieceBox::new(piece, rotation)));
                 if pieces.len() > FEW {
                     for begin in (0..pieces.len()).step_by(group(pieces.len())) {

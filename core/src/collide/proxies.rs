@@ -23,13 +23,16 @@ const GRAIN: usize = 8192;
 /// The mean velocity of a tile is that of one body of so many.
 const SAMPLED: usize = 13;
 
+/// The extent of a sensor, which touches nobody.
+pub(super) const NO_PAIRS: f32 = f32::INFINITY;
+
 /// What the broad phase knows of every body of a tile, a column for each number.
 #[derive(Default, Debug)]
 pub(crate) struct Proxies {
     /// Center, in meters from a place that all share.
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
-    /// The greater half extent of the AABB grown by the body's margin, with room for the rounding of local coordinates.
+    /// The greater half extent of the AABB grown by the body's margin, with room for the rounding of local coordinates; or [`NO_PAIRS`].
     pub(crate) extent: Vec<f32>,
     /// Two bodies that are further apart than these radii together, with room for rounding, do not touch in the step: `reach`, and
     /// as far as the body goes, seen from who goes as most do.
@@ -83,6 +86,10 @@ impl Proxies {
         team.for_each(parts.collect(), |part| setup.lanes.run(part));
         if setup.any_drives() {
             self.sweep(bodies, dynamic, setup);
+        }
+        if setup.sensors {
+            let all = self.extent.iter_mut().zip(&bodies.kind);
+            all.filter(|(_, kind)| setup.kind(**kind).sensor).for_each(|(extent, _)| *extent = NO_PAIRS);
         }
         (self.owned, self.dynamic, self.pairing) = (owned, dynamic, owned);
         self.weight.clear();

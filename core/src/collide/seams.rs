@@ -13,7 +13,7 @@ use crate::model::kind::Form;
 use crate::model::math::{dot, min};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use std::ops::Range;
 
 /// What stands out of a plane by less is not before it, in m, and as part of the radius of what there is room for in the body.
@@ -25,7 +25,7 @@ const ONE_NORMAL: f32 = 0.999_99;
 
 /// Looks again for those contacts of a tile that are behind others.
 pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
-    let mut gone = Vec::new();
+    let (mut gone, mut faces) = (Vec::new(), Vec::new());
     let mut first = 0;
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
@@ -34,8 +34,10 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
         if run.clone().all(|number| normal(number) == normal(run.start)) {
             continue;
         }
-        if run.clone().any(|i| run.clone().any(|k| is_behind(tile, contacts, [i, k], setup))) {
-            mend_of_one(tile, contacts, run, setup, &mut gone);
+        faces.clear();
+        faces.extend(run.clone().map(|i| Face::new(tile, (&tile.contacts.contacts[i], contacts.bodies[i]), setup)));
+        if faces.iter().any(|one| faces.iter().any(|two| two.is_behind(one))) {
+            mend_of_one(tile, contacts, (run, &faces), setup, &mut gone);
         }
     }
     if !gone.is_empty() {
@@ -52,55 +54,64 @@ fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
     Some(from + first..from + first + count)
 }
 
-/// Whether a contact is of another direction than a first one, and not before the plane of that. Round bodies roll from one to the other;
-/// what else pressed already stands on both.
-fn is_behind(tile: &Tile, contacts: &Contacts, [first, other]: [usize; 2], setup: &Setup) -> bool {
-    if first == other {
-        return false;
-    }
-    let contact = |number: usize| (&tile.contacts.contacts[number], contacts.bodies[number]);
-    let [one, two] = [first, other].map(|number| Face::new(tile, contact(number)));
-    let kind = setup.kind(tile.bodies.kind[two.body]);
-    let presses = tile.contacts.contacts[other].points().iter().any(|point| point.normal_impulse > 0.0);
-    if presses && kind.form != Form::Round || dot(one.normal, two.normal) > ONE_NORMAL {
-        return false;
-    }
-    let level = min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius);
-    let between = (tile.bodies.position[two.of] - tile.bodies.position[one.of]).as_vec2() - one.points[0];
-    two.points[..two.count].iter().all(|&point| dot(point + between, one.normal) < level)
-}
-
-/// Where a static is touched.
+/// Where a body touches a static.
 struct Face {
-    body: usize,
-    of: usize,
-    /// Out of it.
+    of: DVec2,
+    /// Out of the static.
     normal: Vec2,
     /// On its surface, from its center.
     points: [Vec2; 2],
     count: usize,
+    /// What stands out of a plane by less than this is not before it.
+    level: f32,
+    /// Whether it pressed already, at a body that does not roll.
+    is_stood_on: bool,
 }
 
 impl Face {
-    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair)) -> Self {
+    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair), setup: &Setup) -> Self {
         let is_first = a as usize >= tile.owned + tile.ghosts();
         let (body, of, way, center) = if is_first { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
         let normal = contact.normal * way;
         let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
-        Self { body: body as usize, of: of as usize, normal, points, count: contact.point_count() }
+        let kind = setup.kind(tile.bodies.kind[body as usize]);
+        let presses = contact.points().iter().any(|point| point.normal_impulse > 0.0);
+        Self {
+            of: tile.bodies.position[of as usize],
+            normal,
+            points,
+            count: contact.point_count(),
+            level: min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius),
+            is_stood_on: presses && kind.form != Form::Round,
+        }
+    }
+
+    /// Whether it is of another direction than a first one, and not before the plane of that. Round bodies roll from one to the other;
+    /// what else pressed already stands on both.
+    fn is_behind(&self, first: &Self) -> bool {
+        if dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
+            return false;
+        }
+        let between = (self.of - first.of).as_vec2() - first.points[0];
+        self.points[..self.count].iter().all(|&point| dot(point + between, first.normal) < self.level)
     }
 }
 
 /// Looks again for those contacts of a body that are behind others, each on the way that the first of these leaves.
-fn mend_of_one(tile: &mut Tile, contacts: &mut Contacts, run: Range<usize>, setup: &Setup, gone: &mut Vec<usize>) {
+fn mend_of_one(
+    tile: &mut Tile,
+    contacts: &mut Contacts,
+    (run, faces): (Range<usize>, &[Face]),
+    setup: &Setup,
+    gone: &mut Vec<usize>,
+) {
     let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
     let all = run.clone().map(|number| Stopped::new(tile, contact(number), setup));
     let Some(all) = all.collect::<Option<Vec<_>>>() else { return };
     let stopped = |number: usize| &all[number - run.start];
+    let is_behind = |first: usize, other: usize| faces[other - run.start].is_behind(&faces[first - run.start]);
     let again = run.clone().filter_map(|other| {
-        let before = |&first: &usize| {
-            stopped(first).order() < stopped(other).order() && is_behind(tile, contacts, [first, other], setup)
-        };
+        let before = |&first: &usize| stopped(first).order() < stopped(other).order() && is_behind(first, other);
         let sooner = |one, two| if stopped(two).order() < stopped(one).order() { two } else { one };
         let first = run.clone().filter(before).reduce(sooner)?;
         Some((first, other, stopped(first).touch(tile, contact(other), setup)))

@@ -81,19 +81,23 @@ impl Motion {
         root_mass: V,
         root_inertia: V,
     ) -> [V; 3] {
-        let one = V::splat(1.0);
         let Outer { gravity: [gx, gy], linear_damping: damping, angular_damping } = outer;
-        let mut vx = vx.add(root_mass.mul(gx)).mul(damping);
-        let mut vy = vy.add(root_mass.mul(gy)).mul(damping);
+        let vx = vx.add(root_mass.mul(gx)).mul(damping);
+        let vy = vy.add(root_mass.mul(gy)).mul(damping);
+        self.limit([vx, vy, w.mul(angular_damping)], root_mass, root_inertia)
+    }
+
+    /// Velocities within the limits of speed, weighed as there.
+    #[inline(always)]
+    pub(crate) fn limit<V: Lanes>(&self, [mut vx, mut vy, w]: [V; 3], root_mass: V, root_inertia: V) -> [V; 3] {
         if self.max_linear_speed < f32::INFINITY {
             let speed = vx.mul(vx).add(vy.mul(vy)).sqrt();
             let limit = V::splat(self.max_linear_speed).mul(root_mass);
-            let scale = speed.sub(limit).if_positive(limit.div(speed), one);
+            let scale = speed.sub(limit).if_positive(limit.div(speed), V::splat(1.0));
             (vx, vy) = (vx.mul(scale), vy.mul(scale));
         }
         let limit = V::splat(self.max_angular_speed).mul(root_inertia);
-        let w = w.mul(angular_damping).min(limit).max(V::splat(0.0).sub(limit));
-        [vx, vy, w]
+        [vx, vy, w.min(limit).max(V::splat(0.0).sub(limit))]
     }
 
     /// A rotation turned on for a substep, at length one again.

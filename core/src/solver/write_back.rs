@@ -359,11 +359,14 @@ impl Mover<'_> {
         let [_, _, root_inv_inertia, root_inv_mass] = V::gather_fixed(&self.solved.weight, index);
         let [x, y, lost, s] = V::gather_fixed(&self.solved.pose, index);
         let [vx, vy, w, _] = V::gather_fixed(&self.solved.velocity, index);
+        // What contacts, and bounces, did after the limits of the last substep.
+        let (one, velocity) = (V::splat(1.0), [vx.mul(root_inv_mass), vy.mul(root_inv_mass), w.mul(root_inv_inertia)]);
+        let [vx, vy, spin] = self.motion.limit(velocity, one, one);
         Motions {
             moved: Vectors::new(x, y).scaled(root_inv_mass),
             turned: Vectors::new(V::splat(1.0).sub(lost.mul(root_inv_inertia)), s.mul(root_inv_inertia)),
-            velocity: Vectors::new(vx, vy).scaled(root_inv_mass),
-            spin: w.mul(root_inv_inertia),
+            velocity: Vectors::new(vx, vy),
+            spin,
         }
     }
 }

@@ -22,6 +22,9 @@ pub(crate) struct Way {
     rotation: Rot,
 }
 
+/// Who turns further than this in a step, in rad, may meet something that the search for contacts did not see.
+const FAR_TURN: f32 = 2.5;
+
 /// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed; and those that a
 /// static has turned aside, as in a corner, and that could come with their middle into another.
 pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way> {
@@ -32,7 +35,9 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     if setup.statics.is_empty() {
         return Vec::new();
     }
-    let any_goes_far = far::any(&bodies.velocity[..tile.owned], setup);
+    let turns_far = |row: usize| bodies.angular_velocity[row].abs() * setup.params.dt > FAR_TURN;
+    let any_turns_far = (0..tile.owned).fold(false, |any, row| any | turns_far(row));
+    let any_goes_far = any_turns_far || far::any(&bodies.velocity[..tile.owned], setup);
     if !any_goes_far && !any_moves(slimness.of_bodies) {
         return Vec::new();
     }
@@ -51,7 +56,8 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     });
     let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
     if any_goes_far || any_moves(slimness.of_both) {
-        let may = |&row: &usize| setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics);
+        let may =
+            |&row: &usize| setup.goes_far(bodies.velocity[row]) || turns_far(row) || goes(row, slimness.of_statics);
         rows.extend((0..tile.owned).filter(may));
         rows.sort_unstable();
     }

@@ -139,6 +139,8 @@ pub(crate) struct Setup {
     pub(crate) slimness: Slimness,
     /// Whether there are bodies that do not touch all others.
     pub(crate) filters: bool,
+    /// Whether there are sensors.
+    pub(crate) sensors: bool,
     /// Whether there are shapes of several pieces.
     pub(crate) compounds: bool,
     /// For each dynamic kind how its bodies move by themselves ([`Dynamics::factors`]); empty where all do alike.
@@ -197,6 +199,7 @@ impl Setup {
         let wide_halo = width_for(largest_radius(&blueprint.kinds, f32::INFINITY), &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
+        let sensors = kinds.iter().any(|kind| kind.sensor);
         let compounds = kinds.iter().any(KindRow::is_compound);
         let factors = factors(&kinds[..dynamic_kinds], &params);
         Ok(Self {
@@ -212,6 +215,7 @@ impl Setup {
             bouncy,
             slimness: Slimness::of(&kinds, dynamic_kinds),
             filters,
+            sensors,
             compounds,
             factors,
             kinds,
@@ -247,6 +251,7 @@ impl Setup {
         setup.bouncy |= kind.material.restitution > 0.0;
         setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
         setup.slimness = Slimness::of(&setup.kinds, setup.dynamic_kinds);
+        setup.sensors |= kind.sensor;
         setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
         setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
         Ok(setup)

@@ -16,7 +16,7 @@ use super::cells::{Cells, Dense, Layout, Sparse};
 use super::search::{Search, Sorted, emit};
 use super::slant::Slant;
 use super::{Field, Pair};
-use crate::collide::proxies::Proxies;
+use crate::collide::proxies::{NO_PAIRS, Proxies};
 use crate::model::math;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
 #[cfg(test)]
@@ -131,7 +131,8 @@ impl Grid {
             }
             most = less;
         };
-        self.larger.extend(self.large.iter().map(|&i| level.body[i as usize]));
+        let large = self.large.iter().filter(|&&i| level.extent[i as usize] < NO_PAIRS);
+        self.larger.extend(large.map(|&i| level.body[i as usize]));
         if binned.is_sparse {
             self.pair(&self.sparse, &binned, field, pairs);
         } else {
@@ -372,7 +373,8 @@ fn choose_limit(level: &Level<'_>, proxies: &Proxies, room: f64) -> f32 {
     let bodies = level.body.len();
     let step = if bodies < 256 * SAMPLED { 1 } else { SAMPLED };
     let of = step as f64;
-    for (&body, &extent) in level.body.iter().zip(level.extent).step_by(step) {
+    let sampled = level.body.iter().zip(level.extent).step_by(step);
+    for (&body, &extent) in sampled.filter(|(_, extent)| **extent < NO_PAIRS) {
         let class = &mut classes[((extent.to_bits() >> 22).saturating_sub(FIRST) as usize).min(CLASSES - 1)];
         // What reaches beyond the tile meets nobody there.
         let [x, y] = proxies.half(body as usize);
@@ -398,5 +400,5 @@ fn choose_limit(level: &Level<'_>, proxies: &Proxies, room: f64) -> f32 {
     }
     // Where the next class begins: those that were not counted may be a little larger.
     let next = (FIRST + best.1 as u32 + 1) << 22;
-    if best.1 + 1 == CLASSES { f32::INFINITY } else { f32::from_bits(next) }
+    if best.1 + 1 == CLASSES { f32::MAX } else { f32::from_bits(next) }
 }

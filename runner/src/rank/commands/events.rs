@@ -86,8 +86,14 @@ pub(super) fn sensors(world: &World, transport: &mut impl Transport) -> Result<V
     records(&told).map_err(RankError::Transport)
 }
 
+/// Of ascending pairs those that are not among others, ascending too.
 fn not_in(all: &[Pair], others: &[Pair]) -> Vec<Pair> {
-    all.iter().filter(|pair| others.binary_search(pair).is_err()).copied().collect()
+    let mut others = others.iter().peekable();
+    let is_new = |pair: &&Pair| {
+        while others.next_if(|other| other < pair).is_some() {}
+        others.peek() != Some(pair)
+    };
+    all.iter().filter(is_new).copied().collect()
 }
 
 /// What all ranks have to say, ascending, on rank 0.
