@@ -88,13 +88,23 @@ impl Slimness {
     /// Of dynamic kinds, and those of statics behind them.
     fn of(kinds: &[KindRow], dynamic_kinds: usize) -> Self {
         let (own, fixed) = kinds.split_at(dynamic_kinds);
-        let least = |kinds: &[KindRow]| {
-            kinds.iter().filter(|kind| !kind.sensor).map(|kind| kind.inner_radius).fold(f32::INFINITY, math::min)
-        };
-        let (of_bodies, of_statics) = (least(own), least(fixed));
-        let longest_arm = own.iter().map(|kind| kind.not_round * kind.bounding_radius).fold(0.0, math::max);
-        Self { of_bodies, of_statics, of_both: of_bodies + of_statics, longest_arm }
+        let nothing = f32::INFINITY;
+        let of_statics = fixed.iter().map(breadth).fold(nothing, math::min);
+        let of_nobody = Self { of_bodies: nothing, of_statics, of_both: nothing, longest_arm: 0.0 };
+        own.iter().fold(of_nobody, Self::with)
     }
+
+    /// With one dynamic kind more.
+    fn with(self, kind: &KindRow) -> Self {
+        let of_bodies = math::min(self.of_bodies, breadth(kind));
+        let longest_arm = math::max(self.longest_arm, kind.not_round * kind.bounding_radius);
+        Self { of_bodies, of_both: of_bodies + self.of_statics, longest_arm, ..self }
+    }
+}
+
+/// Inner radius; a sensor is never too thin.
+fn breadth(kind: &KindRow) -> f32 {
+    if kind.sensor { f32::INFINITY } else { kind.inner_radius }
 }
 
 /// How the bodies of each kind move by themselves; empty if all do alike.
@@ -235,26 +245,33 @@ impl Setup {
         Self { partition: partition.clone(), ..self.clone() }
     }
 
-    /// The same with one more dynamic kind, after those there are.
-    pub(crate) fn with_kind(&self, kind: &Kind) -> Result<Self, SetupError> {
+    /// One more dynamic kind, after those there are: the rows of statics' kinds move on by one. Says whether more may matter to a tile
+    /// from now on.
+    pub(crate) fn add_kind(&mut self, kind: &Kind) -> Result<bool, SetupError> {
         let row = KindRow::dynamic(kind, KindId(self.dynamic_kinds as u32))?;
-        let mut setup = self.clone();
+        let widths = |setup: &Self| (setup.halo_width, setup.wide_halo, setup.overlap);
+        let before = widths(self);
         let width = width_for(row.bounding_radius, &self.params);
-        setup.wide_halo = self.wide_halo.max(width);
+        self.wide_halo = self.wide_halo.max(width);
         if row.bounding_radius <= self.params.large_radius {
-            setup.halo_width = self.halo_width.max(width);
-            setup.overlap = overlap::depth(&self.params).map(|part| part * setup.halo_width);
+            self.halo_width = self.halo_width.max(width);
+            self.overlap = overlap::depth(&self.params).map(|part| part * self.halo_width);
         }
-        setup.kinds.insert(self.dynamic_kinds, row);
-        setup.dynamic_kinds += 1;
-        setup.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
-        setup.bouncy |= kind.material.restitution > 0.0;
-        setup.filters |= is_choosy(&setup.kinds[self.dynamic_kinds]);
-        setup.slimness = Slimness::of(&setup.kinds, setup.dynamic_kinds);
-        setup.sensors |= kind.sensor;
-        setup.compounds |= setup.kinds[self.dynamic_kinds].is_compound();
-        setup.factors = factors(&setup.kinds[..setup.dynamic_kinds], &setup.params);
-        Ok(setup)
+        self.bouncy |= kind.material.restitution > 0.0;
+        self.filters |= is_choosy(&row);
+        self.sensors |= kind.sensor;
+        self.compounds |= row.is_compound();
+        self.slimness = self.slimness.with(&row);
+        let moves_alike = row.dynamics == Dynamics::default();
+        self.kinds.insert(self.dynamic_kinds, row);
+        self.dynamic_kinds += 1;
+        if !(self.factors.is_empty() && moves_alike) {
+            let known = self.factors.len();
+            let rest = self.kinds[known..self.dynamic_kinds].iter();
+            self.factors.extend(rest.map(|kind| kind.dynamics.factors(&self.params)));
+        }
+        self.statics.iter_mut().for_each(|fixed| fixed.kind.0 += 1);
+        Ok(widths(self) != before)
     }
 
     /// Whether there can be dynamic bodies of it.

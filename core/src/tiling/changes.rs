@@ -210,7 +210,13 @@ impl Tile {
         self.contacts.retain(|key| !forgets(key));
     }
 
-    /// Goes on with a setup that has more kinds: statics are of other rows, and where the halo became wider more of them matter.
+    /// Goes on with a setup that has one dynamic kind more, and as wide a halo as before: the rows of statics' kinds are one further on.
+    pub(crate) fn move_kinds_of_statics(&mut self) {
+        let dynamic = self.owned + self.ghosts();
+        self.bodies.kind.iter_mut().skip(dynamic).for_each(|kind| kind.0 += 1);
+    }
+
+    /// Goes on with a setup that has more kinds, and a wider halo: statics are of other rows, and more of them matter.
     pub(crate) fn follow_kinds(&mut self, setup: &Setup) {
         self.reached = setup.statics_of(self.id);
         self.near = Near::default();

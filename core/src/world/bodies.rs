@@ -131,12 +131,16 @@ impl World {
     /// If a size is not positive, or a number out of range.
     pub fn add_kind(&mut self, kind: &Kind) -> Result<KindId, SetupError> {
         let row = KindId(self.setup.dynamic_kinds as u32);
-        let setup = self.setup.with_kind(kind)?;
-        self.settle();
-        self.tiles.par_iter_mut().for_each(|tile| tile.follow_kinds(&setup));
-        self.setup = Arc::new(setup);
+        let widens = Arc::make_mut(&mut self.setup).add_kind(kind)?;
         self.inbox.kinds = self.setup.dynamic_kinds as u32;
-        self.works.iter_mut().for_each(|work| *work = None);
+        if widens {
+            self.settle();
+            let setup = &self.setup;
+            self.tiles.par_iter_mut().for_each(|tile| tile.follow_kinds(setup));
+            self.forget_works();
+        } else {
+            self.tiles.iter_mut().for_each(Tile::move_kinds_of_statics);
+        }
         Ok(row)
     }
 

@@ -274,7 +274,6 @@ impl World {
     }
 
     /// Forgets all that was derived of tiles and is kept from step to step: it must never show.
-    #[cfg(test)]
     pub(crate) fn forget_works(&mut self) {
         self.works.iter_mut().for_each(|work| *work = None);
     }

@@ -68,7 +68,7 @@ impl World {
         let Some(partition) = self.next_partition.take() else { return false };
         let setup = Arc::new(self.setup.with_partition(&partition));
         self.tiles.par_iter_mut().for_each(|tile| tile.move_borders(&setup));
-        self.works.iter_mut().for_each(|work| *work = None);
+        self.forget_works();
         self.setup = setup;
         true
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::Loopback;
 use crate::model::body::StaticBody;
-use crate::model::kind::Material;
+use crate::model::kind::{Dynamics, Material};
 use crate::model::math::Rot;
 use crate::model::params::{Exchange, Params};
 use crate::model::shape::Shape;
@@ -42,6 +42,12 @@ fn pick(number: u64, bound: u64) -> u64 {
     (number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 33) % bound
 }
 
+/// A kind for which the halo must grow, and one for which it need not, that moves otherwise.
+fn added_kinds() -> [Kind; 2] {
+    let dynamics = Dynamics { gravity_scale: 0.5, ..Dynamics::default() };
+    [circle(0.9), Kind { dynamics, ..circle(0.1) }]
+}
+
 /// Some commands for a step.
 fn commands(number: u64) -> Vec<Command> {
     let id = |k: u64| GlobalId(1 + pick(16 * number + k, 320));
@@ -62,8 +68,10 @@ fn commands(number: u64) -> Vec<Command> {
     all.push(Command::Add(Body { id: id(9), ..body(3) }));
     match number {
         9 => all.push(Command::SetGravity(Vec2::new(5.0, -8.0))),
-        14 => all.push(Command::AddKind(Kind::new(Shape::circle(0.9), Material::default()))),
+        14 => all.push(Command::AddKind(added_kinds()[0].clone())),
         15..20 => all.push(Command::Add(Body { id: GlobalId(5000 + number), kind: KindId(2), ..body(4) })),
+        20 => all.push(Command::AddKind(added_kinds()[1].clone())),
+        21..25 => all.push(Command::Add(Body { id: GlobalId(5000 + number), kind: KindId(3), ..body(4) })),
         _ => {}
     }
     all
@@ -74,8 +82,8 @@ fn saved_and_restored(world: &World, exchange: Exchange, columns: u32) -> World 
     let mut bytes = Vec::new();
     let saved = world.save(&mut bytes);
     let mut again = World::whole(&blueprint(exchange, columns, false)).unwrap();
-    while again.setup.dynamic_kinds < world.setup.dynamic_kinds {
-        again.add_kind(&circle(0.9)).unwrap();
+    for kind in &added_kinds()[..world.setup.dynamic_kinds - 2] {
+        again.add_kind(kind).unwrap();
     }
     again.command(&Command::SetGravity(world.gravity())).unwrap();
     again.forces = world.forces.clone();
@@ -98,7 +106,8 @@ fn follow(table: &mut BTreeMap<GlobalId, Body>, command: &Command) -> bool {
         }
         Command::Impulse { id, impulse, at, angular } => {
             let change = |body: &mut Body| {
-                let kind = &[circle(0.25), rectangle(0.5, 0.5), circle(0.9)][body.kind.0 as usize];
+                let [third, fourth] = added_kinds();
+                let kind = &[circle(0.25), rectangle(0.5, 0.5), third, fourth][body.kind.0 as usize];
                 let mass = kind.material.density * kind.shape.area();
                 body.velocity += impulse * (1.0 / mass);
                 let arm = (at.unwrap() - body.position).as_vec2();
@@ -151,7 +160,7 @@ fn a_world_follows_its_commands_as_a_table_does_and_can_be_saved_at_once() {
             }
         }
         assert!(applied > 250 && refused > 0, "{applied} applied, {refused} refused");
-        assert!(world.bodies().any(|body| body.kind == KindId(2)));
+        assert!([2, 3].iter().all(|&kind| world.bodies().any(|body| body.kind == KindId(kind))));
         finish(world, &mut Loopback).unwrap();
     }
 }
