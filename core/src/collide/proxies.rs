@@ -57,7 +57,7 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies, of which so many are owned and so many more ghosts. Local coordinates
-    /// count from `origin`, which had best be near most of them, as they are rounded.
+    /// count from `origin`, which had best be near most of them, as they are rounded. Returns the fastest spin, in rad/s.
     pub(crate) fn load(
         &mut self,
         bodies: &Bodies,
@@ -66,7 +66,7 @@ impl Proxies {
         origin: DVec2,
         setup: &Setup,
         team: Team,
-    ) {
+    ) -> f32 {
         let (total, dynamic) = (bodies.len(), owned + ghosts);
         let mean = mean(&bodies.velocity[..dynamic]);
         let load = Load { bodies, dynamic, origin, mean, setup };
@@ -83,7 +83,7 @@ impl Proxies {
             load,
             range,
         });
-        team.for_each(parts.collect(), |part| setup.lanes.run(part));
+        let fastest = team.for_each(parts.collect(), |part| setup.lanes.run(part));
         if setup.any_drives() {
             self.sweep(bodies, dynamic, setup);
         }
@@ -98,6 +98,7 @@ impl Proxies {
         self.weight.resize(total, 1);
         self.size = rectangle.size().as_vec2().to_array();
         self.lanes = setup.lanes;
+        fastest.into_iter().fold(0.0, math::max)
     }
 
     /// Statics have no margin. Those that move get room for all that they sweep in the step.
@@ -207,34 +208,38 @@ struct Part<'a> {
 }
 
 impl Kernel for Part<'_> {
-    type Output = ();
+    /// The fastest spin.
+    type Output = f32;
 
     #[inline(always)]
-    fn run<V: Lanes>(self) {
+    fn run<V: Lanes>(self) -> f32 {
         let Self { load, range, columns: [x, y, extent, radius], outline } = self;
         let (x, x_rest) = x.as_chunks_mut::<LANES>();
         let (y, y_rest) = y.as_chunks_mut::<LANES>();
         let (extent, extent_rest) = extent.as_chunks_mut::<LANES>();
         let (radius, radius_rest) = radius.as_chunks_mut::<LANES>();
         let (outline, outline_rest) = outline.as_chunks_mut::<LANES>();
-        let mut first = range.start;
+        let (mut first, mut fastest) = (range.start, V::splat(0.0));
         for ((((x, y), extent), radius), outline) in x.iter_mut().zip(y).zip(extent).zip(radius).zip(outline) {
-            load.load::<V>(first, LANES, [x, y, extent, radius], outline);
+            fastest = load.load::<V>(first, LANES, [x, y, extent, radius], outline).max(fastest);
             first += LANES;
         }
         let (mut rows, mut quads) = ([[0.0; LANES]; 4], [[0.0; 4]; LANES]);
-        load.load::<V>(first, range.end - first, rows.each_mut(), &mut quads);
+        fastest = load.load::<V>(first, range.end - first, rows.each_mut(), &mut quads).max(fastest);
         for (rest, row) in [x_rest, y_rest, extent_rest, radius_rest].into_iter().zip(&rows) {
             rest.copy_from_slice(&row[..rest.len()]);
         }
         outline_rest.copy_from_slice(&quads[..outline_rest.len()]);
+        let mut spins = [0.0; LANES];
+        fastest.store(&mut spins);
+        spins.into_iter().fold(0.0, math::max)
     }
 }
 
 impl Load<'_> {
-    /// Fills in the proxies of up to eight bodies.
+    /// Fills in the proxies of up to eight bodies. Returns their spins.
     #[inline(always)]
-    fn load<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) {
+    fn load<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) -> V {
         let (mut spin, mut grows): (Row, Row) = Default::default();
         let (mut places, mut kinds) = ([[0.0; 2]; LANES], [[0.0; 4]; LANES]);
         let (mut velocities, mut rotations) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);
@@ -272,7 +277,8 @@ impl Load<'_> {
         let margin_x = absolute(vx).mul(dt).max(any_way).mul(grows);
         let margin_y = absolute(vy).mul(dt).max(any_way).mul(grows);
         // Turning brings no point of a round body nearer.
-        let sweep = not_round.mul(bound.mul(absolute(V::load(&spin)))).mul(dt);
+        let spin = absolute(V::load(&spin));
+        let sweep = not_round.mul(bound.mul(spin)).mul(dt);
         let swept = rounding.add(sweep.mul(grows));
         let half_x = c.mul(width).add(s.mul(height)).add(swept).min(bound).add(margin_x);
         let half_y = s.mul(width).add(c.mul(height)).add(swept).min(bound).add(margin_y);
@@ -287,5 +293,6 @@ impl Load<'_> {
         reach.add(slack.add(slack)).add(far).store(radius);
         let bound = width.if_positive(bound, zero.sub(bound));
         V::store_quads([half_x, half_y, reach, bound], outline);
+        spin
     }
 }

@@ -35,8 +35,8 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     if setup.statics.is_empty() {
         return Vec::new();
     }
-    let turns_far = |row: usize| bodies.angular_velocity[row].abs() * setup.params.dt > FAR_TURN;
-    let any_turns_far = (0..tile.owned).fold(false, |any, row| any | turns_far(row));
+    let turns_far = |spin: f32| spin.abs() * setup.params.dt > FAR_TURN;
+    let any_turns_far = turns_far(tile.counts.fastest_spin);
     let any_goes_far = any_turns_far || far::any(&bodies.velocity[..tile.owned], setup);
     if !any_goes_far && !any_moves(slimness.of_bodies) {
         return Vec::new();
@@ -56,8 +56,10 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     });
     let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
     if any_goes_far || any_moves(slimness.of_both) {
-        let may =
-            |&row: &usize| setup.goes_far(bodies.velocity[row]) || turns_far(row) || goes(row, slimness.of_statics);
+        let may = |&row: &usize| {
+            let turns_far = any_turns_far && turns_far(bodies.angular_velocity[row]);
+            turns_far || setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics)
+        };
         rows.extend((0..tile.owned).filter(may));
         rows.sort_unstable();
     }

@@ -186,8 +186,9 @@ fn collide(bench: &mut Bench<'_>) {
             Some(_) => tile.rectangle.min,
             None => amid(&tile.bodies.position[..counts[0] + counts[1]]),
         };
-        proxies.load(&tile.bodies, counts, &tile.rectangle, origin, b.setup, b.team);
+        let fastest = proxies.load(&tile.bodies, counts, &tile.rectangle, origin, b.setup, b.team);
         proxies.pair_ghosts(tile, b.setup);
+        b.tile.counts.fastest_spin = fastest;
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(proxies, &b.tile.bodies.id);
         }

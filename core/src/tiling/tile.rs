@@ -78,6 +78,8 @@ pub(crate) struct TileCounts {
     pub(crate) leaps: u64,
     /// Whether an owned body reaches further in the step than the halo.
     pub(crate) far: bool,
+    /// Of anything in the tile, in rad/s.
+    pub(crate) fastest_spin: f32,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
     pub(crate) asleep: u64,

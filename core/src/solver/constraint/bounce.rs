@@ -11,9 +11,18 @@ pub(crate) enum Answer {
     Hold,
     /// It came in fast, and parts.
     Part(Parting),
-    /// Both bodies flew, and came no nearer, or slowly. Where what pressed takes more than this speed, in m/s, it was a blow within the step,
-    /// which is passed on in the next one, as one between bodies that come in fast.
-    NotYet(f32),
+    /// Both bodies flew, and came no nearer, or slowly. Where what pressed takes more than a speed it was a blow within the step, which
+    /// is passed on in the next one, as one between bodies that come in fast.
+    NotYet(Passing),
+}
+
+/// How a blow is passed on; speeds in m/s.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Passing {
+    /// What takes no more is no blow.
+    pub(super) least: f32,
+    /// No blow makes bodies come nearer faster: what takes more pressed from two sides.
+    pub(super) most: f32,
 }
 
 /// How a point that bounces came, and how it is to part; speeds in m/s.
@@ -86,7 +95,9 @@ impl Sides {
                 Answer::Part(parting) if *pressed > 0.0 => {
                     point.normal_mass[lane] * (parting.speed - self.speed(rows, lane, velocity))
                 }
-                Answer::NotYet(_) if is_blow => -*pressed,
+                Answer::NotYet(Passing { most, .. }) if is_blow => {
+                    min(0.0, -point.normal_mass[lane] * (most + self.speed(rows, lane, velocity)))
+                }
                 Answer::Hold if *pressed > 0.0 => min(0.0, -point.normal_mass[lane] * self.speed(rows, lane, velocity)),
                 _ => continue,
             };
@@ -114,11 +125,11 @@ impl Sides {
     ) -> bool {
         let rows = |point: &PointRows| self.normal_rows(point, lane, velocity);
         points.iter().zip(answers).any(|(point, answer)| {
-            let Answer::NotYet(most) = answer else { return false };
+            let Answer::NotYet(Passing { least, .. }) = answer else { return false };
             let own = rows(point);
             let all = points.iter().zip(totals);
             let taken: f32 = all.map(|(point, totals)| speed_given(own, rows(point)) * totals.normal[lane]).sum();
-            taken > most
+            taken > least
         })
     }
 

@@ -35,8 +35,9 @@ pub(crate) struct Groups {
     pub(super) held: Vec<Option<bool>>,
     /// For each body a lower one that a blow may go on to, or come from, or itself.
     pub(super) on: Vec<u32>,
-    /// For each body whether a blow comes to it, and of those that it goes on to, and that know of this one as the lowest, to any.
-    pub(super) struck: Vec<[bool; 2]>,
+    /// For each body whether a blow comes to it or goes on from it; and of those that it goes on to, and that know of this one as the
+    /// lowest, the speed of the fastest, in m/s, or zero.
+    pub(super) struck: Vec<(bool, f32)>,
 }
 
 /// A contact that may bounce.

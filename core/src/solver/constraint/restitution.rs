@@ -1,6 +1,6 @@
 //! Restitution: points that came in fast and pressed get part of their speed back, once, after the last substep.
 
-use super::bounce::{Answer, Parting};
+use super::bounce::{Answer, Parting, Passing};
 use super::columns::Columns;
 use super::groups::{Bounce, Groups, Lane};
 use super::rows::Source;
@@ -21,6 +21,9 @@ const EXACT: f32 = 1e-5;
 
 /// What takes so many times the speed at which bodies came nearer is more than that takes, however the solver rounds.
 const SURELY: f32 = 1.001;
+
+/// A heavy body that comes in gives a light one so many times its own speed, at most.
+const PASSED_ON: f32 = 2.0;
 
 /// In so many steps gravity gives what lies in a pile the speed at which it may come nearer and part.
 const STILL: f32 = 4.0;
@@ -46,23 +49,22 @@ impl Groups {
                     } else if source.holds(i, point, closing) {
                         Answer::Hold
                     } else {
-                        Answer::NotYet(SURELY * max(closing, 0.0) + source.fall(i))
+                        Answer::NotYet(Passing { least: SURELY * max(closing, 0.0) + source.fall(i), most: 0.0 })
                     };
                 }
-                let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
-                let at_once = batches.of_body(self.lanes[i].base as usize).at_once;
-                let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-                bounces.push(Bounce { contact: i as u32, closing: fastest, off_static, answers });
+                self.add_bounce(i, (fastest, answers), kinds, batches);
             }
         }
         if self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
             self.leave_held(source);
             self.leave_unstruck(source);
+            self.hold_beside(batches, source);
         } else {
             self.bounces.clear();
             self.bounces_at_once.clear();
         }
         self.bouncing.extend(self.bounces.iter().map(|bounce| bounce.contact));
+        self.bouncing.sort_unstable();
         let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
             // By names: then both tiles that solve a contact at their border come to the same, if they know the same.
@@ -75,6 +77,35 @@ impl Groups {
         self.bounces_at_once.sort_by(first);
         let lanes = &self.lanes;
         self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+    }
+
+    fn add_bounce(
+        &mut self,
+        contact: usize,
+        (closing, answers): (f32, [Answer; 2]),
+        kinds: [&KindRow; 2],
+        batches: &Batches,
+    ) {
+        let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
+        let at_once = batches.of_body(self.lanes[contact].base as usize).at_once;
+        let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
+        bounces.push(Bounce { contact: contact as u32, closing, off_static, answers });
+    }
+
+    /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would throw the body
+    /// that lies between the two.
+    fn hold_beside(&mut self, batches: &Batches, source: Source<'_>) {
+        for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
+            let kinds = source.kinds_of(i);
+            let is_dead = kinds.iter().all(|kind| kind.material.restitution == 0.0);
+            let bodies = source.contacts.bodies[i].into_iter().zip(kinds);
+            let mut moving = bodies.filter(|(_, kind)| kind.inv_mass > 0.0);
+            if is_dead && moving.any(|(body, _)| self.struck[body as usize].0) && self.is_solved(i as u32) {
+                let speeds = (0..contact.point_count()).map(|point| source.meeting_speeds(i, point)[0]);
+                let fastest = speeds.fold(f32::NEG_INFINITY, max);
+                self.add_bounce(i, (fastest, [Answer::Hold; 2]), kinds, batches);
+            }
+        }
     }
 
     /// Has points hold that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
@@ -109,7 +140,7 @@ impl Groups {
     /// And those that no blow comes to, from one to the next, from where something comes in fast: who comes slowly is stopped, with all that
     /// lies on him. Passed on, that would come as slowly in each step, and be stopped as often.
     ///
-    /// What only holds is left out of it all, but beside what parts.
+    /// What only holds is left out of it all, but beside what parts or passes on.
     fn leave_unstruck(&mut self, source: Source<'_>) {
         let Self { bounces, bounces_at_once, on, struck, .. } = self;
         let moving = |bounce: &Bounce| {
@@ -126,16 +157,31 @@ impl Groups {
             }
         }
         struck.clear();
-        struck.resize(source.tile.bodies.len(), [false; 2]);
+        struck.resize(source.tile.bodies.len(), (false, 0.0));
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.parts()) {
             for body in moving(bounce) {
-                (struck[body as usize][0], struck[root_of(on, body) as usize][1]) = (true, true);
+                struck[body as usize].0 = true;
+                let fastest = &mut struck[root_of(on, body) as usize].1;
+                *fastest = max(*fastest, bounce.closing);
             }
         }
-        let mut is_unstruck = |bounce: &Bounce| !moving(bounce).any(|body| struck[root_of(on, body) as usize][1]);
+        let mut blow = |bounce: &Bounce| moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
+        for bounces in [&mut *bounces, &mut *bounces_at_once] {
+            leave(bounces, |bounce| blow(bounce) == 0.0);
+            for bounce in bounces.iter_mut().filter(|bounce| bounce.passes_on()) {
+                let fastest = blow(bounce);
+                for answer in &mut bounce.answers {
+                    if let Answer::NotYet(passing) = answer {
+                        passing.most = PASSED_ON * fastest;
+                    }
+                }
+            }
+        }
+        for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
+            moving(bounce).for_each(|body| struck[body as usize].0 = true);
+        }
         for bounces in [bounces, bounces_at_once] {
-            leave(bounces, &mut is_unstruck);
-            bounces.retain(|bounce| bounce.passes_on() || moving(bounce).any(|body| struck[body as usize][0]));
+            bounces.retain(|bounce| moving(bounce).any(|body| struck[body as usize].0));
         }
     }
 
