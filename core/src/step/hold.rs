@@ -22,7 +22,7 @@ pub(crate) struct Way {
     rotation: Rot,
 }
 
-/// Who turns further than this in a step, in rad, may meet something that the search for contacts did not see.
+/// Who is not round and turns further than this in a step, in rad, may meet something that the search for contacts did not see.
 const FAR_TURN: f32 = 2.5;
 
 /// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed; and those that a
@@ -57,7 +57,8 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
     let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
     if any_goes_far || any_moves(slimness.of_both) {
         let may = |&row: &usize| {
-            let turns_far = any_turns_far && turns_far(bodies.angular_velocity[row]);
+            let is_round = || setup.kind(bodies.kind[row]).not_round == 0.0;
+            let turns_far = any_turns_far && turns_far(bodies.angular_velocity[row]) && !is_round();
             turns_far || setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics)
         };
         rows.extend((0..tile.owned).filter(may));

@@ -16,8 +16,7 @@ impl Layout {
     /// Cells of this width over the given box.
     pub(super) fn new(low: [f32; 2], high: [f32; 2], cell: f32) -> Self {
         let per_meter = 1.0 / cell;
-        // By way of a signed number, as places are.
-        let [columns, rows] = [0, 1].map(|axis| ((high[axis] - low[axis]) * per_meter) as i32 as usize + 3);
+        let [columns, rows] = [0, 1].map(|axis| ((high[axis] - low[axis]) * per_meter) as u32 as usize + 3);
         Self { origin: low, per_meter, columns, rows }
     }
 

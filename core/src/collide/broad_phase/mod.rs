@@ -2,8 +2,8 @@
 //!
 //! The contract, whichever structure finds them: every pair with a body before
 //! [`Proxies::pairing`](super::proxies::Proxies::pairing) that [`Cull`](super::cull::Cull) takes for one, in any order; pairs that
-//! are none may be among them. Those need not be named that stay apart as seen from one of the two (see `slant.rs`). That test reads the bodies' own bits, not the tile's local coordinates, so two tiles that both see
-//! a pair agree on it.
+//! are none may be among them, and those need not that stay apart as seen from one of the two (see `slant.rs`). That test reads the
+//! bodies' own bits, not the tile's local coordinates, so two tiles that both see a pair agree on it.
 
 mod cells;
 pub(crate) mod grid;

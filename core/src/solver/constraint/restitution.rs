@@ -22,8 +22,8 @@ const EXACT: f32 = 1e-5;
 /// What takes so many times the speed at which bodies came nearer is more than that takes, however the solver rounds.
 const SURELY: f32 = 1.001;
 
-/// A heavy body that comes in gives a light one so many times its own speed, at most.
-const PASSED_ON: f32 = 2.0;
+/// A heavy body that comes in gives a light one twice its own speed, at most, and that a lighter one twice that.
+const PASSED_ON: f32 = 4.0;
 
 /// In so many steps gravity gives what lies in a pile the speed at which it may come nearer and part.
 const STILL: f32 = 4.0;

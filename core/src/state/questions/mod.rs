@@ -158,7 +158,9 @@ impl World {
         let is_near = move |place: DVec2, kind: KindId| {
             let radius =
                 f64::from(self.setup.kind(kind).bounding_radius) * (1.0 + 1e-6) + 1e-14 * place.abs().max_element();
-            (nearest(place) - place).length_squared() <= radius * radius
+            let square = (nearest(place) - place).length_squared();
+            // Where numbers overflow everybody is.
+            square <= radius * radius || square.is_nan()
         };
         let moving = self.moving().filter(move |body| is_near(body.position, body.kind));
         moving.map(|body| self.outline(body))

@@ -107,7 +107,7 @@ impl SceneFile {
     /// are `faults`, after which the rest can be looked at, and nothing more.
     fn begin(path: &Path, faults: &mut Vec<SceneError>) -> Result<(Self, Option<u64>), SceneError> {
         let text = read_text(path)?;
-        let description = Description::read(path, &text, faults)?;
+        let mut description = Description::read(path, &text, faults)?;
         let mut told = None;
         let mut static_ids: Vec<GlobalId> = Vec::new();
         let Statics { all: statics, are_named, tables: places } = &description.statics;
@@ -134,7 +134,8 @@ impl SceneFile {
                 (Rows::File(table), digest)
             }
         };
-        let statics = statics.clone();
+        // Those that all are asked of from now on; of their names there is more to come.
+        let statics = std::mem::take(&mut description.statics.all);
         Ok((
             Self { path: path.to_owned(), digest, description, statics, static_ids, rows, count: 0, by_kind: None },
             told,
