@@ -19,6 +19,7 @@ use super::{Field, Pair};
 use crate::collide::proxies::{NO_PAIRS, Proxies};
 use crate::model::math;
 use crate::parallel::lanes::{Kernel, LANES, Lanes, Row};
+use std::cell::LazyCell;
 #[cfg(test)]
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -155,8 +156,7 @@ impl Grid {
         let is_sparse = crowd > CROWD && few != all;
         let (layout, crowd) = if is_sparse { (all, self.fill_some(level, most, &all) / bodies) } else { (few, crowd) };
         self.sorted.fill(level, &self.cell, &mut self.start, self.large.len());
-        let Small { greatest, reach, .. } = small;
-        Binned { layout, is_sparse, greatest, reach, bodies, crowd }
+        Binned { layout, is_sparse, greatest: small.greatest, bodies, crowd }
     }
 
     /// Tells the small bodies of a level their cells, and where each of these begins. Returns the sum of the squares of how many there
@@ -210,7 +210,7 @@ impl Grid {
         team.append(pairs, sorted.len, GRAIN, |places, pairs| {
             Search { sorted, pairing, lanes, places, pairs }.neighbours(cells);
         });
-        let Binned { layout, greatest, reach, .. } = binned;
+        let (Binned { layout, greatest, .. }, reach) = (binned, LazyCell::new(|| sorted.greatest_radius()));
         for &body in &self.larger {
             let i = body as usize;
             let (x, y, slack, half) = (proxies.x[i], proxies.y[i], proxies.slack(i), proxies.half(i));
@@ -247,9 +247,8 @@ impl Grid {
 struct Binned {
     layout: Layout,
     is_sparse: bool,
-    /// The greatest half extent, and the greatest radius.
+    /// The greatest half extent.
     greatest: f32,
-    reach: f32,
     /// How many there are.
     bodies: f64,
     /// How many there are in the cell of a body, on the average.
@@ -263,12 +262,11 @@ struct Part<'a> {
     large: &'a mut Vec<u32>,
 }
 
-/// The small bodies of a level: the box around their centers, the greatest extent, and the greatest radius.
+/// The small bodies of a level: the box around their centers, and the greatest extent.
 struct Small {
     low: [f32; 2],
     high: [f32; 2],
     greatest: f32,
-    reach: f32,
 }
 
 /// Blocks of eight among which large bodies are looked for at once.
@@ -279,12 +277,12 @@ impl Kernel for Part<'_> {
 
     #[inline(always)]
     fn run<V: Lanes>(self) -> Small {
-        let Self { level: Level { x, y, extent, radius, .. }, most, large } = self;
+        let Self { level: Level { x, y, extent, .. }, most, large } = self;
         large.clear();
         let (infinity, edge) = (V::splat(f32::INFINITY), V::splat(most));
         let nothing = V::splat(f32::NEG_INFINITY);
-        let (mut low_x, mut low_y, mut high_x, mut high_y) = (infinity, infinity, nothing, nothing);
-        let (mut greatest, mut reach) = (nothing, nothing);
+        let (mut low_x, mut low_y, mut high_x, mut high_y, mut greatest) =
+            (infinity, infinity, nothing, nothing, nothing);
         for first in (0..x.len()).step_by(BLOCKS * LANES) {
             let end = x.len().min(first + BLOCKS * LANES);
             let mut largest = nothing;
@@ -296,7 +294,6 @@ impl Kernel for Part<'_> {
                 high_x = beyond.if_positive(nothing, x).max(high_x);
                 high_y = beyond.if_positive(nothing, y).max(high_y);
                 greatest = beyond.if_positive(nothing, extent).max(greatest);
-                reach = beyond.if_positive(nothing, eight(radius, i)).max(reach);
                 largest = extent.max(largest);
             }
             if fold(largest, math::max) > most {
@@ -307,7 +304,6 @@ impl Kernel for Part<'_> {
             low: [fold(low_x, math::min), fold(low_y, math::min)],
             high: [fold(high_x, math::max), fold(high_y, math::max)],
             greatest: fold(greatest, math::max),
-            reach: fold(reach, math::max),
         }
     }
 }

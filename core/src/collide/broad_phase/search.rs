@@ -8,6 +8,7 @@
 use super::Pair;
 use super::cells::Cells;
 use super::grid::Level;
+use crate::model::math::max;
 use crate::parallel::lanes::LaneSet;
 #[cfg(target_arch = "x86_64")]
 use crate::parallel::lanes::Set;
@@ -49,6 +50,10 @@ impl Sorted {
             (x[place], y[place], radius[place]) = (from_x, from_y, from_radius);
             (to_body[place], to_cell[place]) = (body, cell);
         }
+    }
+
+    pub(super) fn greatest_radius(&self) -> f32 {
+        self.radius[..self.len].iter().copied().fold(0.0, max)
     }
 
     /// How many bodies a search looks at.
