@@ -92,15 +92,14 @@ impl Groups {
         bounces.push(Bounce { contact: contact as u32, closing, off_static, answers });
     }
 
-    /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would throw the body
-    /// that lies between the two.
+    /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would
+    /// throw the body that lies between the two.
     fn hold_beside(&mut self, batches: &Batches, source: Source<'_>) {
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let kinds = source.kinds_of(i);
             let is_dead = kinds.iter().all(|kind| kind.material.restitution == 0.0);
-            let bodies = source.contacts.bodies[i].into_iter().zip(kinds);
-            let mut moving = bodies.filter(|(_, kind)| kind.inv_mass > 0.0);
-            if is_dead && moving.any(|(body, _)| self.struck[body as usize].0) && self.is_solved(i as u32) {
+            let is_beside = || source.moving(i).any(|body| self.struck[body as usize].0);
+            if is_dead && is_beside() && self.is_solved(i as u32) {
                 let speeds = (0..contact.point_count()).map(|point| source.meeting_speeds(i, point)[0]);
                 let fastest = speeds.fold(f32::NEG_INFINITY, max);
                 self.add_bounce(i, (fastest, [Answer::Hold; 2]), kinds, batches);
@@ -143,11 +142,7 @@ impl Groups {
     /// What only holds is left out of it all, but beside what parts or passes on.
     fn leave_unstruck(&mut self, source: Source<'_>) {
         let Self { bounces, bounces_at_once, on, struck, .. } = self;
-        let moving = |bounce: &Bounce| {
-            let contact = bounce.contact as usize;
-            let sides = source.contacts.bodies[contact].into_iter().zip(source.kinds_of(contact));
-            sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
-        };
+        let moving = |bounce: &Bounce| source.moving(bounce.contact as usize);
         on.clear();
         on.extend(0..source.tile.bodies.len() as u32);
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
@@ -249,6 +244,12 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mu
 impl<'a> Source<'a> {
     fn kinds_of(self, contact: usize) -> [&'a KindRow; 2] {
         self.contacts.bodies[contact].map(|body| self.setup.kind(self.tile.bodies.kind[body as usize]))
+    }
+
+    /// Those of its bodies that are no statics.
+    fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
+        let sides = self.contacts.bodies[contact].into_iter().zip(self.kinds_of(contact));
+        sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
     }
 
     /// What gravity gives the bodies of a contact in [`STILL`] steps, in m/s.
