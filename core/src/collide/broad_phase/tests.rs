@@ -95,7 +95,7 @@ impl Stuffed {
         let is_clear = |of: usize, offset: Vec2| {
             let kind = self.setup.kind(bodies.kind[of]);
             let seen = bodies.rotation[of].unrotate(offset).abs() - kind.extent - kind.radius;
-            seen.max_element() > (reach_a + reach_b - kind.bounding_radius + goes) * 1.0001
+            seen.max_element() > reach_a + reach_b - kind.bounding_radius + goes
         };
         is_pair && !is_clear(a, offset) && !is_clear(b, -offset)
     }
