@@ -85,7 +85,9 @@ pub use glam;
 pub use exchange::codec::{FORMAT, Frames};
 pub use exchange::halo::{Halo, Loopback, NotHere};
 pub use exchange::mail::{Inbox, Message, Outbox};
-pub use exchange::record::{BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Unseen};
+pub use exchange::record::{
+    BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, MigrantRecord, Unseen,
+};
 pub use exchange::verdict::Verdict;
 pub use model::body::{Bodies, Body, StaticBody};
 pub use model::contact::{Contact, ContactPoint};

@@ -98,13 +98,13 @@ fn the_reported_way_has_one_result() {
     assert_eq!(reported, also);
 }
 
-/// On one tile; what sleeps wakes at the same step everywhere.
+/// What sleeps wakes at the same step everywhere.
 #[test]
 fn sleep_has_one_result() {
     for (path, small, steps) in [
-        ("configs/stack.toml", &[("tiles", "1x1")][..], "200"),
+        ("configs/stack.toml", &[("tiles", "2x2")][..], "200"),
         ("configs/pyramids.toml", &[("bodies", "550"), ("tiles", "1x1")][..], "150"),
-        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "1x1"), ("seed", "1")][..], "300"),
+        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "3x2"), ("seed", "1"), ("sleep_speed", "0.3")][..], "300"),
     ] {
         let asleep = run((path, small), &[("sleep", "true"), ("steps", steps)]).asleep;
         assert!(asleep > 0, "{path}: nobody sleeps");

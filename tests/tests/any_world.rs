@@ -142,9 +142,10 @@ fn any_keys() -> impl Strategy<Value = Vec<String>> {
         prop::sample::select(&["exchange=step", "exchange=substep"][..]),
         prop::sample::select(&["", "", "", "solver=pgs"][..]),
         prop::sample::select(&["", "substeps=2", "hertz=120", "sort_interval=1", "recycle_distance=0"][..]),
+        prop::sample::select(&["", "", "sleep=true sleep_speed=0.5 sleep_time=0.1"][..]),
     );
-    (tiles, others).prop_map(|(tiles, (a, b, c))| {
-        let all = [tiles.as_str(), a, b, c].join(" ");
+    (tiles, others).prop_map(|(tiles, (a, b, c, d))| {
+        let all = [tiles.as_str(), a, b, c, d].join(" ");
         all.split_whitespace().map(str::to_owned).collect()
     })
 }

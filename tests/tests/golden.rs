@@ -86,7 +86,7 @@ const CHOICES: &[(&str, Overrides)] = &[
     ("zoo", &[("bodies", "500"), ("steps", "100"), ("tiles", "3x1"), ("exchange", "step")]),
     ("zoo", &[("bodies", "500"), ("steps", "100"), ("tiles", "3x1"), ("solver", "pgs")]),
     ("zoo", &[("bodies", "500"), ("steps", "100"), ("tiles", "2x1"), ("max_bodies", "60"), ("retile_every", "5")]),
-    ("zoo", &[("bodies", "300"), ("steps", "100"), ("tiles", "1x1"), ("sleep", "true")]),
+    ("zoo", &[("bodies", "300"), ("steps", "150"), ("tiles", "3x2"), ("sleep", "true"), ("sleep_speed", "0.3")]),
 ];
 
 /// A world of the library on some tiles.

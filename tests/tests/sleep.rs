@@ -1,6 +1,6 @@
-//! Islands that rest are left out, on one tile, and wake when something touches them.
+//! Islands that rest are left out, and wake when something touches them.
 
-use atoll_core::{Exchange, GlobalId, Material, SetupError, Shape, TileId, World};
+use atoll_core::{Exchange, GlobalId, Material, Shape};
 use atoll_tests::scenes;
 use atoll_tests::world::{Cut, Scene, Sim};
 use glam::{DVec2, Vec2};
@@ -28,36 +28,76 @@ fn rest(sim: &mut Sim, steps: u32) {
     assert_eq!(sim.report.asleep, 6, "{:?}", sim.report);
 }
 
+/// One tile, tiles with borders through both stacks and below them, and tiles smaller than these.
+const GRIDS: [(u32, u32); 3] = [(1, 1), (8, 8), (40, 40)];
+
 #[test]
 fn what_rests_falls_asleep_and_does_not_move() {
     let (scene, _) = stacks_and_a_ball();
-    let mut sim = scene.start(WHOLE);
-    sim.run(20);
-    assert_eq!(sim.report.asleep, 0);
-    rest(&mut sim, 60);
-    let before = sim.bodies();
-    rest(&mut sim, 20);
-    for (before, after) in before.iter().zip(sim.bodies()).take(6) {
-        assert_eq!(*before, after);
-        assert_eq!((after.velocity, after.angular_velocity), (Vec2::ZERO, 0.0));
+    for (tiles, exchange) in GRIDS.map(|tiles| (tiles, Exchange::Step)).into_iter().chain([((8, 8), Exchange::Substep)])
+    {
+        let mut sim = scene.start_on(tiles, exchange);
+        sim.run(20);
+        assert_eq!(sim.report.asleep, 0);
+        rest(&mut sim, 60);
+        let before = sim.bodies();
+        rest(&mut sim, 20);
+        for (before, after) in before.iter().zip(sim.bodies()).take(6) {
+            assert_eq!(*before, after);
+            assert_eq!((after.velocity, after.angular_velocity), (Vec2::ZERO, 0.0));
+        }
     }
 }
 
 #[test]
 fn a_touch_wakes_the_whole_island_and_no_other() {
     let (scene, ball) = stacks_and_a_ball();
-    let mut sim = scene.start(WHOLE);
-    rest(&mut sim, 100);
-    let before = sim.bodies();
-    // The ball arrives after 11.45 m at 5 m/s.
-    sim.run(42);
-    assert_eq!(sim.report.asleep, 3, "{:?}", sim.report);
-    assert!(sim.body(ball).velocity.x < 4.9);
-    sim.run(8);
-    let after = sim.bodies();
-    for k in 0..3 {
-        assert!(after[k].velocity.length() > 0.1, "{:?}", after[k]);
-        assert_eq!(after[k + 3], before[k + 3]);
+    for (tiles, exchange) in GRIDS.map(|tiles| (tiles, Exchange::Substep)).into_iter().chain([((8, 8), Exchange::Step)])
+    {
+        let mut sim = scene.start_on(tiles, exchange);
+        rest(&mut sim, 100);
+        let before = sim.bodies();
+        // The ball arrives after 11.45 m at 5 m/s.
+        sim.run(42);
+        assert_eq!(sim.report.asleep, 3, "{:?}", sim.report);
+        assert!(sim.body(ball).velocity.x < 4.9);
+        sim.run(8);
+        let after = sim.bodies();
+        for k in 0..3 {
+            assert!(after[k].velocity.length() > 0.1, "{:?}", after[k]);
+            assert_eq!(after[k + 3], before[k + 3]);
+        }
+    }
+}
+
+/// A tile in which nothing changes is left out; asked for its figures it makes its step all the same, and that shows nowhere. Then
+/// a ball strikes what sleeps.
+#[test]
+fn what_stands_still_is_left_out_and_shows_in_no_bit() {
+    let mut scene = scenes::pile(24, 12);
+    (scene.params.sleep, scene.params.sleep_speed) = (true, 1.0);
+    let bodies = scene.bodies.len() as u64;
+    let ball = atoll_core::Body { id: GlobalId(9_999), velocity: Vec2::new(0.0, -20.0), ..scene.bodies[0] };
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let ends = [false, true].map(|is_asked| {
+            let mut sim = scene.start_on((3, 2), exchange);
+            let mut counts = Vec::new();
+            for at in 0..340 {
+                if at == 300 {
+                    let top = sim.bodies().iter().map(|body| body.position).max_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
+                    sim.world.add(atoll_core::Body { position: top + DVec2::new(0.1, 3.0), ..ball }).unwrap();
+                }
+                if is_asked {
+                    sim.world.take_figures_of_next_step();
+                }
+                sim.run(1);
+                counts.push(sim.report);
+            }
+            assert_eq!(counts[299].asleep, bodies, "{exchange:?}: {:?}", counts[299]);
+            assert!(counts[339].asleep < bodies / 2, "{exchange:?}: {:?}", counts[339]);
+            (sim.hashes(), counts)
+        });
+        assert!(ends[0] == ends[1], "{exchange:?}: who asks for figures changes them");
     }
 }
 
@@ -147,11 +187,4 @@ fn rest_shows_in_the_contact_hash() {
     };
     assert_eq!(hashes(3).state, hashes(4).state);
     assert_ne!(hashes(3).contact, hashes(4).contact);
-}
-
-#[test]
-fn across_tiles_it_is_refused() {
-    let (scene, _) = stacks_and_a_ball();
-    let refused = World::new(&scene.blueprint((2, 1), Exchange::Step), &[TileId(0)]).unwrap_err();
-    assert_eq!(refused, SetupError::SleepAcrossTiles { tiles: 2 });
 }

@@ -171,6 +171,8 @@ fn islands_that_sleep_and_wake() {
         }
     }
     scene.body(ball, DVec2::new(-3.0, 0.3), Vec2::new(4.0, 0.0));
-    let end = goes_on_as_if_nothing_was(scene, (1, 1), Exchange::Step);
-    assert!(end.asleep > 0 && end.asleep < 9, "{end:?}");
+    for (tiles, exchange) in [((1, 1), Exchange::Step), ((9, 3), Exchange::Step), ((9, 3), Exchange::Substep)] {
+        let end = goes_on_as_if_nothing_was(scene.clone(), tiles, exchange);
+        assert!(end.asleep > 0 && end.asleep < 9, "{end:?}");
+    }
 }

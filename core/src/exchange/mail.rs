@@ -5,9 +5,8 @@
 //! ranges. Within a rank nothing is copied: outbox and inbox swap their bags, and a receiver is told where to look. Which
 //! thread a tile was on decides in which bag its messages lie, and shows nowhere: receivers sort by source.
 
-use super::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
+use super::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh, MigrantRecord};
 use super::verdict::Verdict;
-use crate::model::body::Body;
 use crate::model::id::TileId;
 
 /// What one tile tells another at one sync point. Most of it is empty most of the time.
@@ -18,7 +17,7 @@ pub struct Message<'a> {
     /// Destination.
     pub to: TileId,
     /// Bodies that change owner.
-    pub migrants: &'a [Body],
+    pub migrants: &'a [MigrantRecord],
     /// Contacts of those bodies.
     pub contacts: &'a [ContactRecord],
     /// Copies of bodies the destination does not own and needs.
@@ -45,7 +44,7 @@ struct Envelope {
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Mailbag {
     envelopes: Vec<Envelope>,
-    pub(crate) migrants: Vec<Body>,
+    pub(crate) migrants: Vec<MigrantRecord>,
     pub(crate) contacts: Vec<ContactRecord>,
     pub(crate) ghosts: Vec<GhostRecord>,
     pub(crate) refreshes: Vec<GhostRefresh>,

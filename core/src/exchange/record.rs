@@ -37,6 +37,18 @@ impl Unseen {
     }
 }
 
+/// A body that changes owner: 56 bytes.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct MigrantRecord {
+    /// The body.
+    pub body: Body,
+    /// How long it has rested, in s; zero where nobody may sleep.
+    pub rested: f32,
+    /// Zero; fills the record to a multiple of its alignment.
+    pub padding: u32,
+}
+
 /// A ghost on its way: 64 bytes.
 #[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -45,8 +57,8 @@ pub struct GhostRecord {
     pub body: Body,
     /// The sum of the body's stored impulses from contacts that the receiving tile does not solve.
     pub unseen: Unseen,
-    /// Zero; fills the record to a multiple of its alignment.
-    pub padding: u32,
+    /// As in [`MigrantRecord`].
+    pub rested: f32,
 }
 
 /// A ghost's state after a substep: 48 bytes. Velocities and displacements are mass-weighted (times the square root of

@@ -1,4 +1,4 @@
-//! Sleeping: islands that rest are left out until something touches them. Within one tile only.
+//! Sleeping: islands that rest are left out until something touches them.
 //!
 //! A body rests while its fastest point is slower than `sleep_speed`. An island has rested as long as the one of its
 //! bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
@@ -7,6 +7,11 @@
 //! island of its own. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with
 //! their impulses, so that they wake as they fell asleep. Source: islands that sleep as in Box2D (E. Catto); here they
 //! are found anew each step, so nothing has to be kept in order.
+//!
+//! An island may lie in several tiles. Each decides about its own part, in which ghosts rest as their owners said of them: who
+//! moves anywhere in an island is heard of at once in the tiles that have it as a ghost, and from there on one tile further
+//! with each step. Time counts on meanwhile, so of an island that spans more tiles than `sleep_time` has steps, those parts
+//! sleep that are so many tiles from whoever moves.
 
 use crate::model::math;
 use crate::solver::index::GraphNode;
@@ -16,8 +21,10 @@ use glam::Vec2;
 /// Who rests since when. Empty where nobody may sleep.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Sleep {
-    /// For each owned body how long it has rested, in seconds.
+    /// For each owned body how long it has rested, in seconds: `sleep_time` at most.
     still: Vec<f32>,
+    /// For each ghost how long it had rested when its owner last said so, in seconds.
+    ghosts: Vec<f32>,
     /// For each owned body whether its island sleeps.
     asleep: Vec<bool>,
     /// For each node of the contact graph that is the lowest of its island, how long that has rested, in seconds, and
@@ -41,6 +48,41 @@ impl Sleep {
     /// For each owned body how long it has rested, in seconds; empty where nobody may sleep.
     pub(crate) fn still(&self) -> &[f32] {
         &self.still
+    }
+
+    /// For each ghost how long it had rested when its owner last said so, in seconds.
+    pub(crate) fn ghosts(&self) -> &[f32] {
+        &self.ghosts
+    }
+
+    /// How long one of the tile's bodies has rested that is no static: owned ones come first. Zero where nobody may sleep.
+    pub(crate) fn rested(&self, body: usize, owned: usize) -> f32 {
+        let rested = if body < owned { self.still.get(body) } else { self.ghosts.get(body - owned) };
+        rested.copied().unwrap_or_default()
+    }
+
+    /// Forgets how long ghosts have rested.
+    pub(crate) fn clear_ghosts(&mut self) {
+        self.ghosts.clear();
+    }
+
+    /// There is one ghost more, which has rested for so many seconds.
+    pub(crate) fn push_ghost(&mut self, rested: f32) {
+        self.ghosts.push(rested);
+    }
+
+    /// A body that has rested for so many seconds takes the place of another, or the one behind the last.
+    pub(crate) fn set(&mut self, place: usize, rested: f32) {
+        match self.still.get_mut(place) {
+            Some(still) => *still = rested,
+            None => self.still.push(rested),
+        }
+    }
+
+    /// Whether all owned bodies, of which there are so many, have rested for long enough.
+    pub(crate) fn all_rest(&self, owned: usize, setup: &Setup) -> bool {
+        let rests = |all: bool, &still: &f32| all & (still >= setup.params.sleep_time);
+        setup.params.sleep && self.still.len() == owned && self.still.iter().fold(true, rests)
     }
 
     /// Makes room for bodies that were added; these have not rested yet.
@@ -96,7 +138,7 @@ impl Sleep {
         let root_of = |node: GraphNode| node.number().map(|number| roots[number as usize] as usize);
         self.rested.clear();
         self.rested.resize(roots.len(), f32::INFINITY);
-        for (&node, &still) in nodes.iter().zip(&self.still) {
+        for (&node, &still) in nodes.iter().zip(self.still.iter().chain(&self.ghosts)) {
             if let Some(root) = root_of(node) {
                 self.rested[root] = math::min(still, self.rested[root]);
             }
@@ -120,7 +162,8 @@ impl Sleep {
     /// Counts on for those that rest. `speed` tells that of a body's fastest point, in m/s.
     pub(crate) fn count_on(&mut self, speed: impl Fn(usize) -> f32, setup: &Setup) {
         for (i, still) in self.still.iter_mut().enumerate().filter(|&(i, _)| !self.asleep[i]) {
-            *still = if speed(i) < setup.params.sleep_speed { *still + setup.params.dt } else { 0.0 };
+            let longer = math::min(*still + setup.params.dt, setup.params.sleep_time);
+            *still = if speed(i) < setup.params.sleep_speed { longer } else { 0.0 };
         }
     }
 }

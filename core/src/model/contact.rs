@@ -233,6 +233,12 @@ impl ContactCache {
         self.contacts.extend_from_slice(&other.contacts);
     }
 
+    /// Whether another has the same, bit for bit.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let bytes = bytemuck::cast_slice::<Contact, u8>;
+        self.keys == other.keys && bytes(&self.contacts) == bytes(&other.contacts)
+    }
+
     /// Has so many contacts, which are yet to be written.
     pub(crate) fn resize(&mut self, count: usize) {
         self.reserve(count);

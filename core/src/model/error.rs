@@ -90,19 +90,6 @@ pub enum SetupError {
         /// The first cut that is not in order.
         cut: u32,
     },
-    /// Sleeping is known within one tile only.
-    #[error(
-        "sleep = true on {tiles} tiles: an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
-    )]
-    SleepAcrossTiles {
-        /// How many tiles there are.
-        tiles: usize,
-    },
-    /// A tile that holds all bodies may be cut at any time.
-    #[error(
-        "sleep = true with tiles = \"adaptive\": an island that sleeps must lie in one tile; use tiles = [1, 1], or sleep = false"
-    )]
-    SleepInForest,
     /// Tiles that become one are not all of one world, or a partition does not follow from another.
     #[error(
         "tile {tile}: the new partition does not follow from the one there is, or joins it with tiles that are elsewhere"

@@ -312,11 +312,15 @@ impl SolverBodies {
         self.ghosts[ghost].given = self.given(place, &refresh.unseen);
     }
 
-    /// Mass-weighted velocity and pose of a body with a contact, as another tile's ghost takes them over.
+    /// Mass-weighted velocity and pose of a body with a contact, as another tile's ghost takes them over. One that sleeps does not
+    /// move.
     pub(crate) fn state_of(&self, body: u32) -> ([f32; 3], Quad) {
-        let place = self.place_of(body).get();
-        let [x, y, w, _] = self.velocity[place];
-        ([x, y, w], self.pose[place])
+        let place = self.place_of(body);
+        if place == SolverIndex::NOT_SOLVED {
+            return ([0.0; 3], ZERO);
+        }
+        let [x, y, w, _] = self.velocity[place.get()];
+        ([x, y, w], self.pose[place.get()])
     }
 
     /// How far a body of the tile has gone in the step, in m, and how far its turning took what is one meter from its center, if it is

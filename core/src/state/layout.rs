@@ -26,7 +26,9 @@ macro_rules! layout {
 }
 pub(crate) use layout;
 
-use crate::exchange::record::{BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, Unseen};
+use crate::exchange::record::{
+    BorderImpulse, BorderPoint, ContactRecord, GhostRecord, GhostRefresh, MigrantRecord, Unseen,
+};
 use crate::model::body::Body;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
@@ -37,7 +39,8 @@ layout!(ContactPoint { anchor: 0, separation: 8, normal_impulse: 12, tangent_imp
 layout!(Contact { normal: 0, offset: 8, rotation_a: 16, rotation_b: 24, points: 32 } 80);
 layout!(ContactRecord { low: 0, high: 8, from_owner_of_low: 16, contact: 24 } 104);
 layout!(Unseen { linear: 0, angular: 8 } 12);
-layout!(GhostRecord { body: 0, unseen: 48, padding: 60 } 64);
+layout!(MigrantRecord { body: 0, rested: 48, padding: 52 } 56);
+layout!(GhostRecord { body: 0, unseen: 48, rested: 60 } 64);
 layout!(GhostRefresh { id: 0, velocity: 8, pose: 20, unseen: 36 } 48);
 layout!(BorderImpulse { low: 0, high: 8, points: 16 } 64);
 layout!(BorderPoint { feature: 0, total_normal: 4, total_tangent: 8, normal: 12, tangent: 16, padding: 20 } 24);

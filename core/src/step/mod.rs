@@ -3,6 +3,7 @@
 mod hold;
 pub(crate) mod phase;
 pub(crate) mod stage;
+pub(crate) mod standstill;
 
 use crate::collide::broad_phase::Field;
 use crate::collide::proxies::amid;
@@ -73,19 +74,23 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {
             world.each_tile(|bench| {
-                collide(bench);
-                prepare(bench);
-                solve(bench, 0..bench.setup.params.integrations());
-                finalize(bench);
+                if begin(bench) {
+                    collide(bench);
+                    prepare(bench);
+                    solve(bench, 0..bench.setup.params.integrations());
+                    finalize(bench);
+                }
             });
         }
         // Between two sync points each tile goes through all that there is to do, while it is in the cache.
         Exchange::Substep => {
             let last = world.setup.params.integrations() - 1;
             world.each_tile_apart(|bench| {
-                collide(bench);
-                bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
-                prepare(bench);
+                if begin(bench) {
+                    collide(bench);
+                    bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
+                    prepare(bench);
+                }
                 make_substep(bench, 0);
             });
             for substep in 1..=last {
@@ -177,6 +182,16 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
     Ok(verdict)
 }
 
+/// Whether a tile has anything to do in this step: not if it stands still. Others may yet hear of it what they heard before.
+fn begin(bench: &mut Bench<'_>) -> bool {
+    bench.stage(Phase::Flush, |b| {
+        let knows_all = b.setup.params.exchange == Exchange::Step || b.work.is_of_last_step;
+        let asked = b.measures || b.figures.is_some() || !knows_all;
+        b.work.outlook = standstill::look(b.tile, asked, b.setup);
+        !b.work.outlook.stands_still()
+    })
+}
+
 /// Broad phase, narrow phase.
 fn collide(bench: &mut Bench<'_>) {
     bench.stage(Phase::Flush, |b| {
@@ -262,6 +277,9 @@ fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
 
 /// Restitution where it has not been, and everything written back.
 fn finalize(bench: &mut Bench<'_>) {
+    if bench.work.outlook.stands_still() {
+        return;
+    }
     bench.stage(Phase::Finalize, |b| {
         let solver = &mut b.work.solver;
         if b.setup.bouncy && b.setup.params.exchange == Exchange::Step {
@@ -280,6 +298,8 @@ fn finalize(bench: &mut Bench<'_>) {
             figures.add_contacts(b.tile, &b.work.contacts, b.setup, b.team);
         }
         far::forget(b.tile);
+        standstill::note(b.tile, &b.work.outlook);
+        b.work.is_of_last_step = true;
     });
 }
 

@@ -1,6 +1,7 @@
 //! One stage of a step of one tile: what it works with, and its time booked.
 
 use super::phase::{Phase, Stopwatch, Timings};
+use super::standstill::Outlook;
 use crate::collide::broad_phase::Pair;
 use crate::collide::broad_phase::grid::Grid;
 use crate::collide::narrow_phase::{Contacts, NarrowPhase};
@@ -32,6 +33,10 @@ pub(crate) struct Work {
     pub(crate) contacts: Contacts,
     pub(crate) solver: Solver,
     pub(crate) border: Border,
+    /// What is known of the step under way.
+    pub(crate) outlook: Outlook,
+    /// Whether it was there for the tile's last step.
+    pub(crate) is_of_last_step: bool,
 }
 
 /// What a thread has for all tiles it works on.
@@ -100,9 +105,10 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs one stage and books the time since the one before.
-    pub(crate) fn stage(&mut self, phase: Phase, stage: impl FnOnce(&mut Self)) {
+    pub(crate) fn stage<R>(&mut self, phase: Phase, stage: impl FnOnce(&mut Self) -> R) -> R {
         let _span = tracing::trace_span!("stage", name = phase.name(), tile = self.tile.id.0).entered();
-        stage(self);
+        let result = stage(self);
         self.watch.lap(phase, self.timings);
+        result
     }
 }

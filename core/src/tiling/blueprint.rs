@@ -161,12 +161,6 @@ impl Setup {
     pub(crate) fn new(blueprint: &Blueprint) -> Result<Self, SetupError> {
         let params = blueprint.params.clone();
         params.check()?;
-        if params.sleep && blueprint.partition.tiles() > 1 {
-            return Err(SetupError::SleepAcrossTiles { tiles: blueprint.partition.tiles() });
-        }
-        if params.sleep && !blueprint.partition.is_uniform() {
-            return Err(SetupError::SleepInForest);
-        }
         let mut kinds = Vec::with_capacity(blueprint.kinds.len() + blueprint.statics.len());
         for (row, kind) in (0..).zip(&blueprint.kinds) {
             kinds.push(KindRow::dynamic(kind, KindId(row))?);

@@ -192,6 +192,7 @@ impl Tile {
             self.sleep.resize(self.owned);
         }
         self.newcomers.clear();
+        self.standstill = None;
         self.rim.is_known = false;
     }
 

@@ -40,6 +40,7 @@ impl<'a> Renaming<'a> {
             return false;
         }
         tile.id = id;
+        tile.standstill = None;
         for owner in &mut tile.ghost_owners {
             *owner = name(*owner).unwrap_or(*owner);
         }
@@ -108,7 +109,10 @@ pub(crate) fn regroup(sources: &[Tile], names: Range<u32>, renaming: &Renaming<'
     for source in sources {
         let settle = |i: usize| {
             let owner = renaming.heir(source.id, source.bodies.position[i]);
-            let bodies = &mut targets[(owner.0 - first) as usize].tile.bodies;
+            let Tile { bodies, sleep, .. } = &mut targets[(owner.0 - first) as usize].tile;
+            if setup.params.sleep {
+                sleep.set(bodies.len(), source.rested(i));
+            }
             bodies.push(source.bodies.get(i));
             Home { owner, index: bodies.len() as u32 - 1 }
         };

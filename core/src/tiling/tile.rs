@@ -1,7 +1,7 @@
 //! A tile: a rectangle of the domain, the bodies it owns, and what it remembers of their contacts.
 
 use crate::collide::broad_phase::quadtree::Quadtree;
-use crate::exchange::record::Unseen;
+use crate::exchange::record::{GhostRecord, Unseen};
 use crate::exchange::rim::Rim;
 use crate::islands::sleep::Sleep;
 use crate::model::body::Bodies;
@@ -12,6 +12,7 @@ use crate::model::strays::Strays;
 use crate::solver::index::GraphNode;
 use crate::state::hash::Hashes;
 use crate::state::violation::Violation;
+use crate::step::standstill::Standstill;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::changes::Changes;
 use crate::tiling::partition::Region;
@@ -56,6 +57,8 @@ pub(crate) struct Tile {
     pub(crate) strays: Strays,
     /// Who rests; empty unless `sleep` is on.
     pub(crate) sleep: Sleep,
+    /// What it was like as its last step began, if all rested.
+    pub(crate) standstill: Option<Box<Standstill>>,
     /// How well the contacts of the last step were solved, if that was measured.
     pub(crate) violation: Violation,
     /// The bodies by place, where the parameters ask for it. Never shows in a result.
@@ -89,6 +92,9 @@ pub(crate) struct TileCounts {
     /// What must never happen, and did.
     pub(crate) fault: Option<Fault>,
 }
+
+/// A tile that stands still takes the time of one of so many times fewer bodies.
+const AT_STANDSTILL: u64 = 32;
 
 /// What ends a run because its results could not be trusted any more.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -127,6 +133,7 @@ impl Tile {
             contacts: ContactCache::default(),
             strays: Strays::default(),
             sleep: Sleep::default(),
+            standstill: None,
             violation: Violation::default(),
             quadtree: (setup.params.broad_phase == BroadPhase::Quadtree).then(quadtree),
             counts: TileCounts::default(),
@@ -153,7 +160,9 @@ impl Tile {
 
     /// About how long a step takes here, in what a body without contacts takes.
     pub(crate) fn work(&self) -> u64 {
-        (self.owned + 2 * self.ghosts() + 2 * self.contacts.len()) as u64
+        let work = self.owned + 2 * self.ghosts() + 2 * self.contacts.len();
+        let stands_still = self.standstill.as_ref().is_some_and(|standstill| standstill.is_known());
+        if stands_still { work as u64 / AT_STANDSTILL } else { work as u64 }
     }
 
     /// Whether it owns nothing and remembers nothing.
@@ -172,6 +181,8 @@ impl Tile {
         self.gaps = Vec::new();
         self.unseen = Vec::new();
         self.ghost_owners = Vec::new();
+        self.sleep = Sleep::default();
+        self.standstill = None;
         self.violation = Violation::default();
     }
 
@@ -180,6 +191,7 @@ impl Tile {
         let Self { region, interior, rectangle, quadtree, .. } = Self::within(self.id, Vec::new(), setup);
         let is_same = region == self.region;
         (self.region, self.interior, self.rectangle) = (region, interior, rectangle);
+        self.standstill = None;
         // A neighbour's border may have moved where this one's have not.
         self.rim.is_known = false;
         if !is_same {
@@ -193,6 +205,15 @@ impl Tile {
     pub(crate) fn find_interior(&mut self, setup: &Setup) {
         let large = setup.has_large() && self.bodies.kind[..self.owned].iter().any(|&kind| setup.is_large(kind));
         self.interior = self.region.shrunk(setup.inset(large));
+    }
+
+    /// Puts one more ghost behind those that there are.
+    #[inline]
+    pub(crate) fn take_ghost(&mut self, owner: TileId, GhostRecord { body, unseen, rested }: GhostRecord) {
+        self.bodies.push(body);
+        self.unseen.push(unseen);
+        self.sleep.push_ghost(rested);
+        self.ghost_owners.push(owner);
     }
 
     pub(crate) fn ghosts(&self) -> usize {
@@ -230,6 +251,11 @@ impl Tile {
             let (velocity, angular_velocity) = (&mut self.bodies.velocity, &mut self.bodies.angular_velocity);
             self.counts.asleep = self.sleep.decide(nodes, roots, velocity, angular_velocity, setup);
         }
+    }
+
+    /// How long one of its bodies that is no static has rested, in s; zero where nobody may sleep.
+    pub(crate) fn rested(&self, body: usize) -> f32 {
+        self.sleep.rested(body, self.owned)
     }
 
     /// Notes who has rested in this step.

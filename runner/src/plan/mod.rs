@@ -246,14 +246,6 @@ mod tests {
     }
 
     #[test]
-    fn islands_sleep_within_one_tile() {
-        let config = |overrides| Config::from_toml_str("test", ROOMS, overrides).unwrap();
-        let error = Plan::new(&config(&[("sleep", "true"), ("tiles", "2x3")])).unwrap_err();
-        assert!(error.to_string().contains("sleep = true on 6 tiles"), "{error}");
-        assert_eq!(plan(&[("sleep", "true"), ("bodies", "50000")]).tiles, [1, 1]);
-    }
-
-    #[test]
     fn what_a_run_made_is_never_taken_for_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let run = RunFolder::new("--resume", folder.path());

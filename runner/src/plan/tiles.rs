@@ -26,9 +26,6 @@ const CUT_IN: u32 = 4;
 /// Columns and rows of tiles, or of the squares that adaptive ones are cut from: those given, else the default for the scene.
 pub(crate) fn tile_counts(config: &Config, scene: &Scene) -> [u32; 2] {
     config.run.tiles.unwrap_or_else(|| {
-        if config.params.sleep {
-            return [1, 1]; // islands sleep within one tile only
-        }
         let (low, high) = scene.domain();
         let tiles = scene.bodies() as f64 / BODIES_PER_TILE;
         let large_radius = if tiles < TILES_THROUGH_LARGE { f32::INFINITY } else { config.params.large_radius };

@@ -2,8 +2,8 @@
 
 use super::Outcome;
 use atoll_core::{
-    Blueprint, Body, BorderImpulse, CodecError, ContactRecord, Exchange, FORMAT, GhostRecord, GhostRefresh, Halo,
-    Inbox, Kind, Material, Message, Outbox, Params, Partition, Shape, StepError, TileId, World, step,
+    Blueprint, BorderImpulse, CodecError, ContactRecord, Exchange, FORMAT, GhostRecord, GhostRefresh, Halo, Inbox,
+    Kind, Material, Message, MigrantRecord, Outbox, Params, Partition, Shape, StepError, TileId, World, step,
 };
 use bytemuck::cast_slice;
 use glam::DVec2;
@@ -70,7 +70,7 @@ pub struct Letter {
     /// Destination.
     pub to: TileId,
     /// As in [`Message`], here and below.
-    pub migrants: Vec<Body>,
+    pub migrants: Vec<MigrantRecord>,
     /// Contacts of those bodies.
     pub contacts: Vec<ContactRecord>,
     /// Ghosts.

@@ -7,7 +7,8 @@ use crate::random::{
 use crate::tally::Tally;
 use atoll::scene::SplitMix64;
 use atoll_core::{
-    Body, CodecError, ContactRecord, Exchange, Frames, GhostRecord, Halo, Inbox, KindId, Outbox, TileId, step,
+    Body, CodecError, ContactRecord, Exchange, Frames, GhostRecord, Halo, Inbox, KindId, MigrantRecord, Outbox, TileId,
+    step,
 };
 use atoll_tests::fuzz::{self, FRAME, Letter, Outcome};
 use atoll_tests::scenes;
@@ -116,7 +117,12 @@ fn messages(random: &mut SplitMix64) -> Vec<Letter> {
             impulses: records(random),
         };
         let ghosts = message.ghosts.iter_mut().map(|ghost| &mut ghost.body);
-        message.migrants.iter_mut().chain(ghosts).for_each(|body| body.kind = KindId(0));
+        message
+            .migrants
+            .iter_mut()
+            .map(|migrant| &mut migrant.body)
+            .chain(ghosts)
+            .for_each(|body| body.kind = KindId(0));
         message
     };
     (0..below(random, 5)).map(|_| message(random)).collect()
@@ -131,8 +137,9 @@ fn kinds_of_bodies(messages: &[Letter]) -> Vec<usize> {
     let mut at = FRAME.header + FRAME.counts * messages.len();
     let mut places = Vec::new();
     for Letter { migrants, contacts, ghosts, refreshes, impulses, .. } in messages {
-        places.extend((0..migrants.len()).map(|i| at + i * size_of::<Body>()));
-        at += migrants.len() * size_of::<Body>() + contacts.len() * size_of::<ContactRecord>();
+        places
+            .extend((0..migrants.len()).map(|i| at + i * size_of::<MigrantRecord>() + offset_of!(MigrantRecord, body)));
+        at += migrants.len() * size_of::<MigrantRecord>() + contacts.len() * size_of::<ContactRecord>();
         places.extend((0..ghosts.len()).map(|i| at + i * size_of::<GhostRecord>() + offset_of!(GhostRecord, body)));
         at += ghosts.len() * size_of::<GhostRecord>() + size_of_val(&refreshes[..]) + size_of_val(&impulses[..]);
     }

@@ -217,14 +217,18 @@ impl Border {
         if !all_known || awaited.next().is_some() {
             tile.counts.fault = Some(Fault::Protocol);
         }
-        for contact in self.contacts.iter().map(|border| border.contact).chain(self.scratch.clone()) {
-            solver.refresh_separation(contact);
+        let contacts = self.contacts.iter().map(|border| border.contact).chain(self.scratch.clone());
+        for contact in contacts {
+            if solver.groups.is_solved(contact) {
+                solver.refresh_separation(contact);
+            }
         }
     }
 
     /// Adds what border contacts did in a substep to what they did in the step.
     pub(crate) fn add_impulses(&mut self, tile: &Tile, solver: &Solver) {
-        for (border, totals) in self.contacts.iter().zip(&mut self.totals) {
+        let both = self.contacts.iter().zip(&mut self.totals);
+        for (border, totals) in both.filter(|(border, _)| solver.groups.is_solved(border.contact)) {
             let count = tile.contacts.contacts[border.contact as usize].point_count();
             for (k, total) in totals[..count].iter_mut().enumerate() {
                 let now = solver.groups.impulses(border.contact, k);
@@ -248,6 +252,9 @@ impl Border {
     pub(crate) fn send_impulses(&self, tile: &Tile, solver: &Solver, bag: &mut Mailbag) {
         for &i in &self.contact_order {
             let border = &self.contacts[i as usize];
+            if !solver.groups.is_solved(border.contact) {
+                continue;
+            }
             let (low, high) = border.pair;
             let points = solver.border_points(&tile.contacts, border.contact, &self.totals[i as usize]);
             bag.address(tile.id, border.peer);
@@ -256,7 +263,7 @@ impl Border {
     }
 
     /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far, and of those that `bounced`.
-    /// Points that only one side has are left alone.
+    /// Points that only one side has are left alone, as are contacts that one side sleeps through.
     pub(crate) fn average(&mut self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, bounced: bool) {
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
@@ -267,6 +274,9 @@ impl Border {
                 tile.counts.fault = Some(Fault::Protocol);
             }
             for (border, totals) in of_pair.zip(&mut self.totals[first..]) {
+                if !solver.groups.is_solved(border.contact) {
+                    continue;
+                }
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
                     solver.move_together(&tile.contacts, border, totals, theirs, bounced);
                 }
@@ -297,6 +307,9 @@ impl Solver {
     /// A contact with the impulses it has at this moment.
     fn current(&self, contacts: &ContactCache, contact: u32) -> Contact {
         let mut current = contacts.contacts[contact as usize];
+        if !self.groups.is_solved(contact) {
+            return current;
+        }
         let count = current.point_count();
         for (k, point) in current.points[..count].iter_mut().enumerate() {
             [point.normal_impulse, point.tangent_impulse] = self.groups.impulses(contact, k);

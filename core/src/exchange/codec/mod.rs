@@ -25,7 +25,7 @@ use bytemuck::{Pod, cast_slice};
 mod tests;
 
 /// The version of the frame; grows with every change of any record.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 #[derive(Encode, Decode)]
 struct Header {
@@ -209,9 +209,9 @@ impl Inbox {
             reader.take_records(announced[3], refreshes)?;
             reader.take_records(announced[4], impulses)?;
             // A kind that the table does not have would be an index out of bounds later on.
-            let bodies =
-                migrants[known_migrants..].iter().chain(ghosts[known_ghosts..].iter().map(|ghost| &ghost.body));
-            if let Some(unknown) = bodies.into_iter().find(|body| body.kind.0 >= kinds) {
+            let migrants = migrants[known_migrants..].iter().map(|migrant| &migrant.body);
+            let mut bodies = migrants.chain(ghosts[known_ghosts..].iter().map(|ghost| &ghost.body));
+            if let Some(unknown) = bodies.find(|body| body.kind.0 >= kinds) {
                 return Err(CodecError::BadRecord { id: unknown.id });
             }
         }

@@ -2,7 +2,7 @@
 
 use super::{COUNTS, FORMAT, Frames};
 use crate::exchange::mail::{Inbox, Mailbag, Message, Outbox};
-use crate::exchange::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh};
+use crate::exchange::record::{BorderImpulse, ContactRecord, GhostRecord, GhostRefresh, MigrantRecord};
 use crate::exchange::verdict::Verdict;
 use crate::model::body::Body;
 use crate::model::error::CodecError;
@@ -32,14 +32,14 @@ fn records<T: Pod>(seed: u64, count: usize) -> Vec<T> {
 /// Writes one more message.
 fn fill(bag: &mut Mailbag, (from, to): (TileId, TileId), seed: u64, counts: [usize; 5]) {
     bag.begin(from, to);
-    bag.migrants.extend(records::<Body>(seed, counts[0]));
+    bag.migrants.extend(records::<MigrantRecord>(seed, counts[0]));
     bag.contacts.extend(records::<ContactRecord>(seed ^ 1, counts[1]));
     bag.ghosts.extend(records::<GhostRecord>(seed ^ 2, counts[2]));
     bag.refreshes.extend(records::<GhostRefresh>(seed ^ 3, counts[3]));
     bag.impulses.extend(records::<BorderImpulse>(seed ^ 4, counts[4]));
     // Rows of the table that exist: all others are refused.
     let ghosts = bag.ghosts.iter_mut().map(|ghost| &mut ghost.body);
-    for body in bag.migrants.iter_mut().chain(ghosts) {
+    for body in bag.migrants.iter_mut().map(|migrant| &mut migrant.body).chain(ghosts) {
         body.kind = KindId(body.kind.0 % KINDS as u32);
     }
 }
@@ -248,7 +248,7 @@ fn what_does_not_fit_is_named() {
     for ghost in [false, true] {
         let mut outbox = outbox(1, 2, 4, &vec![(1, 0, 9, [1, 0, 1, 0, 0])]);
         let bag = &mut outbox.bags[0];
-        let body = if ghost { &mut bag.ghosts[0].body } else { &mut bag.migrants[0] };
+        let body = if ghost { &mut bag.ghosts[0].body } else { &mut bag.migrants[0].body };
         (body.id, body.kind) = (GlobalId(42), KindId(KINDS as u32));
         let refused = error(&frame(&outbox, 1, 0, 2), inbox(0, 2, 4));
         assert_eq!(refused, CodecError::BadRecord { id: GlobalId(42) });
@@ -308,7 +308,7 @@ fn hostile_bytes_neither_panic_nor_fill_the_memory() {
 
 /// Bytes of the records of [`small_frame`].
 fn records_of(frame: &[u8]) -> usize {
-    let records = size_of::<Body>()
+    let records = size_of::<MigrantRecord>()
         + size_of::<ContactRecord>()
         + size_of::<GhostRecord>()
         + 2 * size_of::<GhostRefresh>()

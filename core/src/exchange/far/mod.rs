@@ -19,8 +19,7 @@ pub(crate) use bounds::StaticsByPlace;
 
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
-use crate::exchange::record::{GhostRecord, Unseen};
-use crate::model::body::Body;
+use crate::exchange::record::GhostRecord;
 use crate::model::contact::SlotKind;
 use crate::model::id::TileId;
 use crate::tiling::blueprint::Setup;
@@ -130,7 +129,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
     let unseen = unseen_of(tile, &reached);
     for (Reached { to, row, .. }, unseen) in reached.into_iter().zip(unseen) {
         bag.address(tile.id, to);
-        bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, padding: 0 });
+        bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, rested: tile.rested(row) });
     }
 }
 
@@ -150,27 +149,28 @@ fn apart_from(region: Region, (low, high): (DVec2, DVec2)) -> Region {
 
 /// Takes in what lies on the way of the tile's own bodies, and the statics that its bodies and ghosts may come to.
 pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64) {
-    let mut ghosts: Vec<(TileId, Body, Unseen, bool)> = Vec::new();
+    let mut ghosts: Vec<(TileId, GhostRecord, bool)> = Vec::new();
     for message in mail.messages() {
         ghosts.extend(message.ghosts.iter().map(|ghost| {
             let owner = setup.partition.locate(ghost.body.position);
-            (owner, ghost.body, ghost.unseen, owner != message.from)
+            (owner, *ghost, owner != message.from)
         }));
     }
     let (owned, has_more) = (tile.owned, !ghosts.is_empty());
     if has_more {
         let known = tile.ghost_owners.iter().zip(&tile.unseen).zip(owned..);
-        ghosts.extend(known.map(|((&owner, &unseen), row)| (owner, tile.bodies.get(row), unseen, false)));
-        ghosts.sort_unstable_by_key(|(owner, body, _, is_hearsay)| (*owner, body.id, *is_hearsay));
+        ghosts.extend(known.map(|((&owner, &unseen), row)| {
+            (owner, GhostRecord { body: tile.bodies.get(row), unseen, rested: tile.rested(row) }, false)
+        }));
+        ghosts.sort_unstable_by_key(|(owner, ghost, is_hearsay)| (*owner, ghost.body.id, *is_hearsay));
         // Several tiles may have sent the same. Its owner knows best.
-        ghosts.dedup_by_key(|(_, body, ..)| body.id);
+        ghosts.dedup_by_key(|(_, ghost, _)| ghost.body.id);
         tile.bodies.truncate(owned);
         tile.ghost_owners.clear();
         tile.unseen.clear();
-        for (owner, body, unseen, _) in ghosts {
-            tile.bodies.push(body);
-            tile.ghost_owners.push(owner);
-            tile.unseen.push(unseen);
+        tile.sleep.clear_ghosts();
+        for (owner, ghost, _) in ghosts {
+            tile.take_ghost(owner, ghost);
         }
     }
     let dynamic = owned + tile.ghosts();

@@ -14,9 +14,8 @@ pub(crate) use receive::receive;
 
 use crate::exchange::mail::Mailbag;
 use crate::exchange::overlap::Outline;
-use crate::exchange::record::{ContactRecord, GhostRecord, Unseen};
-use crate::exchange::rim::Rim;
-use crate::model::body::Body;
+use crate::exchange::record::{ContactRecord, GhostRecord, MigrantRecord, Unseen};
+use crate::exchange::rim::{Rim, RimBody};
 use crate::model::id::TileId;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Surroundings;
@@ -37,7 +36,7 @@ pub(crate) struct MigrateWork {
     parcels: Vec<Parcel>,
     /// The tiles around.
     around: Surroundings,
-    arrivals: Vec<Body>,
+    arrivals: Vec<MigrantRecord>,
     ghosts: receive::Ghosts,
 }
 
@@ -120,11 +119,15 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
     for parcel in parcels.drain(..) {
         bag.address(tile.id, parcel.to());
         match parcel.what() {
-            What::Migrant(place) => bag.migrants.push(rim[place].body),
+            What::Migrant(place) => {
+                let RimBody { body, index, .. } = rim[place];
+                bag.migrants.push(MigrantRecord { body, rested: tile.rested(index as usize), padding: 0 });
+            }
             What::Contact(contact) => bag.contacts.push(contacts[contact].1),
             What::Ghost(send) => {
                 let Send { rim: place, unseen, .. } = sends[send];
-                bag.ghosts.push(GhostRecord { body: rim[place as usize].body, unseen, padding: 0 });
+                let RimBody { body, index, .. } = rim[place as usize];
+                bag.ghosts.push(GhostRecord { body, unseen, rested: tile.rested(index as usize) });
             }
         }
     }

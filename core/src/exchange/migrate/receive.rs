@@ -2,8 +2,7 @@
 
 use super::{MigrateWork, place};
 use crate::exchange::mail::Mail;
-use crate::exchange::record::GhostRecord;
-use crate::model::body::Body;
+use crate::exchange::record::{GhostRecord, MigrantRecord};
 use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
@@ -26,10 +25,10 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     for message in mail.messages() {
         let known = arrivals.len();
         arrivals.extend_from_slice(message.migrants);
-        arrivals[known..].sort_unstable_by_key(|body| body.id);
+        arrivals[known..].sort_unstable_by_key(|migrant| migrant.body.id);
     }
     tile.counts.migrations = arrivals.len() as u64;
-    settle(tile, arrivals);
+    settle(tile, arrivals, setup);
     for message in mail.messages() {
         for record in message.contacts {
             let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
@@ -53,7 +52,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
 
 /// Leaves a tile with its own bodies alone. Arrivals take the places of those that left; those that are left over come after the
 /// last body, or the last bodies take the places that are left over.
-fn settle(tile: &mut Tile, arrivals: &[Body]) {
+fn settle(tile: &mut Tile, arrivals: &[MigrantRecord], setup: &Setup) {
     let mut gaps = std::mem::take(&mut tile.gaps);
     let (filled, left) = gaps.split_at(gaps.len().min(arrivals.len()));
     let owned = tile.owned - left.len();
@@ -64,26 +63,38 @@ fn settle(tile: &mut Tile, arrivals: &[Body]) {
     tile.unseen.clear();
     tile.ghost_owners.clear();
     tile.newcomers.clear();
-    for (&gap, &body) in filled.iter().zip(arrivals) {
-        tile.bodies.set(gap as usize, body);
+    tile.sleep.clear_ghosts();
+    if setup.params.sleep {
+        tile.sleep.resize(tile.owned);
+        let places = filled.iter().map(|&gap| gap as usize).chain(tile.owned..);
+        places.zip(arrivals).for_each(|(place, migrant)| tile.sleep.set(place, migrant.rested));
+    }
+    for (&gap, migrant) in filled.iter().zip(arrivals) {
+        tile.bodies.set(gap as usize, migrant.body);
     }
     tile.newcomers.extend_from_slice(filled);
     tile.bodies.reserve(arrivals.len() - filled.len());
-    for &body in &arrivals[filled.len()..] {
+    for migrant in &arrivals[filled.len()..] {
         tile.newcomers.push(tile.bodies.len() as u32);
-        tile.bodies.push(body);
+        tile.bodies.push(migrant.body);
     }
     let (holes, gone) = left.split_at(left.partition_point(|&gap| (gap as usize) < owned));
     let last = (owned as u32..tile.owned as u32).filter(|index| gone.binary_search(index).is_err());
     for (&hole, index) in holes.iter().zip(last) {
-        let body = tile.bodies.get(index as usize);
+        let (body, rested) = (tile.bodies.get(index as usize), tile.rested(index as usize));
         tile.bodies.set(hole as usize, body);
+        if setup.params.sleep {
+            tile.sleep.set(hole as usize, rested);
+        }
     }
     tile.newcomers.extend_from_slice(holes);
     if !left.is_empty() {
         tile.bodies.truncate(owned);
     }
     tile.owned = tile.bodies.len();
+    if setup.params.sleep {
+        tile.sleep.resize(tile.owned);
+    }
     gaps.clear();
     tile.gaps = gaps;
 }
@@ -117,9 +128,6 @@ fn take_ghosts(tile: &mut Tile, mail: Mail<'_>, Ghosts { records, order }: &mut 
     order.sort_unstable();
     tile.bodies.reserve(order.len() + tile.statics.len());
     for &number in &*order {
-        let GhostRecord { body, unseen, .. } = records[number as u32 as usize];
-        tile.bodies.push(body);
-        tile.unseen.push(unseen);
-        tile.ghost_owners.push(TileId((number >> 96) as u32));
+        tile.take_ghost(TileId((number >> 96) as u32), records[number as u32 as usize]);
     }
 }
