@@ -118,7 +118,10 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
             }
             world.exchange(halo)?;
             world.each_tile_apart(|bench| {
-                bench.stage(Phase::Border, |b| average(b, b.setup.bouncy));
+                bench.stage(Phase::Border, |b| {
+                    average(b, b.setup.bouncy);
+                    b.work.border.settle(b.tile, &b.work.contacts, &mut b.work.solver, b.setup);
+                });
                 finalize(bench);
             });
         }

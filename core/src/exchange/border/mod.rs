@@ -16,9 +16,11 @@ use crate::solver::Solver;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::{Fault, Tile};
 use near::Near;
+use settle::Beside;
 use std::ops::Range;
 
 mod near;
+mod settle;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +35,7 @@ pub(crate) struct Border {
     feeds: Vec<Feed>,
     /// Ghosts in contact with owned bodies, sorted by (owner, GlobalId), which is the order of ghosts.
     ghosts: Vec<u32>,
+    beside: Beside,
     /// Contacts that are solved for others.
     scratch: Range<u32>,
     /// Border contacts by the names of their bodies, sorted.
@@ -130,6 +133,7 @@ impl Border {
         contact_order.extend(0..by_pair.len() as u32);
         contact_order.sort_unstable_by_key(|&i| (by_pair[i as usize].peer, i));
         self.find_feeds(tile, contacts);
+        self.find_beside(tile, contacts);
     }
 
     /// The owned bodies that other tiles hear of.

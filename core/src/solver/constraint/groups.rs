@@ -4,7 +4,7 @@ use super::bounce::Answer;
 use super::columns::{Color, Columns, Each, Members, Slices, lengths};
 use super::group::{PointRows, Sides, Totals};
 use crate::model::contact::Contact;
-use crate::model::math::max;
+use crate::model::math::{clamp, max};
 use crate::parallel::lanes::Quad;
 use crate::parallel::team::Team;
 use crate::solver::batches::Batch;
@@ -168,6 +168,31 @@ impl Groups {
         let at = self.lanes[contact as usize];
         let (_, _, totals, lane) = at.totals_mut(&mut self.kept);
         (totals[point].normal[lane], totals[point].tangent[lane]) = (normal, tangent);
+    }
+
+    /// Those of each point.
+    pub(crate) fn all_impulses(&self, contact: u32) -> [[f32; 2]; 2] {
+        let (_, points, lane) = self.lanes[contact as usize].rows(&self.kept);
+        let of = |rows: &PointRows| [rows.normal_impulse[lane], rows.tangent_impulse[lane]];
+        std::array::from_fn(|point| points.get(point).map_or([0.0; 2], of))
+    }
+
+    /// Sets the relative velocity of a contact right, point by point, given the impulses so far along normal and tangent, which grow by
+    /// what that takes: relax, of one contact alone. `h` is the length of a substep in seconds.
+    pub(crate) fn settle(&self, contact: u32, impulses: &mut [[f32; 2]; 2], bodies: &mut SolverBodies, h: f32) {
+        let at = self.lanes[contact as usize];
+        let (sides, points, lane) = at.rows(&self.kept);
+        let velocity = at.bodies_mut(&mut bodies.velocity);
+        for (rows, [normal, tangent]) in points.iter().zip(impulses) {
+            let along = sides.normal_rows(rows, lane, velocity);
+            let closing = -sides.speed(along, lane, velocity) - max(rows.separation[lane], 0.0) / h;
+            let wanted = max(*normal + rows.normal_mass[lane] * closing, 0.0);
+            sides.add_impulse(along, normal, lane, wanted - *normal, velocity);
+            let across = sides.tangent_rows(rows, lane, velocity);
+            let most = sides.friction[lane] * *normal;
+            let wanted = *tangent - rows.tangent_mass[lane] * sides.speed(across, lane, velocity);
+            sides.add_impulse(across, tangent, lane, clamp(wanted, -most, most) - *tangent, velocity);
+        }
     }
 
     /// Overwrites the accumulated impulses of one point.
