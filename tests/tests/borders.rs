@@ -273,3 +273,30 @@ fn a_large_pile_comes_to_rest_over_its_borders() {
     assert!(energy < 1e-3, "{energy} J/kg");
     assert!(facts.mean_penetration <= 0.020, "mean penetration {} m", facts.mean_penetration);
 }
+
+/// What the tiles at a border make of each other's impulses moves bodies, or does not show in their velocities.
+#[test]
+fn bodies_of_a_pile_over_borders_turn_as_they_spin() {
+    let scene = scenes::pile(30, 20);
+    let dt = f64::from(scene.params.dt);
+    let unlike = |tiles| {
+        let mut sim = scene.start_on(tiles, Exchange::Substep);
+        sim.run(400);
+        let mut sum = 0.0;
+        for _ in 0..50 {
+            let before = sim.bodies();
+            sim.run(1);
+            for (before, after) in before.iter().zip(sim.bodies()) {
+                let turned = f64::from(before.rotation.to(after.rotation).angle());
+                sum += (turned / dt - f64::from(before.angular_velocity)).powi(2);
+            }
+        }
+        (sum / 50.0 / scene.bodies.len() as f64).sqrt()
+    };
+    let on_one_tile = unlike((1, 1));
+    for tiles in [(1, 6), (3, 3), (8, 3)] {
+        let unlike = unlike(tiles);
+        println!("{tiles:?}: {unlike:.1e} rad/s, on one tile {on_one_tile:.1e}");
+        assert!(unlike < 2.0 * on_one_tile, "{tiles:?}: {unlike} rad/s, on one tile {on_one_tile}");
+    }
+}
