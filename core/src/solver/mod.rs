@@ -42,6 +42,7 @@ use crate::tiling::tile::Tile;
 use batches::{Batches, Graph};
 use coloring::Coloring;
 use constraint::columns::lengths;
+pub(crate) use constraint::groups::ContactMotion;
 use constraint::groups::Groups;
 use constraint::rows::Source;
 use job::Job;

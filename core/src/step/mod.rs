@@ -118,10 +118,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
             }
             world.exchange(halo)?;
             world.each_tile_apart(|bench| {
-                bench.stage(Phase::Border, |b| {
-                    average(b, b.setup.bouncy);
-                    b.work.border.settle(b.tile, &b.work.contacts, &mut b.work.solver, b.setup);
-                });
+                bench.stage(Phase::Border, agree);
                 finalize(bench);
             });
         }
@@ -319,6 +316,11 @@ fn refresh(bench: &mut Bench<'_>) {
 fn send_impulses(bench: &mut Bench<'_>) {
     let work = &*bench.work;
     work.border.send_impulses(bench.tile, &work.solver, bench.outgoing);
+}
+
+fn agree(bench: &mut Bench<'_>) {
+    let work = &mut *bench.work;
+    work.border.agree(bench.tile, &mut work.solver, bench.mail, bench.setup);
 }
 
 fn average(bench: &mut Bench<'_>, bounced: bool) {

@@ -3,26 +3,28 @@
 //! Each owner of a border contact has solved it together with its other contacts; moved to the mean, its body comes off what it
 //! rests on. Where contacts press hard that is a kick in every step: discs at the borders of a pile at rest kept 2 rad/s that never
 //! turned them, and no pile over borders fell asleep. So the contacts beside take it up before the step ends, with all border
-//! contacts as agreed: two sweeps of relax (see `solver/soft_step.rs`), one contact after the other. Both bodies of such a
-//! contact are the tile's own, or one is a static, so momentum is kept. The impulses that the next step starts with
-//! stay those of the last substep.
+//! contacts as agreed: their surfaces come to move as they did before, as far as contacts may press and rub, in sweeps of
+//! sequential impulses. Both bodies of such a contact are the tile's own, or one is a static, so momentum is kept. The impulses that
+//! the next step starts with stay those of the last substep.
 
 use super::Border;
 use crate::collide::narrow_phase::Contacts;
+use crate::exchange::mail::Mail;
 use crate::model::params::Solver as How;
-use crate::solver::Solver;
+use crate::solver::{ContactMotion, Solver};
+
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
-/// Over all contacts beside; more of them gain nothing.
-const SWEEPS: usize = 2;
+/// Over all contacts beside. More of them gain nothing.
+const SWEEPS: usize = 4;
 
 /// The contacts beside those at the border: with one of the bodies that these move, and with none of another tile.
 #[derive(Default, Debug)]
 pub(super) struct Beside {
     contacts: Vec<u32>,
-    /// For each and each of its points the impulses of the last substep, and of the sweeps.
-    impulses: Vec<[[f32; 2]; 2]>,
+    /// How each of them moved before.
+    before: Vec<ContactMotion>,
 }
 
 impl Border {
@@ -45,24 +47,24 @@ impl Border {
         beside.extend(near.map(|((contact, _), _)| contact));
     }
 
-    /// Has the contacts beside take up what the mean has done to their bodies. Those of bodies that bounce are left alone.
-    pub(crate) fn settle(&mut self, tile: &Tile, contacts: &Contacts, solver: &mut Solver, setup: &Setup) {
-        if setup.params.solver != How::SoftStep || self.contacts.is_empty() {
-            return;
+    /// Moves both copies of every border contact to their mean (see [`average`](Self::average)), and has the contacts beside take up
+    /// what that does to their bodies.
+    pub(crate) fn agree(&mut self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, setup: &Setup) {
+        let settles = setup.params.solver == How::SoftStep;
+        let mut beside = std::mem::take(&mut self.beside);
+        if settles {
+            beside.contacts.retain(|&contact| solver.groups.is_solved(contact));
+            beside.before.clear();
+            beside.before.extend(beside.contacts.iter().map(|&contact| solver.groups.motion(contact, &solver.bodies)));
         }
-        let Self { beside: Beside { contacts: beside, impulses }, .. } = self;
-        let Solver { groups, bodies, .. } = solver;
-        let bouncing = groups.bouncing().iter().flat_map(|&contact| contacts.bodies[contact as usize]);
-        let mut bouncing: Vec<u32> = bouncing.filter(|&body| (body as usize) < tile.owned).collect();
-        bouncing.sort_unstable();
-        let bounces = |body: &u32| bouncing.binary_search(body).is_ok();
-        beside.retain(|&contact| groups.is_solved(contact) && !contacts.bodies[contact as usize].iter().any(bounces));
-        impulses.clear();
-        impulses.extend(beside.iter().map(|&contact| groups.all_impulses(contact)));
-        for _ in 0..SWEEPS {
-            for (&contact, impulses) in beside.iter().zip(&mut *impulses) {
-                groups.settle(contact, impulses, bodies, setup.h);
+        self.average(tile, solver, mail, setup.bouncy);
+        if settles {
+            for _ in 0..SWEEPS {
+                for (&contact, before) in beside.contacts.iter().zip(&mut beside.before) {
+                    solver.groups.restore(contact, before, &mut solver.bodies);
+                }
             }
         }
+        self.beside = beside;
     }
 }

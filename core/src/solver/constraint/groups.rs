@@ -52,6 +52,14 @@ pub(crate) struct Bounce {
     pub(super) answers: [Answer; 2],
 }
 
+/// How the surfaces of a contact move at each of its points, B seen from A, along normal and tangent, in m/s; and the impulses there, in
+/// N s.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct ContactMotion {
+    speeds: [[f32; 2]; 2],
+    impulses: [[f32; 2]; 2],
+}
+
 /// Where a contact's constraint lies.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Lane {
@@ -170,27 +178,38 @@ impl Groups {
         (totals[point].normal[lane], totals[point].tangent[lane]) = (normal, tangent);
     }
 
-    /// Those of each point.
-    pub(crate) fn all_impulses(&self, contact: u32) -> [[f32; 2]; 2] {
-        let (_, points, lane) = self.lanes[contact as usize].rows(&self.kept);
-        let of = |rows: &PointRows| [rows.normal_impulse[lane], rows.tangent_impulse[lane]];
-        std::array::from_fn(|point| points.get(point).map_or([0.0; 2], of))
+    /// How a contact's surfaces move, and what it has pressed in the last substep.
+    pub(crate) fn motion(&self, contact: u32, bodies: &SolverBodies) -> ContactMotion {
+        let at = self.lanes[contact as usize];
+        let (sides, points, lane) = at.rows(&self.kept);
+        let velocity = at.bodies(&bodies.velocity);
+        let mut motion = ContactMotion::default();
+        for ((rows, impulses), speeds) in points.iter().zip(&mut motion.impulses).zip(&mut motion.speeds) {
+            *impulses = [rows.normal_impulse[lane], rows.tangent_impulse[lane]];
+            let (along, across) = (sides.normal_rows(rows, lane, velocity), sides.tangent_rows(rows, lane, velocity));
+            *speeds = [along, across].map(|rows| sides.speed(rows, lane, velocity));
+        }
+        motion
     }
 
-    /// Sets the relative velocity of a contact right, point by point, given the impulses so far along normal and tangent, which grow by
-    /// what that takes: relax, of one contact alone. `h` is the length of a substep in seconds.
-    pub(crate) fn settle(&self, contact: u32, impulses: &mut [[f32; 2]; 2], bodies: &mut SolverBodies, h: f32) {
+    /// Has a contact's surfaces move as they did, point by point, as far as it may press and rub: sequential impulses. What it presses
+    /// then is noted there, and nowhere else.
+    pub(crate) fn restore(
+        &self,
+        contact: u32,
+        ContactMotion { speeds, impulses }: &mut ContactMotion,
+        bodies: &mut SolverBodies,
+    ) {
         let at = self.lanes[contact as usize];
         let (sides, points, lane) = at.rows(&self.kept);
         let velocity = at.bodies_mut(&mut bodies.velocity);
-        for (rows, [normal, tangent]) in points.iter().zip(impulses) {
+        for ((rows, speeds), [normal, tangent]) in points.iter().zip(speeds).zip(impulses) {
             let along = sides.normal_rows(rows, lane, velocity);
-            let closing = -sides.speed(along, lane, velocity) - max(rows.separation[lane], 0.0) / h;
-            let wanted = max(*normal + rows.normal_mass[lane] * closing, 0.0);
-            sides.add_impulse(along, normal, lane, wanted - *normal, velocity);
+            let wanted = *normal - rows.normal_mass[lane] * (sides.speed(along, lane, velocity) - speeds[0]);
+            sides.add_impulse(along, normal, lane, max(wanted, 0.0) - *normal, velocity);
             let across = sides.tangent_rows(rows, lane, velocity);
             let most = sides.friction[lane] * *normal;
-            let wanted = *tangent - rows.tangent_mass[lane] * sides.speed(across, lane, velocity);
+            let wanted = *tangent - rows.tangent_mass[lane] * (sides.speed(across, lane, velocity) - speeds[1]);
             sides.add_impulse(across, tangent, lane, clamp(wanted, -most, most) - *tangent, velocity);
         }
     }

@@ -180,11 +180,6 @@ impl Groups {
         }
     }
 
-    /// Contacts that may bounce, of batches that keep their rows.
-    pub(crate) fn bouncing(&self) -> &[u32] {
-        &self.bouncing
-    }
-
     /// Whether a contact whose batch keeps its rows is among those.
     pub(crate) fn may_bounce(&self, contact: u32) -> bool {
         self.bouncing.binary_search(&contact).is_ok()
