@@ -158,6 +158,21 @@ fn what_loses_its_support_falls() {
     assert!(height < 0.5, "the upper box hangs at {height}");
 }
 
+/// Nor if that is removed, in a tile of its own.
+#[test]
+fn what_rests_on_who_is_removed_falls() {
+    let (scene, _) = stacks_and_a_ball();
+    for (tiles, exchange) in [((1, 1), Exchange::Step), ((40, 40), Exchange::Step), ((40, 40), Exchange::Substep)] {
+        let mut sim = scene.start_on(tiles, exchange);
+        rest(&mut sim, 100);
+        let [middle, upper] = [1, 2].map(|k| sim.bodies()[k]);
+        assert!(sim.world.remove(middle.id));
+        sim.run(30);
+        let fallen = upper.position.y - sim.body(upper.id).position.y;
+        assert!(fallen > 0.4, "{tiles:?}, {exchange:?}: the upper box has fallen {fallen} m");
+    }
+}
+
 #[test]
 fn without_gravity_a_lone_body_at_rest_sleeps_too() {
     let mut scene = Scene::new(DVec2::ZERO, 0.0);

@@ -5,7 +5,7 @@ use super::blueprint::Setup;
 use super::statics::Near;
 use super::tile::Tile;
 use crate::model::body::Body;
-use crate::model::contact::{PairKey, Slot, SlotKind};
+use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::{GlobalId, KindId};
 use rustc_hash::FxHashSet;
 use std::ops::Deref;
@@ -198,17 +198,22 @@ impl Tile {
 
     /// Forgets the contacts with some bodies; whatever rests on one of them wakes.
     pub(crate) fn forget_contacts(&mut self, with: impl Fn(Slot) -> bool) {
-        let forgets = |key: PairKey| with(key.low()) || with(key.high());
-        if !self.sleep.still().is_empty() {
-            for key in self.contacts.keys.iter().filter(|key| forgets(**key)) {
-                for slot in [key.low(), key.high()] {
-                    if let SlotKind::Owned(index) = slot.kind() {
-                        self.sleep.wake(index);
-                    }
+        self.wake_beside(&with);
+        self.contacts.retain(|key| !(with(key.low()) || with(key.high())));
+    }
+
+    /// Whatever rests on some bodies wakes.
+    fn wake_beside(&mut self, with: impl Fn(Slot) -> bool) {
+        if self.sleep.still().is_empty() {
+            return;
+        }
+        for key in self.contacts.keys.iter().filter(|key| with(key.low()) || with(key.high())) {
+            for slot in [key.low(), key.high()] {
+                if let SlotKind::Owned(index) = slot.kind() {
+                    self.sleep.wake(index);
                 }
             }
         }
-        self.contacts.retain(|key| !forgets(key));
     }
 
     /// Goes on with a setup that has one dynamic kind more, and as wide a halo as before: the rows of statics' kinds are one further on.
@@ -241,9 +246,22 @@ impl Tile {
 
     /// Forgets the contacts with the ghost of that name, if there is one.
     pub(crate) fn forget_ghost(&mut self, id: GlobalId) {
-        let ghosts = &self.bodies.id[self.owned..self.owned + self.ghosts()];
-        if let Some(ghost) = ghosts.iter().position(|&name| name == id) {
-            self.forget_contacts(|slot| matches!(slot.kind(), SlotKind::Ghost(number) if number == ghost));
+        if let Some(is_it) = self.ghost(id) {
+            self.forget_contacts(is_it);
         }
+    }
+
+    /// Whatever rests on the ghost of that name wakes, if there is one.
+    pub(crate) fn wake_beside_ghost(&mut self, id: GlobalId) {
+        if let Some(is_it) = self.ghost(id) {
+            self.wake_beside(is_it);
+        }
+    }
+
+    /// Tells of a slot whether it is that of the ghost of that name, if there is one.
+    fn ghost(&self, id: GlobalId) -> Option<impl Fn(Slot) -> bool + use<>> {
+        let ghosts = &self.bodies.id[self.owned..self.owned + self.ghosts()];
+        let ghost = ghosts.iter().position(|&name| name == id)?;
+        Some(move |slot: Slot| matches!(slot.kind(), SlotKind::Ghost(number) if number == ghost))
     }
 }

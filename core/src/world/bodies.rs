@@ -81,6 +81,9 @@ impl World {
     /// [`get`](Self::get).
     pub fn remove(&mut self, id: GlobalId) -> bool {
         self.removed.push(id);
+        if self.setup.params.sleep {
+            self.tiles.iter_mut().for_each(|tile| tile.wake_beside_ghost(id));
+        }
         self.locate_all();
         let may_have_left = self.tiles.len() < self.setup.partition.tiles();
         let found = self.locator.get_mut().and_then(|locator| locator.remove(id, may_have_left, &self.tiles));

@@ -12,7 +12,6 @@ use crate::collide::narrow_phase::Contacts;
 use crate::exchange::mail::Mail;
 use crate::model::params::Solver as How;
 use crate::solver::{ContactMotion, Solver};
-
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
