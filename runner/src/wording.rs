@@ -51,10 +51,31 @@ pub(crate) fn did_you_mean(suggestion: &Option<String>) -> String {
     suggestion.as_ref().map(|word| format!("; did you mean {word}?")).unwrap_or_default()
 }
 
+/// So many of something.
+pub(crate) fn plural(count: u64, word: &str) -> String {
+    match (count, word.strip_suffix('y')) {
+        (1, _) => format!("1 {word}"),
+        (_, Some(stem)) => format!("{count} {stem}ies"),
+        _ => format!("{count} {word}s"),
+    }
+}
+
 /// A number as TOML has it, with an exponent where it would be long.
 pub(crate) fn exponential(number: f64) -> String {
     let is_long = number.is_finite() && number != 0.0 && !(1e-5..1e9).contains(&number.abs());
     if is_long { format!("{number:e}") } else { Value::Float(number).to_string() }
+}
+
+/// A number with as many digits behind the point as asked for, or with an exponent where these would not show it, or it would be long.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Figure(pub f64);
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (places, size) = (f.precision().unwrap_or(6), self.0.abs());
+        let shows = size == 0.0 || (0.1_f64.powi(places as i32)..1e9).contains(&size);
+        if shows { write!(f, "{:.places$}", self.0) } else { write!(f, "{:.2e}", self.0) }
+    }
 }
 
 /// A number with as few digits as it takes, up to four behind the point.

@@ -2,12 +2,12 @@
 
 use super::Summary;
 use crate::plan::tiles;
+use crate::wording::{Figure, plural};
 use std::fmt;
 
 /// The closing words of a run.
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let plural = |count: u64, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
         let tiling = tiles::in_words(self.tiles, self.retile);
         let seed = if self.is_seeded { format!(", seed {}", self.seed) } else { String::new() };
@@ -44,14 +44,14 @@ impl Summary {
         row(f, "bodies", format_args!("{}, {} lost, {} escaped", self.bodies, self.bodies_lost, self.escaped))?;
         let border = 100.0 * self.border_contact_fraction;
         row(f, "contacts", format_args!("{} touching, {border:.2} % across tiles", self.contacts))?;
-        let (mean, most) = (self.mean_penetration, self.max_penetration);
+        let [mean, most] = [self.mean_penetration, self.max_penetration].map(Figure);
         row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
-        let (mean, most) = (self.constraint_violation, self.max_constraint_violation);
+        let [mean, most] = [self.constraint_violation, self.max_constraint_violation].map(Figure);
         row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
         let (islands, largest, colors) = (self.islands, self.largest_island, self.colors);
         let asleep = if self.asleep > 0 { format!(", {} bodies asleep", self.asleep) } else { String::new() };
         row(f, "islands", format_args!("{islands}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
-        let (half_v2, spin2) = (self.mean_half_v2, self.mean_spin2);
+        let [half_v2, spin2] = [self.mean_half_v2, self.mean_spin2].map(Figure);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;
         row(f, "energy", format_args!("{:.6e} J, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;

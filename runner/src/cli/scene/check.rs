@@ -9,7 +9,7 @@ use crate::plan::Plan;
 use crate::rank::part_of_scene;
 use crate::scene::SceneFile;
 use crate::scene::file::Found;
-use crate::wording::OneLine;
+use crate::wording::{Figure, OneLine};
 use atoll_core::{Facts, Loopback, Shape};
 use atoll_transport::Rank;
 use std::fmt::Write as _;
@@ -48,7 +48,7 @@ pub(super) fn run(args: &SceneCheckArgs) -> Result<Exit, RunError> {
                 option: args.scene.display().to_string(),
                 reason: format!("nothing can be computed with it: {error}"),
             })?);
-            row(&mut text, "mass", &format!("{:.6} kg", facts.mass));
+            row(&mut text, "mass", &format!("{:.6} kg", Figure(facts.mass)));
             let overlaps = match facts.overlaps {
                 0 => "none at the start".to_owned(),
                 points => format!("{points} contact points at the start, the deepest {:.3e} m", facts.max_penetration),

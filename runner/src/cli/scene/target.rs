@@ -7,6 +7,7 @@ use crate::folder::durable::{create_folder_durably, write_durably};
 use crate::scene::file::Column;
 use crate::scene::file::digest_of_file;
 use crate::scene::file::write::{self, Alike, BodiesFile, World};
+use crate::wording::plural;
 use atoll_core::Body;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -110,10 +111,10 @@ impl<'a> Target<'a> {
         let bytes = files.filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum::<u64>();
         let World { kinds, statics, .. } = world;
         output::show(&format!(
-            "{} bodies of {} kinds and {} statics, {:.2} MB: `atoll run {}` runs it\n",
-            bodies.len(),
-            kinds.len(),
-            statics.len(),
+            "{} of {} and {}, {:.2} MB: `atoll run {}` runs it\n",
+            plural(bodies.len() as u64, "body"),
+            plural(kinds.len() as u64, "kind"),
+            plural(statics.len() as u64, "static"),
             bytes as f64 * 1e-6,
             text.display()
         ))

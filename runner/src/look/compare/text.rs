@@ -1,7 +1,7 @@
 //! A comparison as people read it.
 
 use super::{Bodies, Comparison, Difference, Side, State, StepDeviation, unlike_ends};
-use crate::wording::OneLine;
+use crate::wording::{OneLine, plural};
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 
@@ -36,7 +36,7 @@ impl Display for Comparison {
         self.write_verdict(f)?;
         for (side, only) in [(&self.a, &self.only_in_a), (&self.b, &self.only_in_b)] {
             if let (Some(first), Some(last)) = (only.first(), only.last()) {
-                let (folder, records) = (side.folder.display(), plural(only.len(), "record"));
+                let (folder, records) = (side.folder.display(), plural(only.len() as u64, "record"));
                 writeln!(f, "only {folder} has {records} of steps {first} to {last}")?;
             }
         }
@@ -72,7 +72,7 @@ impl Comparison {
             return writeln!(f, "{verdict}: no step was recorded by both");
         };
         let most = self.steps.iter().map(|step| step.bodies).max().unwrap_or(0);
-        let (records, bodies) = (plural(self.steps.len(), "record"), plural(most as usize, "body"));
+        let (records, bodies) = (plural(self.steps.len() as u64, "record"), plural(most, "body"));
         write!(f, "{verdict}: {records} of {bodies}, steps {} to {}", first.step, last.step)?;
         match self.steps.iter().filter(|step| !step.is_none()).count() {
             0 => writeln!(f),
@@ -96,9 +96,12 @@ impl Comparison {
             let mut steps = self.steps.iter().filter(|step| bodies(step).count > 0);
             if let Some(step) = steps.next() {
                 let (some, more) = (bodies(step), steps.count());
-                let (count, id) = (plural(some.count as usize, "body"), some.first.unwrap_or(0));
-                let more =
-                    if more > 0 { format!(", and some at {}", plural(more, "later step")) } else { String::new() };
+                let (count, id) = (plural(some.count, "body"), some.first.unwrap_or(0));
+                let more = if more > 0 {
+                    format!(", and some at {}", plural(more as u64, "later step"))
+                } else {
+                    String::new()
+                };
                 writeln!(f, "{does} {count} at step {}, the lowest is {id}{more}", step.step)?;
             }
         }
@@ -179,13 +182,5 @@ impl Display for State {
         let Self { tile: _, x, y, angle, vx, vy, omega, kind } = self;
         write!(f, "x {x}, y {y}, angle {angle}, vx {vx}, vy {vy}, omega {omega}")?;
         kind.map_or(Ok(()), |kind| write!(f, ", kind {kind}"))
-    }
-}
-
-fn plural(count: usize, word: &str) -> String {
-    match (count, word.strip_suffix('y')) {
-        (1, _) => format!("1 {word}"),
-        (_, Some(stem)) => format!("{count} {stem}ies"),
-        _ => format!("{count} {word}s"),
     }
 }
