@@ -11,12 +11,15 @@
 //! An island may lie in several tiles. Each decides about its own part, in which ghosts rest as their owners said of them: who
 //! moves anywhere in an island is heard of at once in the tiles that have it as a ghost, and from there on one tile further
 //! with each step. Time counts on meanwhile, so of an island that spans more tiles than `sleep_time` has steps, those parts
-//! sleep that are so many tiles from whoever moves.
+//! sleep that are so many tiles from whoever moves. What a sleeper leans on in another tile may be struck, wake, and be gone before its own tile
+//! hears of it: so whoever leaned on a ghost that is awake, or is gone, wakes.
 
+use crate::model::id::GlobalId;
 use crate::model::math;
 use crate::solver::index::GraphNode;
 use crate::tiling::blueprint::Setup;
 use glam::Vec2;
+use rustc_hash::FxHashMap;
 
 /// Who rests since when. Empty where nobody may sleep.
 #[derive(Clone, Default, Debug)]
@@ -25,12 +28,23 @@ pub(crate) struct Sleep {
     still: Vec<f32>,
     /// For each ghost how long it had rested when its owner last said so, in seconds.
     ghosts: Vec<f32>,
+    /// Owned bodies that have rested for long enough, each with a ghost that they touched in the last step.
+    leaning: Vec<Leaning>,
     /// For each owned body whether its island sleeps.
     asleep: Vec<bool>,
     /// For each node of the contact graph that is the lowest of its island, how long that has rested, in seconds, and
     /// whether it sleeps.
     rested: Vec<f32>,
     islands: Vec<bool>,
+}
+
+/// An owned body that touched a ghost in the last step.
+#[derive(Clone, Copy, Debug)]
+struct Leaning {
+    /// Its name, and where among the tile's bodies it was.
+    id: GlobalId,
+    was: usize,
+    ghost: GlobalId,
 }
 
 impl Sleep {
@@ -59,6 +73,38 @@ impl Sleep {
     pub(crate) fn rested(&self, body: usize, owned: usize) -> f32 {
         let rested = if body < owned { self.still.get(body) } else { self.ghosts.get(body - owned) };
         rested.copied().unwrap_or_default()
+    }
+
+    /// Forgets who leaned on whom.
+    pub(crate) fn forget_leaning(&mut self) {
+        self.leaning.clear();
+    }
+
+    /// An owned body, known by name and place, touched a ghost in the last step.
+    pub(crate) fn lean(&mut self, (id, was): (GlobalId, usize), ghost: GlobalId, setup: &Setup) {
+        if self.still.get(was).is_some_and(|&still| still >= setup.params.sleep_time) {
+            self.leaning.push(Leaning { id, was, ghost });
+        }
+    }
+
+    /// Wakes those that leaned on a ghost which has rested less, or is gone. `ids` are those of the tile's owned bodies, then of its
+    /// ghosts; `newcomers` the places of those that were given to it in this step.
+    pub(crate) fn wake_leaning(&mut self, ids: &[GlobalId], newcomers: &[u32]) {
+        if self.leaning.is_empty() {
+            return;
+        }
+        let owned = self.still.len();
+        let ghosts = ids[owned..].iter().copied().zip(self.ghosts.iter().copied());
+        let came = newcomers.iter().map(|&place| (ids[place as usize], self.still[place as usize]));
+        let rested: FxHashMap<GlobalId, f32> = ghosts.chain(came).collect();
+        for Leaning { id, was, ghost } in self.leaning.drain(..) {
+            let is_there = ids[..owned].get(was) == Some(&id);
+            let place = if is_there { Some(was) } else { ids[..owned].iter().position(|&other| other == id) };
+            if let Some(place) = place {
+                let ghost = rested.get(&ghost).copied().unwrap_or_default();
+                self.still[place] = math::min(self.still[place], ghost);
+            }
+        }
     }
 
     /// Forgets how long ghosts have rested.

@@ -312,15 +312,16 @@ impl SolverBodies {
         self.ghosts[ghost].given = self.given(place, &refresh.unseen);
     }
 
-    /// Mass-weighted velocity and pose of a body with a contact, as another tile's ghost takes them over. One that sleeps does not
-    /// move.
+    /// Whether a body with a contact is solved: not if it sleeps.
+    pub(crate) fn is_solved(&self, body: u32) -> bool {
+        self.place_of(body) != SolverIndex::NOT_SOLVED
+    }
+
+    /// Mass-weighted velocity and pose of a body that is solved, as another tile's ghost takes them over.
     pub(crate) fn state_of(&self, body: u32) -> ([f32; 3], Quad) {
-        let place = self.place_of(body);
-        if place == SolverIndex::NOT_SOLVED {
-            return ([0.0; 3], ZERO);
-        }
-        let [x, y, w, _] = self.velocity[place.get()];
-        ([x, y, w], self.pose[place.get()])
+        let place = self.place_of(body).get();
+        let [x, y, w, _] = self.velocity[place];
+        ([x, y, w], self.pose[place])
     }
 
     /// How far a body of the tile has gone in the step, in m, and how far its turning took what is one meter from its center, if it is

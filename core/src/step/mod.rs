@@ -90,12 +90,12 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                     collide(bench);
                     bench.stage(Phase::Border, |b| b.work.border.find(b.tile, &b.work.contacts, b.setup));
                     prepare(bench);
+                    make_substep(bench, 0);
                 }
-                make_substep(bench, 0);
             });
             for substep in 1..=last {
                 world.exchange(halo)?;
-                world.each_tile_apart(|bench| {
+                world.each_tile_under_way(|bench| {
                     bench.stage(Phase::Border, refresh);
                     make_substep(bench, substep);
                 });
@@ -104,12 +104,12 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
             let rounds = if world.setup.bouncy { world.setup.params.bounce_rounds() } else { 0 };
             for round in 0..rounds {
                 world.exchange(halo)?;
-                world.each_tile_apart(|bench| {
+                world.each_tile_under_way(|bench| {
                     bench.stage(Phase::Border, |b| average(b, round > 0));
                     bench.stage(Phase::Border, send_refresh);
                 });
                 world.exchange(halo)?;
-                world.each_tile_apart(|bench| {
+                world.each_tile_under_way(|bench| {
                     bench.stage(Phase::Border, refresh);
                     bench.stage(Phase::Finalize, |b| b.work.solver.apply_restitution());
                     bench.stage(Phase::Border, |b| b.work.border.add_bounces(b.tile, &b.work.solver));
@@ -117,7 +117,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
                 });
             }
             world.exchange(halo)?;
-            world.each_tile_apart(|bench| {
+            world.each_tile_under_way(|bench| {
                 bench.stage(Phase::Border, agree);
                 finalize(bench);
             });
@@ -182,11 +182,10 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
     Ok(verdict)
 }
 
-/// Whether a tile has anything to do in this step: not if it stands still. Others may yet hear of it what they heard before.
+/// Whether a tile has anything to do in this step: not if it stands still.
 fn begin(bench: &mut Bench<'_>) -> bool {
     bench.stage(Phase::Flush, |b| {
-        let knows_all = b.setup.params.exchange == Exchange::Step || b.work.is_of_last_step;
-        let asked = b.measures || b.figures.is_some() || !knows_all;
+        let asked = b.measures || b.figures.is_some();
         b.work.outlook = standstill::look(b.tile, asked, b.setup);
         !b.work.outlook.stands_still()
     })
@@ -277,9 +276,6 @@ fn solve_at_once(bench: &mut Bench<'_>, batch: usize) {
 
 /// Restitution where it has not been, and everything written back.
 fn finalize(bench: &mut Bench<'_>) {
-    if bench.work.outlook.stands_still() {
-        return;
-    }
     bench.stage(Phase::Finalize, |b| {
         let solver = &mut b.work.solver;
         if b.setup.bouncy && b.setup.params.exchange == Exchange::Step {
@@ -299,7 +295,6 @@ fn finalize(bench: &mut Bench<'_>) {
         }
         far::forget(b.tile);
         standstill::note(b.tile, &b.work.outlook);
-        b.work.is_of_last_step = true;
     });
 }
 
@@ -310,7 +305,7 @@ fn send_refresh(bench: &mut Bench<'_>) {
 
 fn refresh(bench: &mut Bench<'_>) {
     let work = &mut *bench.work;
-    work.border.refresh(bench.tile, &mut work.solver, bench.mail);
+    work.border.refresh(bench.tile, &mut work.solver, bench.mail, bench.setup);
 }
 
 fn send_impulses(bench: &mut Bench<'_>) {

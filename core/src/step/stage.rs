@@ -35,8 +35,6 @@ pub(crate) struct Work {
     pub(crate) border: Border,
     /// What is known of the step under way.
     pub(crate) outlook: Outlook,
-    /// Whether it was there for the tile's last step.
-    pub(crate) is_of_last_step: bool,
 }
 
 /// What a thread has for all tiles it works on.

@@ -258,6 +258,11 @@ impl Tile {
         self.sleep.rested(body, self.owned)
     }
 
+    /// Whether that is long enough to sleep, if all of its island have.
+    pub(crate) fn rests(&self, body: usize, setup: &Setup) -> bool {
+        self.rested(body) >= setup.params.sleep_time
+    }
+
     /// Notes who has rested in this step.
     pub(crate) fn count_rest(&mut self, setup: &Setup) {
         if setup.params.sleep {

@@ -140,6 +140,15 @@ impl World {
         self.each(|bench, own| stage(&mut bench.with_work(own.get_or_insert_default())));
     }
 
+    /// As [`each_tile_apart`](Self::each_tile_apart), over those tiles that do not stand still in this step.
+    pub(crate) fn each_tile_under_way(&mut self, stage: impl Fn(&mut Bench<'_>) + Sync) {
+        self.each_tile_apart(|bench| {
+            if !bench.work.outlook.stands_still() {
+                stage(bench);
+            }
+        });
+    }
+
     fn each<R: Send>(&mut self, stage: impl Fn(&mut Bench<'_>, &mut Option<Box<Work>>) -> R + Sync) -> Vec<R> {
         let Self { setup, hands, schedule, works, tiles, busy, inbox, .. } = self;
         let &mut Self { step, measures, takes_figures, clock, .. } = self;

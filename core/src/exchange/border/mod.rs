@@ -178,7 +178,7 @@ impl Border {
         }
     }
 
-    /// Tells every peer the state of its ghosts.
+    /// Tells every peer the state of its ghosts, but of those that sleep.
     pub(crate) fn send_refresh(&self, tile: &Tile, solver: &Solver, bag: &mut Mailbag) {
         let mut unseen = vec![Unseen::default(); self.sends.len()];
         for feed in &self.feeds {
@@ -192,6 +192,9 @@ impl Border {
         }
         for &i in &self.send_order {
             let Outgoing { body, peer } = self.sends[i as usize];
+            if !solver.bodies.is_solved(body) {
+                continue;
+            }
             let (velocity, pose) = solver.bodies.state_of(body);
             bag.address(tile.id, peer);
             let id = tile.bodies.id[body as usize];
@@ -199,8 +202,14 @@ impl Border {
         }
     }
 
-    /// Takes over the owners' state of the ghosts in contact.
-    pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>) {
+    /// Takes over the owners' state of the ghosts in contact. Of who rests its owner may say nothing: then it sleeps, and stays where it was.
+    pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, setup: &Setup) {
+        let rests = |tile: &Tile, ghost: usize| setup.params.sleep && tile.rests(tile.owned + ghost, setup);
+        for ghost in (0..tile.ghosts()).filter(|&ghost| rests(tile, ghost)) {
+            let (row, unseen) = (tile.owned + ghost, tile.unseen[ghost]);
+            let held = GhostRefresh { id: tile.bodies.id[row], velocity: [0.0; 3], pose: [0.0; 4], unseen };
+            solver.bodies.refresh(row, &held);
+        }
         let mut awaited = self.ghosts.iter().map(|&ghost| ghost as usize).peekable();
         let mut all_known = true;
         for message in mail.messages() {
@@ -213,12 +222,14 @@ impl Border {
                     all_known = false;
                     break;
                 };
-                all_known &= awaited.peek().is_none_or(|&next| next >= ghost);
+                while let Some(silent) = awaited.next_if(|&next| next < ghost) {
+                    all_known &= rests(tile, silent);
+                }
                 awaited.next_if_eq(&ghost);
                 solver.bodies.refresh(tile.owned + ghost, refresh);
             }
         }
-        if !all_known || awaited.next().is_some() {
+        if !(awaited.all(|silent| rests(tile, silent)) && all_known) {
             tile.counts.fault = Some(Fault::Protocol);
         }
         let contacts = self.contacts.iter().map(|border| border.contact).chain(self.scratch.clone());

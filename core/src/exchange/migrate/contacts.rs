@@ -16,6 +16,7 @@ const AHEAD: usize = 8;
 /// strays.
 pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.strays.clear();
+    tile.sleep.forget_leaning();
     find_concerned(tile, work);
     let MigrateWork { mark, border, sends, concerned, contacts, .. } = work;
     let border_of = |mark: u32| border.get((mark as usize).checked_sub(1)?);
@@ -33,6 +34,10 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             tile.strays.push(Stray { pair, authority: Authority::Overlap, contact: *contact });
             continue;
         };
+        if high.is_ghost() {
+            let (id, ghost) = (tile.bodies.id[low_index], tile.bodies.id[tile.index(high)]);
+            tile.sleep.lean((id, low_index), ghost, setup);
+        }
         let (high_mark, high_owner) = match high.kind() {
             SlotKind::Owned(index) => (mark[index], Some(tile.id)),
             SlotKind::Ghost(ghost) => (0, Some(tile.ghost_owners[ghost])),
