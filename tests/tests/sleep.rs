@@ -173,6 +173,34 @@ fn what_rests_on_who_is_removed_falls() {
     }
 }
 
+/// Nor if that, longer than tiles are, is struck away within one step.
+#[test]
+fn what_lies_on_a_plank_that_is_struck_away_falls() {
+    let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+    scene.params.sleep = true;
+    scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, Material::default());
+    scene.wall(DVec2::new(0.0, 1.5), (2.0, 3.0), 0.0, Material::default());
+    let [plank, boxed] = [(24.0, 0.3), (0.4, 0.4)]
+        .map(|(width, height)| scene.kind(Shape::rectangle(width, height), Material::default()));
+    let ball = scene.kind(Shape::circle(0.4), Material { density: 500.0, ..Material::default() });
+    scene.body(plank, DVec2::new(0.0, 3.15), Vec2::ZERO);
+    let boxes: Vec<GlobalId> =
+        (-5..=5).map(|k| scene.body(boxed, DVec2::new(2.0 * f64::from(k), 3.5), Vec2::ZERO)).collect();
+    for (tiles, exchange) in [((1, 1), Exchange::Step), ((40, 1), Exchange::Step), ((40, 1), Exchange::Substep)] {
+        let mut sim = scene.start_on(tiles, exchange);
+        sim.run(100);
+        assert_eq!(sim.report.asleep, 12, "{:?}", sim.report);
+        let position = DVec2::new(9.0, 6.5);
+        let velocity = Vec2::new(0.0, -150.0);
+        sim.world
+            .add(atoll_core::Body { id: GlobalId(99), position, velocity, kind: ball, ..scene.bodies[0] })
+            .unwrap();
+        sim.run(60);
+        let still: Vec<_> = boxes.iter().filter(|&&id| (sim.body(id).position.y - 3.5).abs() < 0.05).collect();
+        assert!(still.is_empty(), "{tiles:?}, {exchange:?}: {still:?} hang in the air");
+    }
+}
+
 #[test]
 fn without_gravity_a_lone_body_at_rest_sleeps_too() {
     let mut scene = Scene::new(DVec2::ZERO, 0.0);
