@@ -129,11 +129,6 @@ fn values_that_do_not_go_together_are_refused() {
     // Nobody asked for it: the scene does.
     let by_default = format!("{frozen}, the default of this scene; or use exchange = \"step\"");
     refused("--set ghosts=frozen --set kind=pile", &by_default);
-    refused(
-        "--set sleep=true --tiles 2x2",
-        "this configuration makes no world: sleep = true on 4 tiles: an island that sleeps must lie in one tile; use \
-         tiles = [1, 1], or sleep = false",
-    );
     refused("--set margin_floor=2", "physics.margin_cap = 0.5 (the default): must be finite and at least margin_floor");
 }
 
