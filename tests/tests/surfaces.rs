@@ -1,7 +1,7 @@
 //! Ground of several pieces bears what slides, rolls and comes down upon it as one piece does.
 
-use atoll_core::{Exchange, Material, Part, Rot, Shape};
-use atoll_tests::world::{Scene, Sim};
+use atoll_core::{Body, Exchange, Material, Part, Rot, Shape};
+use atoll_tests::world::{Scene, Sim, noise};
 use glam::{DVec2, Vec2};
 use std::f32::consts::TAU;
 
@@ -147,5 +147,38 @@ fn a_plank_comes_to_rest_on_a_plateau() {
             assert!(body.angular_velocity.abs() < 1e-3, "{what}: still turns at {} rad/s", body.angular_velocity);
             assert!(high.abs() < 1e-3, "{what}: rests {high} m too high");
         }
+    }
+}
+
+/// Thin plates among discs and boxes that fall upon them in a room of chains stay in it.
+#[test]
+fn nobody_is_pressed_through_a_chain() {
+    const SIDE: f32 = 7.0;
+    for seed in 0..20 {
+        let mut scene = Scene::new(MIDDLE, -10.0);
+        let corners = [(0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE)].map(Vec2::from);
+        for k in 0..4 {
+            let [before, from, to, after] = [3, 0, 1, 2].map(|step| corners[(k + step) % 4]);
+            scene.segment(MIDDLE, [from, to], [Some(before), Some(after)]);
+        }
+        let bouncy = Material { restitution: 0.5, ..Material::default() };
+        let plate = scene.kind(Shape::rectangle(0.5, 0.025), bouncy);
+        let ball = scene.kind(Shape::circle(0.25), Material { density: 4.0, friction: 0.0, ..Material::default() });
+        let boxed = scene.kind(Shape::rectangle(0.5, 0.5), Material::default());
+        for k in 0..36_u64 {
+            let random = |number: u64| noise(seed, 4 * k + number);
+            let place = DVec2::new(0.7 + 1.1 * (k % 6) as f64, 0.7 + 1.1 * (k / 6) as f64);
+            let velocity = DVec2::new(random(0) - 0.5, random(1) - 0.5).as_vec2() * 6.0;
+            scene.body([plate, ball, boxed][(3.0 * random(2)) as usize], MIDDLE + place, velocity);
+            scene.last().rotation = Rot::from_angle(6.0 * random(3) as f32);
+        }
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        sim.run(240);
+        let out = |body: &&Body| {
+            let place = body.position - MIDDLE;
+            place.min_element() < -0.05 || place.max_element() > f64::from(SIDE) + 0.05
+        };
+        let out: Vec<_> = sim.bodies().iter().filter(out).map(|body| (body.id, body.position - MIDDLE)).collect();
+        assert!(out.is_empty(), "room {seed}: {out:?}");
     }
 }

@@ -45,6 +45,9 @@ pub(super) const ROUNDS: usize = 3;
 const MORE_ROUNDS: usize = 12;
 const LEAST_WAY: f32 = 0.002;
 
+/// The cosine between a segment's normal and that of its contact with what lies on it, at least.
+const LIES: f32 = 0.99;
+
 /// Slower than this, in m/s, nothing runs against a corner.
 pub(super) const CREEPING: f32 = 0.01;
 
@@ -118,6 +121,8 @@ struct Approach<'a> {
     pieces: Option<[&'a Piece; 2]>,
     /// Their numbers, as features of contacts name them (see [`Contact::pieces`]).
     features: u32,
+    /// Whether one is a segment of a chain, and the other lay on its face in the last step.
+    lies: bool,
 }
 
 /// A manifold, and the moment in which it is one.
@@ -152,7 +157,7 @@ impl<'a> Approach<'a> {
         let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
         let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
         let between = b.velocity - a.velocity;
-        Self { a, b, offset, between, pieces: None, features: 0 }
+        Self { a, b, offset, between, pieces: None, features: 0, lies: false }
     }
 
     /// Of two pieces, if they have some.
@@ -215,6 +220,15 @@ impl<'a> Approach<'a> {
         if self.closing(&over, one.anchor) < 0.25 * closing { over } else { at }
     }
 
+    /// Whether one of the pieces is a segment, and the other had a contact with it along the normal of its face.
+    fn lies(&self, known: Option<&Contact>) -> bool {
+        let (Some([a, b]), Some(known)) = (self.pieces, known) else { return false };
+        [(a, known.rotation_a), (b, known.rotation_b)].into_iter().any(|(piece, rotation)| {
+            let along = || dot(rotation.rotate(piece.outline.normal(0)), known.normal).abs();
+            piece.side.is_some() && along() > LIES
+        })
+    }
+
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.
     #[inline(always)]
     fn pass_by(&self, setup: &Setup) -> bool {
@@ -245,7 +259,7 @@ impl<'a> Approach<'a> {
         let manifold = match self.pieces {
             None => collide(self.a.kind, rotation_a, self.b.kind, rotation_b, offset, reach),
             Some(pieces) => {
-                let found = convex::collide(pieces, [rotation_a, rotation_b], offset, reach);
+                let found = convex::collide(pieces, [rotation_a, rotation_b], offset, reach, self.lies);
                 found.named(self.features)
             }
         };

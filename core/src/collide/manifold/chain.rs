@@ -24,8 +24,9 @@ const BEYOND: f32 = 1e-5;
 type AtEnd = Option<(f32, Manifold)>;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
-/// the piece. What has no contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
-pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2) -> Manifold {
+/// the piece, which is before the segment, or over it where it `lies` there already, however deep it was pressed. What has no contact with it here, as
+/// another segment has, only [tells how far it is](Manifold::is_distance).
+pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2, lies: bool) -> Manifold {
     let [to, from] = own.edge(0);
     let along = to - from;
     let length = dot(along, along).sqrt();
@@ -35,7 +36,8 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let none = (f32::INFINITY, from, 0);
     let (lowest, corner, number) = heights.fold(none, |least, at| if at.0 < least.0 { at } else { least });
     let is_over = (0.0..=length).contains(&dot(corner - from, along));
-    let is_before = dot(center - from, n) >= 0.0;
+    let lies = lies && (0.0..=length).contains(&dot(center - from, along));
+    let is_before = lies || dot(center - from, n) >= 0.0;
     // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
     let of_lowest = || is_over.then(|| of_corner(corner, lowest, n, radius, 1 << 9 | number));
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();

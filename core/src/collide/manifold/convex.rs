@@ -11,18 +11,25 @@ use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::Piece;
 use glam::Vec2;
 
-/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none.
+/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. Where one is
+/// a segment of a chain, `lies` tells that the other has lain on its face.
 #[inline(never)]
-pub(in crate::collide) fn collide([a, b]: [&Piece; 2], [rot_a, rot_b]: [Rot; 2], offset: Vec2, reach: f32) -> Manifold {
+pub(in crate::collide) fn collide(
+    [a, b]: [&Piece; 2],
+    [rot_a, rot_b]: [Rot; 2],
+    offset: Vec2,
+    reach: f32,
+    lies: bool,
+) -> Manifold {
     if b.side.is_some() {
-        let back = collide([b, a], [rot_b, rot_a], -offset, reach);
+        let back = collide([b, a], [rot_b, rot_a], -offset, reach, lies);
         return back.swapped(offset);
     }
     let (turn, seen) = (rot_a.to(rot_b), rot_a.unrotate(offset));
     let (own, other) = (&a.outline, &b.outline.seen(turn, seen));
     let radii = [a.radius, b.radius];
     let mut manifold = match a.side {
-        Some(side) => chain::collide(own, side, other, b.radius, turn.rotate(b.center) + seen),
+        Some(side) => chain::collide(own, side, other, b.radius, turn.rotate(b.center) + seen, lies),
         None => polygons(own, other, radii, reach),
     };
     manifold.normal = rot_a.rotate(manifold.normal);

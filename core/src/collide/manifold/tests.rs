@@ -33,7 +33,7 @@ impl Two {
     fn within(&self, reach: f32) -> Manifold {
         let (a, b) = (row(&self.a), row(&self.b));
         if !(a.form.is_simple() && b.form.is_simple()) {
-            convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, reach)
+            convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, reach, false)
         } else {
             collide(&a, self.rot_a, &b, self.rot_b, self.offset, reach)
         }
@@ -42,7 +42,7 @@ impl Two {
     /// As if both were made of pieces.
     fn of_pieces(&self) -> Manifold {
         let (a, b) = (row(&self.a), row(&self.b));
-        convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, f32::INFINITY)
+        convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, f32::INFINITY, false)
     }
 
     fn swapped(&self) -> Self {

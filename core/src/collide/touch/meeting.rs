@@ -89,13 +89,17 @@ pub(in crate::collide) fn meet<'a>(
             ([&pieces_a[number_a], &pieces_b[number_b]], Contact::features_of(number_a as u32, number_b as u32));
         (pair.pieces, pair.features) = (Some(pieces), features);
         let known = known.iter().copied().find(|known| known.pieces() == features);
+        pair.lies = false;
         let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
         let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
         let outcome = match (kept, rolled) {
             (Some(separation), _) => Met::Known(separation),
             (None, Some((contact, separation))) => Met::Found(contact, separation),
             _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
-            _ => Met::from(pair.touch(known, far, setup)),
+            _ => {
+                pair.lies = pair.lies(known);
+                Met::from(pair.touch(known, far, setup))
+            }
         };
         met(Meeting { bodies, pieces, features, known, outcome });
     };
