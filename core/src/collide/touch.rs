@@ -221,7 +221,7 @@ impl<'a> Approach<'a> {
     }
 
     /// Whether one of the pieces is a segment, and the other had a contact with it along the normal of its face.
-    fn lies(&self, known: Option<&Contact>) -> bool {
+    fn has_lain(&self, known: Option<&Contact>) -> bool {
         let (Some([a, b]), Some(known)) = (self.pieces, known) else { return false };
         [(a, known.rotation_a), (b, known.rotation_b)].into_iter().any(|(piece, rotation)| {
             let along = || dot(rotation.rotate(piece.outline.normal(0)), known.normal).abs();

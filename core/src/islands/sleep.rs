@@ -80,11 +80,9 @@ impl Sleep {
         self.leaning.clear();
     }
 
-    /// An owned body, known by name and place, touched a ghost in the last step.
-    pub(crate) fn lean(&mut self, (id, was): (GlobalId, usize), ghost: GlobalId, setup: &Setup) {
-        if self.still.get(was).is_some_and(|&still| still >= setup.params.sleep_time) {
-            self.leaning.push(Leaning { id, was, ghost });
-        }
+    /// An owned body that has rested for long enough, known by name and place, touched a ghost in the last step.
+    pub(crate) fn lean(&mut self, (id, was): (GlobalId, usize), ghost: GlobalId) {
+        self.leaning.push(Leaning { id, was, ghost });
     }
 
     /// Wakes those that leaned on a ghost which has rested less, or is gone. `ids` are those of the tile's owned bodies, then of its

@@ -260,7 +260,7 @@ impl Tile {
 
     /// Whether that is long enough to sleep, if all of its island have.
     pub(crate) fn rests(&self, body: usize, setup: &Setup) -> bool {
-        self.rested(body) >= setup.params.sleep_time
+        setup.params.sleep && self.rested(body) >= setup.params.sleep_time
     }
 
     /// Notes who has rested in this step.

@@ -97,7 +97,7 @@ pub(in crate::collide) fn meet<'a>(
             (None, Some((contact, separation))) => Met::Found(contact, separation),
             _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
             _ => {
-                pair.lies = pair.lies(known);
+                pair.lies = pair.has_lain(known);
                 Met::from(pair.touch(known, far, setup))
             }
         };

@@ -204,7 +204,7 @@ impl Border {
 
     /// Takes over the owners' state of the ghosts in contact. Of who rests its owner may say nothing: then it sleeps, and stays where it was.
     pub(crate) fn refresh(&self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, setup: &Setup) {
-        let rests = |tile: &Tile, ghost: usize| setup.params.sleep && tile.rests(tile.owned + ghost, setup);
+        let rests = |tile: &Tile, ghost: usize| tile.rests(tile.owned + ghost, setup);
         for ghost in (0..tile.ghosts()).filter(|&ghost| rests(tile, ghost)) {
             let (row, unseen) = (tile.owned + ghost, tile.unseen[ghost]);
             let held = GhostRefresh { id: tile.bodies.id[row], velocity: [0.0; 3], pose: [0.0; 4], unseen };

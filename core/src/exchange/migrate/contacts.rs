@@ -34,9 +34,9 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             tile.strays.push(Stray { pair, authority: Authority::Overlap, contact: *contact });
             continue;
         };
-        if high.is_ghost() {
+        if high.is_ghost() && tile.rests(low_index, setup) {
             let (id, ghost) = (tile.bodies.id[low_index], tile.bodies.id[tile.index(high)]);
-            tile.sleep.lean((id, low_index), ghost, setup);
+            tile.sleep.lean((id, low_index), ghost);
         }
         let (high_mark, high_owner) = match high.kind() {
             SlotKind::Owned(index) => (mark[index], Some(tile.id)),
