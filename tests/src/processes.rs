@@ -86,13 +86,15 @@ pub fn ranks_of(program: &Running, ranks: usize) -> Vec<RankProcess> {
     }
 }
 
-/// Whether the launcher of an MPI job says whom it lost. That of MPICH says that a process was killed and names one of the
-/// job, but not always that one.
+/// Whether an MPI job says whom it lost. The launcher of Open MPI names the rank. That of MPICH says that a process was
+/// killed and names one of the job, but not always that one; its last line takes the signals of all that ended in one OR,
+/// so that SIGKILL and the SIGABRT of a rank whose UCX missed the lost one amount to "Terminated (signal 15)".
 #[cfg(feature = "mpi")]
-pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
+pub fn job_names(ended: &Ended, lost: &RankProcess) -> bool {
     let said = format!("{}{}", ended.stdout, ended.stderr);
     if atoll_transport::mpi::Mpi::library().contains("MPICH") {
-        said.contains("EXIT STRING: Killed (signal 9)")
+        let missed = |line: &str| line.contains(&format!("(pid={} ", lost.pid)) && line.contains("No such process");
+        said.lines().any(|line| line.ends_with("EXIT CODE: 9") || missed(line))
     } else {
         said.contains(&format!("process rank {} with PID", lost.rank))
     }
@@ -100,7 +102,7 @@ pub fn launcher_names(ended: &Ended, lost: &RankProcess) -> bool {
 
 /// Nobody launches MPI jobs.
 #[cfg(not(feature = "mpi"))]
-pub fn launcher_names(_: &Ended, _: &RankProcess) -> bool {
+pub fn job_names(_: &Ended, _: &RankProcess) -> bool {
     false
 }
 

@@ -80,7 +80,7 @@ fn a_rank_that_is_killed_ends_all_others() {
             } else {
                 // The launcher ends the job, and says whom it missed.
                 assert!(ended.code != Some(0), "{way}: {ended}");
-                assert!(processes::launcher_names(&ended, victim), "{way}: rank {rank} is not named: {ended}");
+                assert!(processes::job_names(&ended, victim), "{way}: rank {rank} is not named: {ended}");
             }
             assert_nothing_left(way, &before);
         }
