@@ -1,7 +1,8 @@
-//! One scene, body for body, in Atoll, in Box2D v3 and in rapier2d: time, memory, and what is left at the end.
+//! One scene, or any world of yours, body for body, in Atoll, in Box2D v3 and in rapier2d: time, memory, and what is left at the end.
 //!
 //! ```sh
 //! cargo run --release -p atoll-benches --features peers --bin peers -- --scene pile
+//! cargo run --release -p atoll-benches --features peers --bin peers -- my_world.toml --steps 300
 //! ```
 //!
 //! What is set alike and what each engine keeps: see `atoll_benches::peers`. Needs a C compiler and Rust 1.95.
@@ -10,6 +11,7 @@ use atoll_benches::peers::case::{Case, SceneName, Wishes};
 use atoll_benches::peers::report::{self, Row};
 use atoll_benches::peers::{Engine, Failure, Run, children, run};
 use clap::Parser;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -17,13 +19,16 @@ use std::time::Duration;
 #[derive(Debug, Parser)]
 #[command(name = "peers")]
 struct Cli {
-    /// Which scene.
+    /// A configuration or a scene's file.
+    #[arg(required_unless_present = "scene", conflicts_with = "scene")]
+    file: Option<PathBuf>,
+    /// One of the scenes that come with Atoll.
     #[arg(long, value_enum)]
-    scene: SceneName,
+    scene: Option<SceneName>,
     /// Dynamic bodies [default: the configuration's; pile 20000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     bodies: Option<u64>,
-    /// Steps of a run [default: 200; pile 600].
+    /// Steps of a run [default: 200; pile 600; those of the file].
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
     /// Threads of each engine.
@@ -66,9 +71,13 @@ fn case(cli: &Cli) -> Result<Case, Failure> {
         bodies: cli.bodies,
         steps: cli.steps,
         threads: Some(usize::from(cli.threads)),
-        tiles: cli.tiles.clone(),
+        tiles: cli.tiles.as_deref(),
     };
-    Case::new(cli.scene, &wishes)
+    match (&cli.file, cli.scene) {
+        (Some(path), _) => Case::read(path, wishes),
+        (None, Some(scene)) => Case::new(scene, wishes),
+        (None, None) => unreachable!("one of them is required"),
+    }
 }
 
 fn child(cli: &Cli, engine: Engine) -> Result<ExitCode, Failure> {

@@ -120,7 +120,7 @@ fn haff() -> Law {
 
 /// What all engines come to as steps get shorter.
 fn spins() -> Law {
-    let case = || Case::new(SceneName::Normal, &Wishes { bodies: Some(30_000), ..Wishes::default() });
+    let case = || Case::new(SceneName::Normal, Wishes { bodies: Some(30_000), ..Wishes::default() });
     Law {
         name: "30,000 bodies of NORMAL after 3.33 s: mean square spin; theory: the limit of short steps".to_owned(),
         theory: Box::new(move || 83.0),

@@ -185,8 +185,10 @@ fn create_dynamic(world: ffi::b2WorldId, body: &Body, kind: &Kind, params: &Para
         def.rotation = ffi::b2Rot { c: body.rotation.c, s: body.rotation.s };
         def.linearVelocity = ffi::b2Vec2 { x: body.velocity.x, y: body.velocity.y };
         def.angularVelocity = body.angular_velocity;
-        def.linearDamping = params.linear_damping;
-        def.angularDamping = params.angular_damping;
+        def.linearDamping = params.linear_damping + kind.dynamics.linear_damping;
+        def.angularDamping = params.angular_damping + kind.dynamics.angular_damping;
+        def.gravityScale = kind.dynamics.gravity_scale;
+        def.motionLocks.angularZ = kind.dynamics.fixed_rotation;
         def.enableSleep = false;
         let id = ffi::b2CreateBody(world, &def);
         create_shapes(id, kind);
@@ -203,6 +205,8 @@ fn create_shapes(body: ffi::b2BodyId, kind: &Kind) {
         def.density = density;
         def.material.friction = friction;
         def.material.restitution = restitution;
+        def.filter.categoryBits = kind.filter.categories.into();
+        def.filter.maskBits = kind.filter.mask.into();
         match kind.shape {
             Shape::Circle { radius } => {
                 let circle = ffi::b2Circle { center: ffi::b2Vec2 { x: 0.0, y: 0.0 }, radius };
@@ -217,6 +221,9 @@ fn create_shapes(body: ffi::b2BodyId, kind: &Kind) {
                     match corners[..] {
                         [center] => {
                             ffi::b2CreateCircleShape(body, &def, &ffi::b2Circle { center, radius });
+                        }
+                        [point1, point2] if radius == 0.0 => {
+                            ffi::b2CreateSegmentShape(body, &def, &ffi::b2Segment { point1, point2 });
                         }
                         [center1, center2] => {
                             ffi::b2CreateCapsuleShape(body, &def, &ffi::b2Capsule { center1, center2, radius });

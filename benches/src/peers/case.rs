@@ -1,12 +1,13 @@
-//! What is compared: a scene of the configurations, of a size, for a number of steps.
+//! What is compared: a scene of the configurations or of any file, of a size, for a number of steps.
 
 use super::Failure;
 use super::given::{Corners, Given};
-use ::atoll::Config;
+use ::atoll::{Config, Override};
 use ::atoll::internals::Plan;
 use ::atoll_core::{Blueprint, Body, GlobalId};
 use clap::ValueEnum;
 use std::fmt;
+use std::path::Path;
 
 /// A scene, by the name of its configuration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -72,8 +73,8 @@ impl fmt::Display for SceneName {
 /// A scene with everything that is asked of it.
 #[derive(Debug)]
 pub struct Case {
-    /// Its name.
-    pub scene: SceneName,
+    /// Its name, or that of its file.
+    pub scene: String,
     /// Steps to make; may be zero.
     pub steps: u64,
     /// Threads to make them on.
@@ -83,8 +84,8 @@ pub struct Case {
 }
 
 /// What the command line says about a case; the scene knows the rest.
-#[derive(Clone, Default, Debug)]
-pub struct Wishes {
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Wishes<'a> {
     /// How many dynamic bodies.
     pub bodies: Option<u64>,
     /// How many steps.
@@ -92,7 +93,7 @@ pub struct Wishes {
     /// How many threads; one if nothing is said.
     pub threads: Option<usize>,
     /// Atoll's columns and rows of tiles, as in a configuration.
-    pub tiles: Option<String>,
+    pub tiles: Option<&'a str>,
 }
 
 impl Case {
@@ -100,20 +101,51 @@ impl Case {
     ///
     /// # Errors
     /// If it cannot be read, or makes no world.
-    pub fn new(scene: SceneName, wishes: &Wishes) -> Result<Self, Failure> {
+    pub fn new(scene: SceneName, wishes: Wishes<'_>) -> Result<Self, Failure> {
         let path = format!("{}/../configs/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
-        let name = format!("configs/{scene}.toml");
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| Failure::refused(format!("{name}: {error}; run from a checkout that has this scene")))?;
+        let wishes = Wishes { bodies: wishes.bodies.or(scene.bodies()), ..wishes };
+        let case = Self::read(Path::new(&path), wishes)?;
+        Ok(Self { scene: scene.to_string(), steps: wishes.steps.unwrap_or_else(|| scene.steps()), ..case })
+    }
+
+    /// Reads a configuration, or a file of a scene.
+    ///
+    /// # Errors
+    /// If it cannot be read, makes no world, or has what only Atoll knows.
+    pub fn read(path: &Path, wishes: Wishes<'_>) -> Result<Self, Failure> {
         let threads = wishes.threads.unwrap_or(1);
-        let bodies = wishes.bodies.or(scene.bodies()).map(|bodies| bodies.to_string());
-        let threads_text = threads.to_string();
-        let mut overrides = vec![("ranks", "1"), ("threads", &threads_text), ("physics.sleep", "false")];
-        overrides.extend(bodies.as_deref().map(|bodies| ("bodies", bodies)));
-        overrides.extend(wishes.tiles.as_deref().map(|tiles| ("tiles", tiles)));
-        let config = Config::from_toml_str(&name, &text, &overrides).map_err(Failure::refused)?;
+        let mut overrides = vec![
+            Override::set("ranks", "1"),
+            Override::set("threads", &threads.to_string()),
+            Override::set("physics.sleep", "false"),
+        ];
+        overrides.extend(wishes.bodies.map(|bodies| Override::set("bodies", &bodies.to_string())));
+        overrides.extend(wishes.tiles.map(|tiles| Override::set("tiles", tiles)));
+        let config = Config::load(path, &overrides).map_err(Failure::refused)?;
         let plan = Plan::new(&config).map_err(Failure::refused)?;
-        Ok(Self { scene, steps: wishes.steps.unwrap_or_else(|| scene.steps()), threads, plan })
+        // Nobody asks again whether they can be read.
+        plan.scene.iter().try_for_each(|body| body.map(drop)).map_err(Failure::refused)?;
+        let scene = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let case = Self { scene, steps: wishes.steps.unwrap_or(config.run.steps), threads, plan };
+        case.check().map(|()| case)
+    }
+
+    /// Refuses what the other engines do not have, or have in another way.
+    fn check(&self) -> Result<(), Failure> {
+        let blueprint = &self.plan.blueprint;
+        let kinds = || blueprint.kinds.iter().chain(blueprint.statics.iter().map(|fixed| &fixed.kind));
+        let unlike = [
+            (kinds().any(|kind| kind.sensor), "sensors"),
+            (kinds().any(|kind| kind.material.surface_speed != 0.0), "surfaces that move"),
+            (kinds().any(|kind| kind.filter.group != 0), "groups of bodies"),
+        ];
+        match unlike.iter().find(|(has, _)| *has) {
+            None => Ok(()),
+            Some((_, what)) => Err(Failure::refused(format!(
+                "{} has {what}, which not every engine knows, or not alike; leave them out",
+                self.scene
+            ))),
+        }
     }
 }
 
@@ -123,10 +155,11 @@ impl Given for Case {
     }
 
     fn bodies(&self) -> impl Iterator<Item = Body> {
-        self.plan.scene.iter().map(|body| body.expect("scenes of this crate are made, not read"))
+        self.plan.scene.iter().map(|body| body.expect("read before"))
     }
 
     fn home(&self, index: u64) -> Corners {
+        // Those in files have any names, and one home.
         let id = GlobalId(self.plan.scene.statics().len() as u64 + index);
         let (low, high) = self.plan.scene.home(id).expect("one of this scene");
         [low.to_array(), high.to_array()]

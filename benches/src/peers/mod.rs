@@ -1,4 +1,4 @@
-//! One scene, body for body, in Atoll, in Box2D v3 and in rapier2d: program `peers`.
+//! One scene, or any world of yours, body for body, in Atoll, in Box2D v3 and in rapier2d: program `peers`.
 //!
 //! Every run is a process of its own, the engines take turns, and the figures are medians. The clock measures steps
 //! alone; the memory is the process's peak after the last step. Then the final bodies of every engine go into a fresh
@@ -6,13 +6,14 @@
 //!
 //! # What is set alike
 //!
-//! Bodies, walls, shapes, density, friction, restitution and their mixing rules; gravity, length of a step, substeps;
+//! Bodies, walls, shapes, density, friction, restitution and their mixing rules; gravity and damping, also of single kinds,
+//! who never turns, categories and masks; length of a step, substeps;
 //! stiffness and damping of contacts (twice the stiffness against walls, which is Box2D's and rapier's own rule); the
 //! speed of pushing out; linear and angular damping; no sleep; no continuous collision.
 //!
 //! # What each engine keeps
 //!
-//! - **Atoll**: `f64` positions; the tiles and the exchange of the configuration. All tiles are in one process, and no
+//! - **Atoll**: `f64` positions; segments are solid from one side, those of the others from both; the tiles and the exchange of the configuration. All tiles are in one process, and no
 //!   transport is between them.
 //! - **Box2D**: its cap of 400 m/s, its turn of at most an eighth a step, its margins, `f32` positions; its AVX2 kernels,
 //!   compiled by the C compiler at `-O3`. More threads are its own scheduler's. It counts a solver block's bodies in 16

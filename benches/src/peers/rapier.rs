@@ -2,11 +2,11 @@
 
 use super::Simulation;
 use super::given::Given;
-use ::atoll_core::{Body, Kind, Params, Rot, Shape, StaticBody};
+use ::atoll_core::{Body, Dynamics, Kind, Params, Rot, Shape, StaticBody};
 use glam::Vec2;
 use rapier2d::dynamics::SpringCoefficients;
 use rapier2d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, Pose, RigidBodyBuilder,
+    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode, PhysicsWorld, Pose, RigidBodyBuilder,
     RigidBodyHandle, SharedShape, Vector,
 };
 
@@ -46,16 +46,20 @@ impl<'a, W: Given> Simulated<'a, W> {
             driven.extend(fixed.path.map(|_| (handle, fixed)));
         }
         let place = |body: Body| {
+            let kind = &blueprint.kinds[body.kind.0 as usize];
+            let Dynamics { gravity_scale, linear_damping, angular_damping, fixed_rotation } = kind.dynamics;
             let dynamic = RigidBodyBuilder::dynamic()
                 .translation(Vector::new(body.position.x as f32, body.position.y as f32))
                 .rotation(body.rotation.angle())
                 .linvel(Vector::new(body.velocity.x, body.velocity.y))
                 .angvel(body.angular_velocity)
-                .linear_damping(params.linear_damping)
-                .angular_damping(params.angular_damping)
+                .linear_damping(params.linear_damping + linear_damping)
+                .angular_damping(params.angular_damping + angular_damping)
+                .gravity_scale(gravity_scale)
                 .can_sleep(false)
                 .ccd_enabled(false);
-            world.insert(dynamic, collider(&blueprint.kinds[body.kind.0 as usize])).0
+            let dynamic = if fixed_rotation { dynamic.lock_rotations() } else { dynamic };
+            world.insert(dynamic, collider(kind)).0
         };
         let handles = given.bodies().map(place).collect();
         Self { world, given, handles, driven, step: 0 }
@@ -88,7 +92,11 @@ fn collider(kind: &Kind) -> ColliderBuilder {
             }
         }
     };
+    let group = |bits: u32| Group::from_bits_retain(bits);
+    let groups =
+        InteractionGroups::new(group(kind.filter.categories), group(kind.filter.mask), InteractionTestMode::And);
     shape
+        .collision_groups(groups)
         .density(kind.material.density)
         .friction(kind.material.friction)
         .friction_combine_rule(CoefficientCombineRule::GeometricMean)
@@ -101,6 +109,7 @@ fn part((corners, radius): &(Vec<Vec2>, f32)) -> (Pose, SharedShape) {
     let corners: Vec<Vector> = corners.iter().map(|corner| Vector::new(corner.x, corner.y)).collect();
     match corners[..] {
         [center] => (Pose::from_translation(center), SharedShape::ball(*radius)),
+        [from, to] if *radius == 0.0 => (Pose::IDENTITY, SharedShape::segment(from, to)),
         [from, to] => (Pose::IDENTITY, SharedShape::capsule(from, to, *radius)),
         _ => {
             let hull = SharedShape::round_convex_hull(&corners, *radius);

@@ -42,7 +42,7 @@ impl Row {
         Some(Self {
             engine: engine.to_string(),
             engine_version: first.engine_version.clone(),
-            scene: case.scene.to_string(),
+            scene: case.scene.clone(),
             bodies: case.plan.scene.bodies(),
             steps: case.steps,
             threads: case.threads,
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn rows_have_medians_and_the_table_ratios() {
         let wishes = Wishes { bodies: Some(500), ..Wishes::default() };
-        let case = Case::new(SceneName::Normal, &wishes).unwrap();
+        let case = Case::new(SceneName::Normal, wishes).unwrap();
         assert_eq!(Row::new(Engine::Atoll, &case, &[]), None);
         let atoll = Row::new(Engine::Atoll, &case, &[run(4.0, 10_000_000), run(1.0, 10_000_000), run(2.0, 10_000_000)]);
         let box2d = Row::new(Engine::Box2d, &case, &[run(3.0, 25_000_000)]);

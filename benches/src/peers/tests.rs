@@ -6,7 +6,7 @@ const ENGINES: [Engine; 3] = [Engine::Atoll, Engine::Box2d, Engine::Rapier];
 
 fn case(scene: SceneName, bodies: u64, steps: u64, threads: usize) -> Case {
     let wishes = Wishes { bodies: Some(bodies), steps: Some(steps), threads: Some(threads), tiles: None };
-    Case::new(scene, &wishes).unwrap()
+    Case::new(scene, wishes).unwrap()
 }
 
 /// Differs from `b` by at most this part of it.
