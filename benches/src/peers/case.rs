@@ -2,8 +2,8 @@
 
 use super::Failure;
 use super::given::{Corners, Given};
-use ::atoll::{Config, Override};
 use ::atoll::internals::Plan;
+use ::atoll::{Config, Override};
 use ::atoll_core::{Blueprint, Body, GlobalId};
 use clap::ValueEnum;
 use std::fmt;

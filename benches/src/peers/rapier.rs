@@ -6,8 +6,8 @@ use ::atoll_core::{Body, Dynamics, Kind, Params, Rot, Shape, StaticBody};
 use glam::Vec2;
 use rapier2d::dynamics::SpringCoefficients;
 use rapier2d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode, PhysicsWorld, Pose, RigidBodyBuilder,
-    RigidBodyHandle, SharedShape, Vector,
+    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode,
+    PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, SharedShape, Vector,
 };
 
 /// The version of rapier2d.

@@ -102,8 +102,9 @@ pub struct BorderPoint {
     pub normal: f32,
     /// The last substep's impulse along the tangent, in N s.
     pub tangent: f32,
-    /// Zero.
-    pub padding: u32,
+    /// Speed of the fastest blow that its contact gives back or passes on as the sender knows it, in m/s; less than zero if it does not
+    /// bounce.
+    pub blow: f32,
 }
 
 impl BorderPoint {
@@ -113,6 +114,6 @@ impl BorderPoint {
         total_tangent: 0.0,
         normal: 0.0,
         tangent: 0.0,
-        padding: 0,
+        blow: -1.0,
     };
 }

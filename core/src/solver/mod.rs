@@ -167,8 +167,15 @@ impl Solver {
         let source = Source { tile, contacts, bodies: &self.bodies, setup };
         self.groups.write_kept(&self.batches, source, team);
         if setup.bouncy {
-            self.groups.find_bounces(&self.batches, source);
+            self.groups.find_bounces(&self.batches, source, &[]);
         }
+    }
+
+    /// Finds anew what bounces, with blows that come to contacts from other tiles, each with its speed in m/s: whatever they would go on
+    /// to here is to wait for them.
+    pub(crate) fn pass_on(&mut self, tile: &Tile, contacts: &Contacts, heard: &[(u32, f32)], setup: &Setup) {
+        let source = Source { tile, contacts, bodies: &self.bodies, setup };
+        self.groups.find_bounces(&self.batches, source, heard);
     }
 
     /// How many batches there are.

@@ -43,4 +43,4 @@ layout!(MigrantRecord { body: 0, rested: 48, padding: 52 } 56);
 layout!(GhostRecord { body: 0, unseen: 48, rested: 60 } 64);
 layout!(GhostRefresh { id: 0, velocity: 8, pose: 20, unseen: 36 } 48);
 layout!(BorderImpulse { low: 0, high: 8, points: 16 } 64);
-layout!(BorderPoint { feature: 0, total_normal: 4, total_tangent: 8, normal: 12, tangent: 16, padding: 20 } 24);
+layout!(BorderPoint { feature: 0, total_normal: 4, total_tangent: 8, normal: 12, tangent: 16, blow: 20 } 24);

@@ -320,7 +320,9 @@ fn agree(bench: &mut Bench<'_>) {
 
 fn average(bench: &mut Bench<'_>, bounced: bool) {
     let work = &mut *bench.work;
-    work.border.average(bench.tile, &mut work.solver, bench.mail, bounced);
+    if work.border.average(bench.tile, &mut work.solver, bench.mail, bounced) {
+        work.solver.pass_on(bench.tile, &work.contacts, work.border.heard(), bench.setup);
+    }
 }
 
 /// Completes the report of a step, and the step.

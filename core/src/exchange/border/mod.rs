@@ -12,6 +12,7 @@ use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::record::{BorderImpulse, BorderPoint, GhostRefresh, Unseen};
 use crate::model::contact::{Contact, ContactCache, ContactPoint, PairKey, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
+use crate::model::math::max;
 use crate::solver::Solver;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::{Fault, Tile};
@@ -48,6 +49,8 @@ pub(crate) struct Border {
     contact_order: Vec<u32>,
     /// For every owned body the range of its `sends`; all empty between steps.
     sends_of: Vec<(u32, u32)>,
+    /// See [`heard`](Self::heard).
+    heard: Vec<(u32, f32)>,
     near: Near,
     /// The contacts of ghosts, and of bodies that are near to other tiles.
     outer: Vec<u32>,
@@ -87,6 +90,7 @@ impl Border {
         self.feeds.clear();
         self.ghosts.clear();
         self.contacts.clear();
+        self.heard.clear();
         let own = tile.contacts.own();
         self.scratch = own as u32..tile.contacts.len() as u32;
         self.near.find(tile, setup);
@@ -278,8 +282,10 @@ impl Border {
     }
 
     /// Moves both copies of every border contact to their mean, or to the lesser one where bodies go far, and of those that `bounced`.
-    /// Points that only one side has are left alone, as are contacts that one side sleeps through.
-    pub(crate) fn average(&mut self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, bounced: bool) {
+    /// Points that only one side has are left alone, as are contacts that one side sleeps through. Returns whether the other tiles
+    /// told of blows that this one did not know of: see [`heard`](Self::heard).
+    pub(crate) fn average(&mut self, tile: &mut Tile, solver: &mut Solver, mail: Mail<'_>, bounced: bool) -> bool {
+        let before = self.heard.len();
         for impulse in mail.messages().flat_map(|message| message.impulses) {
             let pair = (impulse.low, impulse.high);
             // One for each two pieces of the pair that touch; features tell them apart.
@@ -293,10 +299,21 @@ impl Border {
                     continue;
                 }
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
-                    solver.move_together(&tile.contacts, border, totals, theirs, bounced);
+                    let is_known = solver.move_together(&tile.contacts, border, totals, theirs, bounced);
+                    if is_known && theirs.blow > max(solver.groups.blow(border.contact), 0.0) {
+                        self.heard.push((border.contact, theirs.blow));
+                    }
                 }
             }
         }
+        self.heard.sort_unstable_by_key(|(contact, _)| *contact);
+        self.heard.len() > before
+    }
+
+    /// Blows that come to border contacts from the other side, as far as told in this step: the contact, ascending, and the speed of
+    /// the blow in m/s.
+    pub(crate) fn heard(&self) -> &[(u32, f32)] {
+        &self.heard
     }
 }
 
@@ -335,13 +352,15 @@ impl Solver {
     fn border_points(&self, contacts: &ContactCache, contact: u32, totals: &[[f32; 2]; 2]) -> [BorderPoint; 2] {
         let known = &contacts.contacts[contact as usize];
         let (points, count) = (&known.points, known.point_count());
+        let blow = self.groups.blow(contact);
         std::array::from_fn(|k| {
             let [normal, tangent] = if k < count { self.groups.impulses(contact, k) } else { [0.0; 2] };
             let ([total_normal, total_tangent], feature) = (totals[k], points[k].feature);
-            BorderPoint { feature, total_normal, total_tangent, normal, tangent, ..BorderPoint::NONE }
+            BorderPoint { feature, total_normal, total_tangent, normal, tangent, blow }
         })
     }
 
+    /// Whether the contact has that point.
     fn move_together(
         &mut self,
         contacts: &ContactCache,
@@ -349,30 +368,29 @@ impl Solver {
         totals: &mut [[f32; 2]; 2],
         theirs: &BorderPoint,
         bounced: bool,
-    ) {
+    ) -> bool {
         let BorderContact { contact, owns_a, far, .. } = *border;
         // Each owner may know others with whom its body bounces, or whom it meets first. The lesser impulse is the one that is sure:
-        // it gives nobody more energy than there was.
+        // it gives nobody more energy than there was. Where one owner alone sees the blow both take the lesser, or there would be momentum
+        // that nobody had.
         let may_bounce = self.groups.may_bounce(contact);
-        let lesser = far || bounced && may_bounce;
+        let lesser = far || bounced && (may_bounce || theirs.blow >= 0.0);
         let points = contacts.contacts[contact as usize].points();
-        if let Some(k) = points.iter().position(|point| point.feature == theirs.feature) {
-            let ([normal, tangent], now) = (totals[k], self.groups.impulses(contact, k));
-            // Both owners must come to the same: of equal ones that of body A's.
-            let (less, equal) = (theirs.total_normal < normal, theirs.total_normal == normal);
-            let theirs_counts = less || equal && !owns_a;
-            let common = |mine: f32, theirs: f32| match (lesser, theirs_counts) {
-                (false, _) => 0.5 * (mine + theirs),
-                (true, true) => theirs,
-                (true, false) => mine,
-            };
-            let total = [common(normal, theirs.total_normal), common(tangent, theirs.total_tangent)];
-            self.apply_impulse(contact, k, owns_a, total[0] - normal, total[1] - tangent);
-            totals[k] = total;
-            if may_bounce {
-                self.groups.set_totals(contact, k, total);
-            }
-            self.groups.set_impulses(contact, k, [common(now[0], theirs.normal), common(now[1], theirs.tangent)]);
-        }
+        let Some(k) = points.iter().position(|point| point.feature == theirs.feature) else { return false };
+        let ([normal, tangent], now) = (totals[k], self.groups.impulses(contact, k));
+        // Both owners must come to the same: of equal ones that of body A's.
+        let (less, equal) = (theirs.total_normal < normal, theirs.total_normal == normal);
+        let theirs_counts = less || equal && !owns_a;
+        let common = |mine: f32, theirs: f32| match (lesser, theirs_counts) {
+            (false, _) => 0.5 * (mine + theirs),
+            (true, true) => theirs,
+            (true, false) => mine,
+        };
+        let total = [common(normal, theirs.total_normal), common(tangent, theirs.total_tangent)];
+        self.apply_impulse(contact, k, owns_a, total[0] - normal, total[1] - tangent);
+        totals[k] = total;
+        self.groups.set_totals(contact, k, total);
+        self.groups.set_impulses(contact, k, [common(now[0], theirs.normal), common(now[1], theirs.tangent)]);
+        true
     }
 }

@@ -27,8 +27,8 @@ pub(crate) struct Groups {
     pub(super) lanes: Vec<Lane>,
     /// Contacts that may bounce, of batches that keep their rows.
     pub(super) bounces: Vec<Bounce>,
-    /// These contacts, ascending.
-    pub(super) bouncing: Vec<u32>,
+    /// These contacts, ascending, each with the speed of the blow that it gives back or passes on, in m/s.
+    pub(super) bouncing: Vec<(u32, f32)>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
     /// For each body whether something held it as the step began, where that was asked.
@@ -46,6 +46,8 @@ pub(crate) struct Bounce {
     pub(super) contact: u32,
     /// Speed at which the faster of its points comes in, in m/s.
     pub(super) closing: f32,
+    /// Speed of the fastest blow that it gives back or passes on, in m/s; zero if it only holds.
+    pub(super) blow: f32,
     /// Whether one of the two never moves.
     pub(super) off_static: bool,
     /// Of each point.

@@ -29,8 +29,9 @@ const PASSED_ON: f32 = 4.0;
 const STILL: f32 = 4.0;
 
 impl Groups {
-    /// Finds the contacts that may bounce, in the order in which they do in each batch.
-    pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>) {
+    /// Finds the contacts that may bounce, in the order in which they do in each batch; with blows that come from elsewhere: the
+    /// contact, ascending, and the speed in m/s.
+    pub(crate) fn find_bounces(&mut self, batches: &Batches, source: Source<'_>, heard: &[(u32, f32)]) {
         self.bounces.clear();
         self.bouncing.clear();
         self.bounces_at_once.clear();
@@ -55,16 +56,16 @@ impl Groups {
                 self.add_bounce(i, (fastest, answers), kinds, batches);
             }
         }
-        if self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
+        if !heard.is_empty() || self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
             self.leave_held(source);
-            self.leave_unstruck(source);
+            self.leave_unstruck(source, heard);
             self.hold_beside(batches, source);
         } else {
             self.bounces.clear();
             self.bounces_at_once.clear();
         }
-        self.bouncing.extend(self.bounces.iter().map(|bounce| bounce.contact));
-        self.bouncing.sort_unstable();
+        self.bouncing.extend(self.bounces.iter().map(|bounce| (bounce.contact, bounce.blow)));
+        self.bouncing.sort_unstable_by_key(|(contact, _)| *contact);
         let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
             // By names: then both tiles that solve a contact at their border come to the same, if they know the same.
@@ -89,7 +90,7 @@ impl Groups {
         let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
         let at_once = batches.of_body(self.lanes[contact].base as usize).at_once;
         let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-        bounces.push(Bounce { contact: contact as u32, closing, off_static, answers });
+        bounces.push(Bounce { contact: contact as u32, closing, blow: 0.0, off_static, answers });
     }
 
     /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would
@@ -140,7 +141,7 @@ impl Groups {
     /// lies on him. Passed on, that would come as slowly in each step, and be stopped as often.
     ///
     /// What only holds is left out of it all, but beside what parts or passes on.
-    fn leave_unstruck(&mut self, source: Source<'_>) {
+    fn leave_unstruck(&mut self, source: Source<'_>, heard: &[(u32, f32)]) {
         let Self { bounces, bounces_at_once, on, struck, .. } = self;
         let moving = |bounce: &Bounce| source.moving(bounce.contact as usize);
         on.clear();
@@ -160,17 +161,26 @@ impl Groups {
                 *fastest = max(*fastest, bounce.closing);
             }
         }
-        let mut blow = |bounce: &Bounce| moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
+        for bounce in bounces.iter().filter(|bounce| bounce.passes_on()) {
+            let first = heard.partition_point(|(contact, _)| *contact < bounce.contact);
+            let of_contact = heard[first..].iter().take_while(|(contact, _)| *contact == bounce.contact);
+            if let Some(speed) = of_contact.map(|(_, speed)| *speed).reduce(max) {
+                moving(bounce).for_each(|body| {
+                    let fastest = &mut struck[root_of(on, body) as usize].1;
+                    *fastest = max(*fastest, speed);
+                });
+            }
+        }
         for bounces in [&mut *bounces, &mut *bounces_at_once] {
-            leave(bounces, |bounce| blow(bounce) == 0.0);
-            for bounce in bounces.iter_mut().filter(|bounce| bounce.passes_on()) {
-                let fastest = blow(bounce);
+            for bounce in bounces.iter_mut().filter(|bounce| bounce.parts() || bounce.passes_on()) {
+                bounce.blow = moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
                 for answer in &mut bounce.answers {
                     if let Answer::NotYet(passing) = answer {
-                        passing.most = PASSED_ON * fastest;
+                        passing.most = PASSED_ON * bounce.blow;
                     }
                 }
             }
+            leave(bounces, |bounce| bounce.blow == 0.0);
         }
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
             moving(bounce).for_each(|body| struck[body as usize].0 = true);
@@ -182,7 +192,13 @@ impl Groups {
 
     /// Whether a contact whose batch keeps its rows is among those.
     pub(crate) fn may_bounce(&self, contact: u32) -> bool {
-        self.bouncing.binary_search(&contact).is_ok()
+        self.blow(contact) >= 0.0
+    }
+
+    /// Speed of the blow that such a contact gives back or passes on, in m/s; less than zero if it does not bounce.
+    pub(crate) fn blow(&self, contact: u32) -> f32 {
+        let place = self.bouncing.binary_search_by_key(&contact, |(contact, _)| *contact);
+        place.map_or(-1.0, |place| self.bouncing[place].1)
     }
 
     /// Bounces of all batches that keep their rows.
