@@ -106,14 +106,3 @@ pub struct BorderPoint {
     /// bounce.
     pub blow: f32,
 }
-
-impl BorderPoint {
-    pub(crate) const NONE: Self = Self {
-        feature: crate::model::contact::ContactPoint::ABSENT,
-        total_normal: 0.0,
-        total_tangent: 0.0,
-        normal: 0.0,
-        tangent: 0.0,
-        blow: -1.0,
-    };
-}

@@ -2,6 +2,7 @@
 
 use super::bounce::Answer;
 use super::columns::{Color, Columns, Each, Members, Slices, lengths};
+use super::energies::Energies;
 use super::group::{PointRows, Sides, Totals};
 use crate::model::contact::Contact;
 use crate::model::math::{clamp, max};
@@ -31,6 +32,8 @@ pub(crate) struct Groups {
     pub(super) bouncing: Vec<(u32, f32)>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
+    /// What bounces may have.
+    pub(super) energies: Energies,
     /// For each body whether something held it as the step began, where that was asked.
     pub(super) held: Vec<Option<bool>>,
     /// For each body a lower one that a blow may go on to, or come from, or itself.

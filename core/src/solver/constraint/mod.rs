@@ -8,11 +8,14 @@
 //! | `rows.rs` | how rows are made of contacts |
 //! | `kernels.rs` | what passes do to a group |
 //! | `groups.rs` | all of a tile's; how to find that of a contact |
-//! | `restitution.rs` | bounces |
+//! | `restitution.rs` | what bounces, and in which order |
+//! | `bounce.rs` | the bounce of one contact |
+//! | `energies.rs` | that bounces give no energy that nobody had |
 
 mod bounce;
 #[allow(unsafe_code)]
 pub(crate) mod columns;
+mod energies;
 pub(crate) mod group;
 pub(crate) mod groups;
 pub(crate) mod kernels;

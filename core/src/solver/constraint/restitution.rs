@@ -8,6 +8,7 @@ use crate::islands::union_find::{join, root_of};
 use crate::model::kind::KindRow;
 use crate::model::math::{dot, max, min, right_perp, turn};
 use crate::model::params::Exchange;
+use crate::parallel::lanes::Quad;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
 use glam::Vec2;
@@ -35,6 +36,7 @@ impl Groups {
         self.bounces.clear();
         self.bouncing.clear();
         self.bounces_at_once.clear();
+        self.energies.clear();
         let threshold = source.setup.params.restitution_threshold;
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let kinds = source.kinds_of(i);
@@ -50,7 +52,8 @@ impl Groups {
                     } else if source.holds(i, point, closing) {
                         Answer::Hold
                     } else {
-                        Answer::NotYet(Passing { least: SURELY * max(closing, 0.0) + source.fall(i), most: 0.0 })
+                        let least = SURELY * max(closing, 0.0) + source.fall(i);
+                        Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
                     };
                 }
                 self.add_bounce(i, (fastest, answers), kinds, batches);
@@ -76,8 +79,11 @@ impl Groups {
         let first = |bounce: &Bounce, other: &Bounce| other.closing.total_cmp(&bounce.closing);
         self.bounces.sort_by(first);
         self.bounces_at_once.sort_by(first);
-        let lanes = &self.lanes;
-        self.bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+        let Self { bounces, bounces_at_once, lanes, energies, on, .. } = self;
+        bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+        if !(bounces.is_empty() && bounces_at_once.is_empty()) {
+            energies.find([bounces, bounces_at_once], lanes, on, source);
+        }
     }
 
     fn add_bounce(
@@ -134,7 +140,17 @@ impl Groups {
             }
         }
         let is_held = |bounce: &Bounce| sides(bounce.contact as usize).iter().any(|&body| held[body] == Some(true));
-        [bounces, bounces_at_once].into_iter().for_each(|bounces| leave(bounces, is_held));
+        for bounce in bounces.iter_mut().chain(bounces_at_once).filter(|bounce| is_held(bounce)) {
+            for answer in &mut bounce.answers {
+                if let Answer::NotYet(passing) = answer {
+                    if passing.most > source.fall(bounce.contact as usize) {
+                        passing.held = true
+                    } else {
+                        *answer = Answer::Hold
+                    }
+                }
+            }
+        }
     }
 
     /// And those that no blow comes to, from one to the next, from where something comes in fast: who comes slowly is stopped, with all that
@@ -175,7 +191,7 @@ impl Groups {
             for bounce in bounces.iter_mut().filter(|bounce| bounce.parts() || bounce.passes_on()) {
                 bounce.blow = moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
                 for answer in &mut bounce.answers {
-                    if let Answer::NotYet(passing) = answer {
+                    if let Answer::NotYet(passing @ Passing { held: false, .. }) = answer {
                         passing.most = PASSED_ON * bounce.blow;
                     }
                 }
@@ -203,17 +219,20 @@ impl Groups {
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, lanes, kept, .. } = self;
-        bounce(bounces, lanes, kept, bodies);
+        let Self { bounces, lanes, kept, energies, .. } = self;
+        energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity));
     }
 
     /// Bounces of a batch that is solved at once.
     pub(crate) fn apply_restitution_at_once(&mut self, batch: &Batch, bodies: &mut SolverBodies) {
-        let Self { bounces_at_once: bounces, lanes, at_once, .. } = self;
+        let Self { bounces_at_once: bounces, lanes, at_once, energies, .. } = self;
         let before =
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
-        bounce(&bounces[own], lanes, at_once, bodies);
+        let bounces = &bounces[own];
+        energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
+            bounce(bounces, lanes, rows, velocity);
+        });
     }
 }
 
@@ -244,12 +263,12 @@ impl Answer {
 /// speeds that both want after several, and off two statics with normals that are nearly one after many, which are few contacts. An
 /// impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and after. So with
 /// restitution 1 nothing is lost or gained where each point parts as fast as it came.
-fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, bodies: &mut SolverBodies) {
+fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &mut [Quad]) {
     let mut pass = |bounce: &Bounce| {
         let at = lanes[bounce.contact as usize];
         let (sides, points, totals, lane) = at.totals_mut(columns);
         let least = EXACT * bounce.closing;
-        sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(&mut bodies.velocity))
+        sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(velocity))
     };
     let mut acts = |bounces: &mut dyn Iterator<Item = &Bounce>| bounces.fold(false, |acts, bounce| pass(bounce) | acts);
     if (0..PASSES).all(|_| acts(&mut bounces.iter())) {
@@ -263,7 +282,7 @@ impl<'a> Source<'a> {
     }
 
     /// Those of its bodies that are no statics.
-    fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
+    pub(super) fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
         let sides = self.contacts.bodies[contact].into_iter().zip(self.kinds_of(contact));
         sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
     }

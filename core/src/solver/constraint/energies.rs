@@ -1,0 +1,216 @@
+//! No more energy than there was: what bodies may have that bounce off each other at once.
+//!
+//! One contact alone gives back no more than it takes. Of several at once that can be more, where what pressed at one of them was a blow
+//! from another within the step: as the step began its bodies moved apart, and by `energy = impulse * (speed apart before + after) / 2` it
+//! gives what nobody had. In columns that fall and bounce that came to many times the energy of the fall. So bodies in contacts that
+//! bounce, one next to the other, go from where the solver left them only as far towards what bounces make of them as they keep to the energy of
+//! motion that they came with. Impulses do so too, and momentum is what it was.
+
+use super::columns::Columns;
+use super::groups::{Bounce, Lane};
+use super::rows::Source;
+use crate::islands::union_find::{join, root_of};
+use crate::model::params::Ghosts;
+use crate::parallel::lanes::Quad;
+use crate::solver::batches::Batch;
+use crate::solver::bodies::SolverBodies;
+use std::ops::Range;
+
+/// How far rounding may be beyond, as a part.
+const ROUNDING: f64 = 1e-6;
+
+/// Bodies of contacts that bounce, and what they may have.
+#[derive(Default, Debug)]
+pub(super) struct Energies {
+    /// Of batches that keep their rows, and of those that are solved at once, batch by batch.
+    kept: Vec<Cluster>,
+    at_once: Vec<Cluster>,
+    /// Of the clusters, one after the other: bodies, and contacts.
+    bodies: Vec<Faller>,
+    contacts: Vec<u32>,
+    /// What the solver left: velocities of the bodies, and at each contact's points the impulses along normal and tangent.
+    solved: Vec<Quad>,
+    pressed: Vec<[[f32; 2]; 2]>,
+    /// Buffers: contacts, each with where its batch and its cluster begin; and bodies of a cluster.
+    sorted: Vec<(u32, u32, u32)>,
+    moving: Vec<u32>,
+}
+
+/// A body, and what gravity does to it.
+#[derive(Debug)]
+struct Faller {
+    /// Its place among the solver's bodies.
+    place: u32,
+    /// Its weight by the root of its mass.
+    weight: [f32; 2],
+}
+
+/// Two contacts or more, each of which shares a body with another.
+#[derive(Debug)]
+struct Cluster {
+    /// Where the bodies of its batch begin.
+    base: u32,
+    bodies: Range<usize>,
+    contacts: Range<usize>,
+    /// Twice the energy of motion of its bodies as the step begins, in J.
+    twice_energy: f64,
+}
+
+/// Twice the energy of motion of a body whose velocity is mass-weighted.
+fn twice_energy([x, y, w, _]: Quad) -> f64 {
+    product([x, y, w, 0.0], [x, y, w, 0.0])
+}
+
+fn product(a: Quad, b: Quad) -> f64 {
+    (0..3).map(|k| f64::from(a[k]) * f64::from(b[k])).sum()
+}
+
+impl Energies {
+    pub(super) fn clear(&mut self) {
+        self.kept.clear();
+        self.at_once.clear();
+    }
+
+    /// Finds the clusters among contacts that bounce; `on` is a buffer.
+    pub(super) fn find(&mut self, bounces: [&[Bounce]; 2], lanes: &[Lane], on: &mut Vec<u32>, source: Source<'_>) {
+        self.clear();
+        self.bodies.clear();
+        self.contacts.clear();
+        on.clear();
+        on.extend(0..source.tile.bodies.len() as u32);
+        for bounce in bounces.into_iter().flatten() {
+            let mut moving = source.moving(bounce.contact as usize);
+            if let (Some(one), Some(other)) = (moving.next(), moving.next()) {
+                join(on, [one, other]);
+            }
+        }
+        for (bounces, at_once) in bounces.into_iter().zip([false, true]) {
+            self.sorted.clear();
+            for contact in bounces.iter().map(|bounce| bounce.contact) {
+                let body = source.moving(contact as usize).next().expect("one of a contact's bodies moves");
+                self.sorted.push((lanes[contact as usize].base, root_of(on, body), contact));
+            }
+            self.sorted.sort_unstable();
+            let clusters = if at_once { &mut self.at_once } else { &mut self.kept };
+            for cluster in self.sorted.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1)) {
+                let among = || cluster.iter().map(|(.., contact)| *contact as usize);
+                if cluster.len() == 1 || among().any(|contact| source.is_driven(contact)) {
+                    continue;
+                }
+                let (first_body, first_contact) = (self.bodies.len(), self.contacts.len());
+                self.contacts.extend(cluster.iter().map(|(.., contact)| contact));
+                self.moving.clear();
+                self.moving.extend(among().flat_map(|contact| source.moving(contact)));
+                self.moving.sort_unstable();
+                self.moving.dedup();
+                let twice_energy = self.moving.iter().map(|&body| source.twice_energy(body as usize)).sum();
+                self.bodies.extend(self.moving.iter().map(|&body| source.faller(body as usize)));
+                let (bodies, contacts) = (first_body..self.bodies.len(), first_contact..self.contacts.len());
+                clusters.push(Cluster { base: cluster[0].0, bodies, contacts, twice_energy });
+            }
+        }
+    }
+
+    /// Has all batches that keep their rows, or one that is solved at once, bounce, within what its bodies may have.
+    pub(super) fn keep(
+        &mut self,
+        at_once: Option<&Batch>,
+        lanes: &[Lane],
+        columns: &mut Columns,
+        solver: &mut SolverBodies,
+        bounce: impl FnOnce(&mut Columns, &mut [Quad]),
+    ) {
+        let Self { kept, at_once: others, bodies, contacts, solved, pressed, .. } = self;
+        let clusters = match at_once {
+            None => &kept[..],
+            Some(batch) => {
+                let before = |place: usize| others.partition_point(|cluster| (cluster.base as usize) < place);
+                &others[before(batch.bodies.start)..before(batch.bodies.end)]
+            }
+        };
+        solved.clear();
+        pressed.clear();
+        for cluster in clusters {
+            solved.extend(bodies[cluster.bodies.clone()].iter().map(|body| solver.velocity[body.place as usize]));
+            pressed.extend(contacts[cluster.contacts.clone()].iter().map(|&contact| {
+                let (_, _, totals, lane) = lanes[contact as usize].totals_mut(columns);
+                std::array::from_fn(|k| totals.get(k).map_or([0.0; 2], |totals| totals.of(lane)))
+            }));
+        }
+        bounce(columns, &mut solver.velocity);
+        let (mut solved, mut pressed) = (&solved[..], &pressed[..]);
+        for cluster in clusters {
+            let (bodies, contacts) = (&bodies[cluster.bodies.clone()], &contacts[cluster.contacts.clone()]);
+            let (solved, pressed) = (
+                solved.split_off(..bodies.len()).expect("one for each body"),
+                pressed.split_off(..contacts.len()).expect("one for each contact"),
+            );
+            let Some(part) = part(cluster.twice_energy, bodies, solved, solver) else { continue };
+            let blend = |from: f32, to: f32| from + part * (to - from);
+            for (body, from) in bodies.iter().zip(solved) {
+                let to = &mut solver.velocity[body.place as usize];
+                (0..3).for_each(|k| to[k] = blend(from[k], to[k]));
+            }
+            for (&contact, from) in contacts.iter().zip(pressed) {
+                let (_, _, totals, lane) = lanes[contact as usize].totals_mut(columns);
+                for (totals, from) in totals.iter_mut().zip(from) {
+                    totals.normal[lane] = blend(from[0], totals.normal[lane]);
+                    totals.tangent[lane] = blend(from[1], totals.tangent[lane]);
+                }
+            }
+        }
+    }
+}
+
+/// How far bodies may go from where the solver left them to where they bounced to; none if all of the way. They have what they had as the step
+/// began, and what gravity has done since.
+fn part(first: f64, bodies: &[Faller], solved: &[Quad], solver: &SolverBodies) -> Option<f32> {
+    let (mut most, mut before, mut after, mut along, mut change) = (first, 0.0, 0.0, 0.0, 0.0);
+    for (body, &from) in bodies.iter().zip(solved) {
+        let (to, moved) = (solver.velocity[body.place as usize], solver.pose[body.place as usize]);
+        let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2], 0.0];
+        let [x, y] = body.weight;
+        most += 2.0 * product([x, y, 0.0, 0.0], moved);
+        before += twice_energy(from);
+        after += twice_energy(to);
+        along += product(from, way);
+        change += twice_energy(way);
+    }
+    let most = f64::max(most, before) * (1.0 + ROUNDING);
+    if after <= most || change == 0.0 {
+        return None;
+    }
+    // Of a square whose ends are below and above it.
+    let root = (along * along + change * (most - before)).max(0.0).sqrt();
+    Some(((root - along) / change).clamp(0.0, 1.0) as f32)
+}
+
+impl Source<'_> {
+    /// Whether something gives a contact's bodies energy from outside: a static that moves, or a ghost that nothing moves.
+    fn is_driven(self, contact: usize) -> bool {
+        let (tile, setup) = (self.tile, self.setup);
+        let dynamic = tile.owned + tile.ghosts();
+        self.contacts.bodies[contact].into_iter().map(|body| body as usize).any(|body| {
+            if body >= dynamic {
+                setup.drives(tile.bodies.kind[body])
+            } else {
+                body >= tile.owned && setup.params.ghosts == Ghosts::Frozen
+            }
+        })
+    }
+
+    /// Twice the energy of motion of a body as the step begins, in J.
+    fn twice_energy(self, body: usize) -> f64 {
+        let bodies = &self.tile.bodies;
+        let kind = self.setup.kind(bodies.kind[body]);
+        let (velocity, spin) =
+            (bodies.velocity[body] * kind.root_mass, bodies.angular_velocity[body] * kind.root_inertia);
+        twice_energy([velocity.x, velocity.y, spin, 0.0])
+    }
+
+    fn faller(self, body: usize) -> Faller {
+        let kind = self.setup.kind(self.tile.bodies.kind[body]);
+        let weight = self.setup.params.gravity * (kind.dynamics.gravity_scale * kind.root_mass);
+        Faller { place: self.bodies.places()[body].get() as u32, weight: weight.to_array() }
+    }
+}
