@@ -336,7 +336,7 @@ fn a_blow_upon_a_pack_over_borders_makes_no_momentum() {
                     ((sim.momentum() - momentum).length() / momentum.length(), sim.kinetic_energy() / energy);
                 let what = format!("case {case}, {grid:?}, step {step}");
                 assert!(drift < 1e-5, "{what}: momentum is off by {drift} of what there was");
-                assert!(part < 1.03, "{what}: {part} of the energy that there was");
+                assert!(part < 1.05, "{what}: {part} of the energy that there was");
             }
         }
     }

@@ -23,8 +23,6 @@ pub(crate) struct Passing {
     pub(super) least: f32,
     /// No blow makes bodies come nearer faster: what takes more pressed from two sides.
     pub(super) most: f32,
-    /// Whether something holds one of the two.
-    pub(super) held: bool,
 }
 
 /// How a point that bounces came, and how it is to part; speeds in m/s.

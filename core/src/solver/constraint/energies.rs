@@ -10,7 +10,6 @@ use super::columns::Columns;
 use super::groups::{Bounce, Lane};
 use super::rows::Source;
 use crate::islands::union_find::{join, root_of};
-use crate::model::params::Ghosts;
 use crate::parallel::lanes::Quad;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
@@ -26,7 +25,7 @@ pub(super) struct Energies {
     kept: Vec<Cluster>,
     at_once: Vec<Cluster>,
     /// Of the clusters, one after the other: bodies, and contacts.
-    bodies: Vec<Faller>,
+    bodies: Vec<Body>,
     contacts: Vec<u32>,
     /// What the solver left: velocities of the bodies, and at each contact's points the impulses along normal and tangent.
     solved: Vec<Quad>,
@@ -36,13 +35,15 @@ pub(super) struct Energies {
     moving: Vec<u32>,
 }
 
-/// A body, and what gravity does to it.
+/// A body of a cluster.
 #[derive(Debug)]
-struct Faller {
+struct Body {
     /// Its place among the solver's bodies.
     place: u32,
     /// Its weight by the root of its mass.
     weight: [f32; 2],
+    /// Twice its energy of motion as the step begins, in J.
+    twice_energy: f64,
 }
 
 /// Two contacts or more, each of which shares a body with another.
@@ -52,8 +53,6 @@ struct Cluster {
     base: u32,
     bodies: Range<usize>,
     contacts: Range<usize>,
-    /// Twice the energy of motion of its bodies as the step begins, in J.
-    twice_energy: f64,
 }
 
 /// Twice the energy of motion of a body whose velocity is mass-weighted.
@@ -103,10 +102,9 @@ impl Energies {
                 self.moving.extend(among().flat_map(|contact| source.moving(contact)));
                 self.moving.sort_unstable();
                 self.moving.dedup();
-                let twice_energy = self.moving.iter().map(|&body| source.twice_energy(body as usize)).sum();
-                self.bodies.extend(self.moving.iter().map(|&body| source.faller(body as usize)));
+                self.bodies.extend(self.moving.iter().map(|&body| source.body(body as usize)));
                 let (bodies, contacts) = (first_body..self.bodies.len(), first_contact..self.contacts.len());
-                clusters.push(Cluster { base: cluster[0].0, bodies, contacts, twice_energy });
+                clusters.push(Cluster { base: cluster[0].0, bodies, contacts });
             }
         }
     }
@@ -145,7 +143,7 @@ impl Energies {
                 solved.split_off(..bodies.len()).expect("one for each body"),
                 pressed.split_off(..contacts.len()).expect("one for each contact"),
             );
-            let Some(part) = part(cluster.twice_energy, bodies, solved, solver) else { continue };
+            let Some(part) = part(bodies, solved, solver) else { continue };
             let blend = |from: f32, to: f32| from + part * (to - from);
             for (body, from) in bodies.iter().zip(solved) {
                 let to = &mut solver.velocity[body.place as usize];
@@ -164,13 +162,13 @@ impl Energies {
 
 /// How far bodies may go from where the solver left them to where they bounced to; none if all of the way. They have what they had as the step
 /// began, and what gravity has done since.
-fn part(first: f64, bodies: &[Faller], solved: &[Quad], solver: &SolverBodies) -> Option<f32> {
-    let (mut most, mut before, mut after, mut along, mut change) = (first, 0.0, 0.0, 0.0, 0.0);
+fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies) -> Option<f32> {
+    let (mut most, mut before, mut after, mut along, mut change) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (body, &from) in bodies.iter().zip(solved) {
         let (to, moved) = (solver.velocity[body.place as usize], solver.pose[body.place as usize]);
         let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2], 0.0];
         let [x, y] = body.weight;
-        most += 2.0 * product([x, y, 0.0, 0.0], moved);
+        most += body.twice_energy + 2.0 * product([x, y, 0.0, 0.0], moved);
         before += twice_energy(from);
         after += twice_energy(to);
         along += product(from, way);
@@ -186,31 +184,25 @@ fn part(first: f64, bodies: &[Faller], solved: &[Quad], solver: &SolverBodies) -
 }
 
 impl Source<'_> {
-    /// Whether something gives a contact's bodies energy from outside: a static that moves, or a ghost that nothing moves.
+    /// Whether something gives a contact's bodies energy from outside: a static that moves, or what a ghost meets elsewhere.
     fn is_driven(self, contact: usize) -> bool {
-        let (tile, setup) = (self.tile, self.setup);
-        let dynamic = tile.owned + tile.ghosts();
+        let tile = self.tile;
+        let statics = tile.owned + tile.ghosts();
         self.contacts.bodies[contact].into_iter().map(|body| body as usize).any(|body| {
-            if body >= dynamic {
-                setup.drives(tile.bodies.kind[body])
-            } else {
-                body >= tile.owned && setup.params.ghosts == Ghosts::Frozen
-            }
+            (tile.owned..statics).contains(&body) || body >= statics && self.setup.drives(tile.bodies.kind[body])
         })
     }
 
-    /// Twice the energy of motion of a body as the step begins, in J.
-    fn twice_energy(self, body: usize) -> f64 {
-        let bodies = &self.tile.bodies;
-        let kind = self.setup.kind(bodies.kind[body]);
-        let (velocity, spin) =
-            (bodies.velocity[body] * kind.root_mass, bodies.angular_velocity[body] * kind.root_inertia);
-        twice_energy([velocity.x, velocity.y, spin, 0.0])
-    }
-
-    fn faller(self, body: usize) -> Faller {
-        let kind = self.setup.kind(self.tile.bodies.kind[body]);
-        let weight = self.setup.params.gravity * (kind.dynamics.gravity_scale * kind.root_mass);
-        Faller { place: self.bodies.places()[body].get() as u32, weight: weight.to_array() }
+    fn body(self, body: usize) -> Body {
+        let (tile, setup) = (self.tile, self.setup);
+        let kind = setup.kind(tile.bodies.kind[body]);
+        let weight = setup.params.gravity * (kind.dynamics.gravity_scale * kind.root_mass);
+        let velocity = tile.bodies.velocity[body] * kind.root_mass;
+        let spin = tile.bodies.angular_velocity[body] * kind.root_inertia;
+        Body {
+            place: self.bodies.places()[body].get() as u32,
+            weight: weight.to_array(),
+            twice_energy: twice_energy([velocity.x, velocity.y, spin, 0.0]),
+        }
     }
 }

@@ -53,7 +53,7 @@ impl Groups {
                         Answer::Hold
                     } else {
                         let least = SURELY * max(closing, 0.0) + source.fall(i);
-                        Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
+                        Answer::NotYet(Passing { least, most: 0.0 })
                     };
                 }
                 self.add_bounce(i, (fastest, answers), kinds, batches);
@@ -140,17 +140,7 @@ impl Groups {
             }
         }
         let is_held = |bounce: &Bounce| sides(bounce.contact as usize).iter().any(|&body| held[body] == Some(true));
-        for bounce in bounces.iter_mut().chain(bounces_at_once).filter(|bounce| is_held(bounce)) {
-            for answer in &mut bounce.answers {
-                if let Answer::NotYet(passing) = answer {
-                    if passing.most > source.fall(bounce.contact as usize) {
-                        passing.held = true
-                    } else {
-                        *answer = Answer::Hold
-                    }
-                }
-            }
-        }
+        [bounces, bounces_at_once].into_iter().for_each(|bounces| leave(bounces, is_held));
     }
 
     /// And those that no blow comes to, from one to the next, from where something comes in fast: who comes slowly is stopped, with all that
@@ -191,7 +181,7 @@ impl Groups {
             for bounce in bounces.iter_mut().filter(|bounce| bounce.parts() || bounce.passes_on()) {
                 bounce.blow = moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
                 for answer in &mut bounce.answers {
-                    if let Answer::NotYet(passing @ Passing { held: false, .. }) = answer {
+                    if let Answer::NotYet(passing) = answer {
                         passing.most = PASSED_ON * bounce.blow;
                     }
                 }
