@@ -23,6 +23,8 @@ pub(crate) struct Passing {
     pub(super) least: f32,
     /// No blow makes bodies come nearer faster: what takes more pressed from two sides.
     pub(super) most: f32,
+    /// Whether something held one of the two as the step began: then `most` is the speed at which they moved apart.
+    pub(super) held: bool,
 }
 
 /// How a point that bounces came, and how it is to part; speeds in m/s.

@@ -53,7 +53,7 @@ impl Groups {
                         Answer::Hold
                     } else {
                         let least = SURELY * max(closing, 0.0) + source.fall(i);
-                        Answer::NotYet(Passing { least, most: 0.0 })
+                        Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
                     };
                 }
                 self.add_bounce(i, (fastest, answers), kinds, batches);
@@ -115,7 +115,9 @@ impl Groups {
     }
 
     /// Has points hold that are not to bounce yet, but where both bodies fly. What presses there in a pile is not a blow alone, but also
-    /// what lies above: without it that would be thrown down, and what bounces off would have more energy than there was.
+    /// what lies above: without it that would be thrown down, and what bounces off would have more energy than there was. But no load
+    /// presses where they moved apart: there a blow came within the step, and they are to come nearer as fast as that at most, which
+    /// gives no energy.
     fn leave_held(&mut self, source: Source<'_>) {
         let Self { bounces, bounces_at_once, held, .. } = self;
         let sides = |contact: usize| source.contacts.bodies[contact].map(|body| body as usize);
@@ -140,7 +142,16 @@ impl Groups {
             }
         }
         let is_held = |bounce: &Bounce| sides(bounce.contact as usize).iter().any(|&body| held[body] == Some(true));
-        [bounces, bounces_at_once].into_iter().for_each(|bounces| leave(bounces, is_held));
+        for bounce in bounces.iter_mut().chain(bounces_at_once).filter(|bounce| is_held(bounce)) {
+            let fall = source.fall(bounce.contact as usize);
+            for answer in &mut bounce.answers {
+                match answer {
+                    Answer::NotYet(passing) if passing.most > fall => passing.held = true,
+                    Answer::NotYet(_) => *answer = Answer::Hold,
+                    _ => {}
+                }
+            }
+        }
     }
 
     /// And those that no blow comes to, from one to the next, from where something comes in fast: who comes slowly is stopped, with all that
@@ -181,12 +192,14 @@ impl Groups {
             for bounce in bounces.iter_mut().filter(|bounce| bounce.parts() || bounce.passes_on()) {
                 bounce.blow = moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
                 for answer in &mut bounce.answers {
-                    if let Answer::NotYet(passing) = answer {
+                    if let Answer::NotYet(passing @ Passing { held: false, .. }) = answer {
                         passing.most = PASSED_ON * bounce.blow;
                     }
                 }
             }
-            leave(bounces, |bounce| bounce.blow == 0.0);
+            for bounce in bounces.iter_mut().filter(|bounce| bounce.blow == 0.0) {
+                bounce.answers.iter_mut().filter(|answer| answer.passes_on()).for_each(|answer| *answer = Answer::Hold);
+            }
         }
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
             moving(bounce).for_each(|body| struck[body as usize].0 = true);
@@ -223,13 +236,6 @@ impl Groups {
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
             bounce(bounces, lanes, rows, velocity);
         });
-    }
-}
-
-/// Has those points hold that are not to bounce yet.
-fn leave(bounces: &mut [Bounce], mut whose: impl FnMut(&Bounce) -> bool) {
-    for bounce in bounces.iter_mut().filter(|bounce| whose(bounce)) {
-        bounce.answers.iter_mut().filter(|answer| answer.passes_on()).for_each(|answer| *answer = Answer::Hold);
     }
 }
 
