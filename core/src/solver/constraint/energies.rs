@@ -8,8 +8,9 @@
 
 use super::columns::Columns;
 use super::groups::{Bounce, Lane};
+use super::restitution::join_all;
 use super::rows::Source;
-use crate::islands::union_find::{join, root_of};
+use crate::islands::union_find::root_of;
 use crate::parallel::lanes::Quad;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
@@ -30,7 +31,7 @@ pub(super) struct Energies {
     /// What the solver left: velocities of the bodies, and at each contact's points the impulses along normal and tangent.
     solved: Vec<Quad>,
     pressed: Vec<[[f32; 2]; 2]>,
-    /// Buffers: contacts, each with where its batch and its cluster begin; and bodies of a cluster.
+    /// Buffers: bounces, each with where its batch and its cluster begin; and bodies of a cluster.
     sorted: Vec<(u32, u32, u32)>,
     moving: Vec<u32>,
 }
@@ -75,31 +76,24 @@ impl Energies {
         self.clear();
         self.bodies.clear();
         self.contacts.clear();
-        on.clear();
-        on.extend(0..source.tile.bodies.len() as u32);
-        for bounce in bounces.into_iter().flatten() {
-            let mut moving = source.moving(bounce.contact as usize);
-            if let (Some(one), Some(other)) = (moving.next(), moving.next()) {
-                join(on, [one, other]);
-            }
-        }
+        join_all(on, source, bounces.into_iter().flatten());
         for (bounces, at_once) in bounces.into_iter().zip([false, true]) {
             self.sorted.clear();
-            for contact in bounces.iter().map(|bounce| bounce.contact) {
-                let body = source.moving(contact as usize).next().expect("one of a contact's bodies moves");
-                self.sorted.push((lanes[contact as usize].base, root_of(on, body), contact));
+            for (i, bounce) in (0..).zip(bounces) {
+                let body = bounce.moving().next().expect("one of a contact's bodies moves");
+                self.sorted.push((lanes[bounce.contact as usize].base, root_of(on, body), i));
             }
             self.sorted.sort_unstable();
             let clusters = if at_once { &mut self.at_once } else { &mut self.kept };
             for cluster in self.sorted.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1)) {
-                let among = || cluster.iter().map(|(.., contact)| *contact as usize);
-                if cluster.len() == 1 || among().any(|contact| source.is_driven(contact)) {
+                let among = || cluster.iter().map(|(.., i)| &bounces[*i as usize]);
+                if cluster.len() == 1 || among().any(|bounce| source.is_driven(bounce.contact as usize)) {
                     continue;
                 }
                 let (first_body, first_contact) = (self.bodies.len(), self.contacts.len());
-                self.contacts.extend(cluster.iter().map(|(.., contact)| contact));
+                self.contacts.extend(among().map(|bounce| bounce.contact));
                 self.moving.clear();
-                self.moving.extend(among().flat_map(|contact| source.moving(contact)));
+                self.moving.extend(among().flat_map(Bounce::moving));
                 self.moving.sort_unstable();
                 self.moving.dedup();
                 self.bodies.extend(self.moving.iter().map(|&body| source.body(body as usize)));

@@ -93,6 +93,11 @@ fn along(row: [f32; 3], v: Quad) -> f32 {
 impl Sides {
     const EMPTY: Self = Self { a: [0; WIDE], b: [0; WIDE], normal_x: ZERO, normal_y: ZERO, friction: ZERO };
 
+    /// Bodies A and B, as places in their batch.
+    pub(super) fn places(&self, lane: usize) -> [usize; 2] {
+        [self.a[lane] as usize, self.b[lane] as usize]
+    }
+
     /// The normal times the roots of the inverse masses of A and B, which bodies tell with their velocities.
     fn normals(&self, lane: usize, velocity: &[Quad]) -> [[f32; 2]; 2] {
         [&self.a, &self.b].map(|bodies| {

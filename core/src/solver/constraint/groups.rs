@@ -34,6 +34,8 @@ pub(crate) struct Groups {
     pub(super) bounces_at_once: Vec<Bounce>,
     /// What bounces may have.
     pub(super) energies: Energies,
+    /// For each of the solver's bodies when something moved it last, while contacts bounce.
+    pub(super) moved: Vec<u32>,
     /// For each body whether something held it as the step began, where that was asked.
     pub(super) held: Vec<Option<bool>>,
     /// For each body a lower one that a blow may go on to, or come from, or itself.
@@ -47,6 +49,8 @@ pub(crate) struct Groups {
 #[derive(Debug)]
 pub(crate) struct Bounce {
     pub(super) contact: u32,
+    /// Those of its bodies that are no statics, as bodies of the tile.
+    pub(super) moving: [Option<u32>; 2],
     /// Speed at which the faster of its points comes in, in m/s.
     pub(super) closing: f32,
     /// Speed of the fastest blow that it gives back or passes on, in m/s; zero if it only holds.

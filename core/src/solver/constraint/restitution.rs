@@ -56,7 +56,7 @@ impl Groups {
                         Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
                     };
                 }
-                self.add_bounce(i, (fastest, answers), kinds, batches);
+                self.add_bounce(i, (fastest, answers), source, batches);
             }
         }
         if !heard.is_empty() || self.bounces.iter().chain(&self.bounces_at_once).any(Bounce::parts) {
@@ -90,13 +90,15 @@ impl Groups {
         &mut self,
         contact: usize,
         (closing, answers): (f32, [Answer; 2]),
-        kinds: [&KindRow; 2],
+        source: Source<'_>,
         batches: &Batches,
     ) {
-        let off_static = kinds.iter().any(|kind| kind.inv_mass == 0.0);
+        let mut moving = source.moving(contact);
+        let moving = [moving.next(), moving.next()];
+        let off_static = moving[1].is_none();
         let at_once = batches.of_body(self.lanes[contact].base as usize).at_once;
         let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-        bounces.push(Bounce { contact: contact as u32, closing, blow: 0.0, off_static, answers });
+        bounces.push(Bounce { contact: contact as u32, moving, closing, blow: 0.0, off_static, answers });
     }
 
     /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would
@@ -109,7 +111,7 @@ impl Groups {
             if is_dead && is_beside() && self.is_solved(i as u32) {
                 let speeds = (0..contact.point_count()).map(|point| source.meeting_speeds(i, point)[0]);
                 let fastest = speeds.fold(f32::NEG_INFINITY, max);
-                self.add_bounce(i, (fastest, [Answer::Hold; 2]), kinds, batches);
+                self.add_bounce(i, (fastest, [Answer::Hold; 2]), source, batches);
             }
         }
     }
@@ -160,19 +162,11 @@ impl Groups {
     /// What only holds is left out of it all, but beside what parts or passes on.
     fn leave_unstruck(&mut self, source: Source<'_>, heard: &[(u32, f32)]) {
         let Self { bounces, bounces_at_once, on, struck, .. } = self;
-        let moving = |bounce: &Bounce| source.moving(bounce.contact as usize);
-        on.clear();
-        on.extend(0..source.tile.bodies.len() as u32);
-        for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
-            let mut moving = moving(bounce);
-            if let (Some(one), Some(other)) = (moving.next(), moving.next()) {
-                join(on, [one, other]);
-            }
-        }
+        join_all(on, source, bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()));
         struck.clear();
         struck.resize(source.tile.bodies.len(), (false, 0.0));
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.parts()) {
-            for body in moving(bounce) {
+            for body in bounce.moving() {
                 struck[body as usize].0 = true;
                 let fastest = &mut struck[root_of(on, body) as usize].1;
                 *fastest = max(*fastest, bounce.closing);
@@ -182,7 +176,7 @@ impl Groups {
             let first = heard.partition_point(|(contact, _)| *contact < bounce.contact);
             let of_contact = heard[first..].iter().take_while(|(contact, _)| *contact == bounce.contact);
             if let Some(speed) = of_contact.map(|(_, speed)| *speed).reduce(max) {
-                moving(bounce).for_each(|body| {
+                bounce.moving().for_each(|body| {
                     let fastest = &mut struck[root_of(on, body) as usize].1;
                     *fastest = max(*fastest, speed);
                 });
@@ -190,7 +184,7 @@ impl Groups {
         }
         for bounces in [&mut *bounces, &mut *bounces_at_once] {
             for bounce in bounces.iter_mut().filter(|bounce| bounce.parts() || bounce.passes_on()) {
-                bounce.blow = moving(bounce).map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
+                bounce.blow = bounce.moving().map(|body| struck[root_of(on, body) as usize].1).fold(0.0, max);
                 for answer in &mut bounce.answers {
                     if let Answer::NotYet(passing @ Passing { held: false, .. }) = answer {
                         passing.most = PASSED_ON * bounce.blow;
@@ -202,10 +196,10 @@ impl Groups {
             }
         }
         for bounce in bounces.iter().chain(&*bounces_at_once).filter(|bounce| bounce.passes_on()) {
-            moving(bounce).for_each(|body| struck[body as usize].0 = true);
+            bounce.moving().for_each(|body| struck[body as usize].0 = true);
         }
         for bounces in [bounces, bounces_at_once] {
-            bounces.retain(|bounce| moving(bounce).any(|body| struck[body as usize].0));
+            bounces.retain(|bounce| bounce.moving().any(|body| struck[body as usize].0));
         }
     }
 
@@ -222,24 +216,40 @@ impl Groups {
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, lanes, kept, energies, .. } = self;
-        energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity));
+        let Self { bounces, lanes, kept, energies, moved, .. } = self;
+        energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity, moved));
     }
 
     /// Bounces of a batch that is solved at once.
     pub(crate) fn apply_restitution_at_once(&mut self, batch: &Batch, bodies: &mut SolverBodies) {
-        let Self { bounces_at_once: bounces, lanes, at_once, energies, .. } = self;
+        let Self { bounces_at_once: bounces, lanes, at_once, energies, moved, .. } = self;
         let before =
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
         let bounces = &bounces[own];
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
-            bounce(bounces, lanes, rows, velocity);
+            bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], moved);
         });
     }
 }
 
+/// For each body of the tile a lower one that it bounces off, or that one, or itself.
+pub(super) fn join_all<'b>(on: &mut Vec<u32>, source: Source<'_>, bounces: impl Iterator<Item = &'b Bounce>) {
+    on.clear();
+    on.extend(0..source.tile.bodies.len() as u32);
+    for bounce in bounces {
+        if let [Some(one), Some(other)] = bounce.moving {
+            join(on, [one, other]);
+        }
+    }
+}
+
 impl Bounce {
+    /// Those of its bodies that are no statics.
+    pub(super) fn moving(&self) -> impl Iterator<Item = u32> {
+        self.moving.into_iter().flatten()
+    }
+
     fn parts(&self) -> bool {
         self.answers.iter().any(|answer| matches!(answer, Answer::Part(_)))
     }
@@ -259,16 +269,36 @@ impl Answer {
 /// speeds that both want after several, and off two statics with normals that are nearly one after many, which are few contacts. An
 /// impulse changes the energy by half of itself times the sum of the speeds at which its point parts before and after. So with
 /// restitution 1 nothing is lost or gained where each point parts as fast as it came.
-fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &mut [Quad]) {
-    let mut pass = |bounce: &Bounce| {
+///
+/// A contact is passed over while nothing has moved its bodies since it let them be.
+fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &mut [Quad], moved: &mut Vec<u32>) {
+    let Some(first) = bounces.iter().map(|bounce| lanes[bounce.contact as usize].base as usize).min() else { return };
+    moved.clear();
+    moved.resize(velocity.len() - first, 0);
+    let mut looked = vec![0; bounces.len()];
+    let mut time = 0;
+    let mut pass = |looked: &mut u32, bounce: &Bounce| {
         let at = lanes[bounce.contact as usize];
         let (sides, points, totals, lane) = at.totals_mut(columns);
-        let least = EXACT * bounce.closing;
-        sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(velocity))
+        let places = sides.places(lane).map(|place| at.base as usize + place);
+        if places.iter().all(|&place| moved[place - first] < *looked) {
+            return false;
+        }
+        time += 1;
+        *looked = time;
+        let least = EXACT * max(bounce.closing.abs(), bounce.blow);
+        let acts = sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(velocity));
+        if acts {
+            places.into_iter().filter(|&place| velocity[place][3] != 0.0).for_each(|place| moved[place - first] = time);
+        }
+        acts
     };
-    let mut acts = |bounces: &mut dyn Iterator<Item = &Bounce>| bounces.fold(false, |acts, bounce| pass(bounce) | acts);
-    if (0..PASSES).all(|_| acts(&mut bounces.iter())) {
-        let _ = (0..PASSES_OFF_STATICS).all(|_| acts(&mut bounces.iter().filter(|bounce| bounce.off_static)));
+    let mut acts = |all: bool| {
+        let which = bounces.iter().zip(&mut looked).filter(|(bounce, _)| all || bounce.off_static);
+        which.fold(false, |acts, (bounce, looked)| pass(looked, bounce) | acts)
+    };
+    if (0..PASSES).all(|_| acts(true)) {
+        let _ = (0..PASSES_OFF_STATICS).all(|_| acts(false));
     }
 }
 
@@ -278,7 +308,7 @@ impl<'a> Source<'a> {
     }
 
     /// Those of its bodies that are no statics.
-    pub(super) fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
+    fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
         let sides = self.contacts.bodies[contact].into_iter().zip(self.kinds_of(contact));
         sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
     }
