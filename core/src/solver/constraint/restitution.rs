@@ -77,10 +77,10 @@ impl Groups {
         }
         // Who comes in faster first: that may be all it takes, where several throw the same body back.
         let first = |bounce: &Bounce, other: &Bounce| other.closing.total_cmp(&bounce.closing);
-        self.bounces.sort_by(first);
-        self.bounces_at_once.sort_by(first);
         let Self { bounces, bounces_at_once, lanes, energies, on, .. } = self;
-        bounces_at_once.sort_by_key(|bounce| lanes[bounce.contact as usize].base);
+        let batch = |bounce: &Bounce| lanes[bounce.contact as usize].base;
+        bounces.sort_by(first);
+        bounces_at_once.sort_by(|one, other| batch(one).cmp(&batch(other)).then_with(|| first(one, other)));
         if !(bounces.is_empty() && bounces_at_once.is_empty()) {
             energies.find([bounces, bounces_at_once], lanes, on, source);
         }
