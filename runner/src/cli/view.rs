@@ -118,9 +118,12 @@ fn serve(desk: Arc<Desk>, port: Option<u16>, bind: Option<IpAddr>) -> Result<Ser
 fn tell(server: &Server, bind: Option<IpAddr>, open: bool) {
     if let Some(address) = bind.filter(|address| !address.is_loopback()) {
         complain(&format!(
-            "--bind {address}: whoever reaches this machine and knows the address below can look at the run and pause it; \
-             nothing is encrypted"
+            "--bind {address}: whoever reaches this machine and knows the address below can look at the run, pause it and \
+             change its world; nothing is encrypted"
         ));
+        if address.is_unspecified() {
+            complain(&format!("open it with any address of this machine in the place of {address}"));
+        }
     }
     let url = server.url();
     complain(&format!("open {url}"));

@@ -67,11 +67,29 @@ pub(crate) struct Server {
 #[derive(Clone, Debug)]
 struct Door {
     /// What a browser may call this server.
-    hosts: Arc<[String]>,
+    names: Names,
     token: Arc<str>,
     desk: Arc<Desk>,
     over: Arc<AtomicBool>,
     open: Arc<AtomicUsize>,
+}
+
+/// What a browser may call a server at an address. A page of another origin that has its own name lead here calls it by that.
+#[derive(Clone, Copy, Debug)]
+struct Names(SocketAddr);
+
+impl Names {
+    fn have(self, host: &str) -> bool {
+        let Self(own) = self;
+        let is_own = |address: SocketAddr| {
+            address.port() == own.port() && (own.ip().is_unspecified() || address.ip() == own.ip())
+        };
+        let is_localhost = || {
+            let local = own.ip().is_loopback() || own.ip().is_unspecified();
+            local && host.strip_prefix("localhost:").is_some_and(|port| port == own.port().to_string())
+        };
+        host.parse().is_ok_and(is_own) || is_localhost()
+    }
 }
 
 impl Server {
@@ -86,12 +104,8 @@ impl Server {
         let address = listener.local_addr()?;
         let token = token()?;
         let over = Arc::new(AtomicBool::new(false));
-        let mut hosts = vec![address.to_string()];
-        if address.ip().is_loopback() {
-            hosts.push(format!("localhost:{}", address.port()));
-        }
         let door = Door {
-            hosts: hosts.into(),
+            names: Names(address),
             token: token.as_str().into(),
             desk: Arc::clone(&desk),
             over: Arc::clone(&over),
@@ -171,10 +185,10 @@ fn serve(mut stream: TcpStream, door: &Door) -> io::Result<()> {
     let Some(request) = read_request(&mut stream)? else {
         return refuse(&mut stream, "400 Bad Request", "This is no request that Atoll understands.");
     };
-    if !request.host.as_ref().is_some_and(|host| door.hosts.contains(host)) {
-        return refuse(&mut stream, "403 Forbidden", "This server has another name.");
+    if !request.host.as_ref().is_some_and(|host| door.names.have(host)) {
+        return refuse(&mut stream, "403 Forbidden", "This server has another name: call it by the number of its address.");
     }
-    let own = |origin: &String| door.hosts.iter().any(|host| origin.strip_prefix("http://") == Some(host));
+    let own = |origin: &String| origin.strip_prefix("http://").is_some_and(|host| door.names.have(host));
     if !request.origin.as_ref().is_none_or(own) {
         return refuse(&mut stream, "403 Forbidden", "Only its own page may ask.");
     }
@@ -361,5 +375,25 @@ impl Write for Deaf {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_server_is_called_by_its_address_and_by_no_name_that_leads_there() {
+        let names = |address: &str| Names(address.parse().unwrap());
+        let called = |address: &str, host: &str| names(address).have(host);
+        assert!(called("127.0.0.1:8000", "127.0.0.1:8000") && called("127.0.0.1:8000", "localhost:8000"));
+        assert!(called("192.0.2.2:8000", "192.0.2.2:8000") && !called("192.0.2.2:8000", "localhost:8000"));
+        // At all addresses of the machine.
+        for host in ["127.0.0.1:8000", "192.0.2.2:8000", "[2001:db8::1]:8000", "localhost:8000"] {
+            assert!(called("0.0.0.0:8000", host) && called("[::]:8000", host), "{host}");
+        }
+        for host in ["atoll.example:8000", "localhost.example:8000", "127.0.0.1:80", "127.0.0.1", "localhost:80", ""] {
+            assert!(!called("0.0.0.0:8000", host) && !called("127.0.0.1:8000", host), "{host}");
+        }
     }
 }
