@@ -286,7 +286,7 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &
         }
         time += 1;
         *looked = time;
-        let least = EXACT * max(bounce.closing.abs(), bounce.blow);
+        let least = EXACT * max(bounce.closing, 0.0);
         let acts = sides.bounce(points, totals, lane, bounce.answers, least, at.bodies_mut(velocity));
         if acts {
             places.into_iter().filter(|&place| velocity[place][3] != 0.0).for_each(|place| moved[place - first] = time);

@@ -186,7 +186,11 @@ fn serve(mut stream: TcpStream, door: &Door) -> io::Result<()> {
         return refuse(&mut stream, "400 Bad Request", "This is no request that Atoll understands.");
     };
     if !request.host.as_ref().is_some_and(|host| door.names.have(host)) {
-        return refuse(&mut stream, "403 Forbidden", "This server has another name: call it by the number of its address.");
+        return refuse(
+            &mut stream,
+            "403 Forbidden",
+            "This server has another name: call it by the number of its address.",
+        );
     }
     let own = |origin: &String| origin.strip_prefix("http://").is_some_and(|host| door.names.have(host));
     if !request.origin.as_ref().is_none_or(own) {

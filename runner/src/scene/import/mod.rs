@@ -7,7 +7,7 @@ use super::SceneError;
 use super::file::write::World;
 use super::file::{FARTHEST, is_turn};
 use crate::scene::record::KindText;
-use atoll_core::{Body, GlobalId, Kind, Rot, StaticBody};
+use atoll_core::{Body, Dynamics, GlobalId, Kind, Material, Rot, StaticBody};
 use glam::DVec2;
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
@@ -26,6 +26,8 @@ pub(crate) struct Imported {
     names: Vec<Option<String>>,
     statics: Vec<StaticBody>,
     pub(crate) bodies: Vec<Body>,
+    /// Where each static and each body is in the file's own list, from zero; empty where its id tells.
+    numbers: [Vec<usize>; 2],
     rows: HashMap<(String, u32), u32>,
     left_out: BTreeMap<&'static str, u64>,
 }
@@ -50,7 +52,11 @@ fn text(path: &Path) -> Result<String, SceneError> {
     if !data.is_file() || data.len() > LONGEST {
         return Err(SceneError::read(path, WHAT, "it is no regular file of at most 4 GiB; name one"));
     }
-    let bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
+    let mut bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
+    // Some editors mark it as UTF-8 by a character of no width in front.
+    if bytes.starts_with("\u{feff}".as_bytes()) {
+        bytes.drain(..3);
+    }
     String::from_utf8(bytes).map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))
 }
 
@@ -104,17 +110,32 @@ impl Imported {
         let refuse = |what: String| Err(SceneError::whole(path, what));
         let is_place = |place: DVec2| place.is_finite() && place.abs().cmple(DVec2::splat(FARTHEST)).all();
         if let Some(at) = self.kinds.iter().position(|kind| !kind.is_valid()) {
-            return refuse(format!("it has a shape or a material that cannot be: {:?}", self.kinds[at]));
+            return refuse(format!(
+                "it has a shape or a material that cannot be: {}; sizes and densities must be above 0, a restitution at most 1, \
+                 others but the gravity at least 0, all finite",
+                told(&self.kinds[at], self.names[at].as_deref())
+            ));
+        }
+        if let Some(gravity) = self.gravity.filter(|gravity| !gravity.iter().all(|along| (*along as f32).is_finite())) {
+            return refuse(format!("its gravity cannot be: {gravity:?} m/s^2; give numbers of at most 1e38"));
         }
         let is_good = |place: DVec2, rotation: Rot| is_place(place) && is_turn(rotation);
-        if let Some(fixed) =
-            self.statics.iter().find(|fixed| !is_good(fixed.position, fixed.rotation) || !fixed.kind.is_valid())
-        {
-            return refuse(format!("static {} has a number that cannot be; positions must be within 1e9 m", fixed.id));
+        let is_static = |fixed: &StaticBody| {
+            let moves = fixed.path.is_none_or(|path| path.is_valid());
+            is_good(fixed.position, fixed.rotation) && fixed.kind.is_valid() && moves
+        };
+        let cannot_be = |what: &str, numbers: &[usize], at: usize, id: GlobalId| {
+            let which =
+                numbers.get(at).map_or(format!("{what} {id}"), |number| format!("body {number} of its list, from 0,"));
+            refuse(format!("{which} has a number that cannot be; positions must be within 1e9 m, all numbers finite"))
+        };
+        let [of_statics, of_bodies] = &self.numbers;
+        if let Some(at) = self.statics.iter().position(|fixed| !is_static(fixed)) {
+            return cannot_be("static", of_statics, at, self.statics[at].id);
         }
         let moves = |body: &Body| body.velocity.is_finite() && body.angular_velocity.is_finite();
-        if let Some(body) = self.bodies.iter().find(|body| !is_good(body.position, body.rotation) || !moves(body)) {
-            return refuse(format!("body {} has a number that cannot be; positions must be within 1e9 m", body.id));
+        if let Some(at) = self.bodies.iter().position(|body| !is_good(body.position, body.rotation) || !moves(body)) {
+            return cannot_be("body", of_bodies, at, self.bodies[at].id);
         }
         let (low, high) = self.domain;
         if !(is_place(low) && is_place(high) && low.cmplt(high).all()) {
@@ -129,6 +150,17 @@ impl Imported {
             None => Ok(()),
         }
     }
+}
+
+/// A kind, in the numbers that a file gave it.
+fn told(kind: &Kind, name: Option<&str>) -> String {
+    let Material { density, friction, restitution, .. } = kind.material;
+    let Dynamics { gravity_scale, linear_damping, angular_damping, .. } = kind.dynamics;
+    let (name, radius) = (name.map_or(String::new(), |name| format!("{name}, ")), kind.shape.bounding_radius());
+    format!(
+        "{name}within {radius} m of its middle, density {density}, friction {friction}, restitution {restitution}, gravity \
+         scale {gravity_scale}, damping {linear_damping} and {angular_damping}"
+    )
 }
 
 #[cfg(test)]

@@ -49,8 +49,11 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Imported, SceneError> {
     for (list, what) in [("joint", "joints"), ("image", "images")] {
         imported.leave_out(what, world.get(list).and_then(Value::as_array).map_or(0, Vec::len) as u64);
     }
-    for body in objects(world, "body") {
+    for (number, body) in objects(world, "body").enumerate() {
         add(&mut imported, body);
+        let Imported { statics, bodies, numbers: [of_statics, of_bodies], .. } = &mut imported;
+        of_statics.resize(statics.len(), number);
+        of_bodies.resize(bodies.len(), number);
     }
     // Statics have the lowest ids, as in scenes that are made.
     let first = imported.statics.len() as u64;
