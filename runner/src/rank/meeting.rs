@@ -103,7 +103,7 @@ impl<'a> Meetings<'a> {
         }
     }
 
-    /// Meets before the first step, or after the last, if that is wanted.
+    /// Meets before the first step, or after the last, if that is wanted. Returns whether somebody asked the run to stop.
     ///
     /// # Errors
     /// If a rank is lost, or what is to be done cannot be.
@@ -113,16 +113,17 @@ impl<'a> Meetings<'a> {
         last: &StepReport,
         halo: &mut RankHalo<Counting<T>>,
         commander: &mut Commander,
-    ) -> Result<(), RankError> {
+    ) -> Result<bool, RankError> {
         if !self.host().is_some_and(Host::lingers) {
-            return Ok(());
+            return Ok(false);
         }
         // Before the first step there is something to see as well.
         world.settle();
         self.hold(world, last, halo, commander)
     }
 
-    /// Meets, until rank 0 lets time go on, or somebody asks the run to stop.
+    /// Meets, until rank 0 lets time go on, or somebody asks the run to stop. Returns whether that was so, on all ranks alike: who waits
+    /// for a word allows no step.
     ///
     /// # Errors
     /// If a rank is lost, or what is to be done cannot be.
@@ -132,15 +133,16 @@ impl<'a> Meetings<'a> {
         last: &StepReport,
         halo: &mut RankHalo<Counting<T>>,
         commander: &mut Commander,
-    ) -> Result<(), RankError> {
-        let Some(host) = self.host() else { return Ok(()) };
+    ) -> Result<bool, RankError> {
+        let Some(host) = self.host() else { return Ok(false) };
         let (waited, rank) = (halo.waited(), halo.transport().rank());
         let (assignment, transport) = halo.parts();
-        let before = transport.stats();
-        while !commander.is_over() {
+        let (before, mut stopped) = (transport.stats(), false);
+        while !(commander.is_over() || stopped) {
             let held = Held { rank, world, assignment, last, waited };
             match self.go_round(host, &held, transport).map_err(RankError::Transport)? {
                 Round::Over => break,
+                Round::Stopped => stopped = true,
                 Round::Answered => {}
                 Round::Waits if self.tells_of_waiting => commander.wait(world.step_count()),
                 Round::Waits => {}
@@ -148,7 +150,7 @@ impl<'a> Meetings<'a> {
             }
         }
         self.sent += transport.stats().since(&before);
-        Ok(())
+        Ok(stopped)
     }
 
     /// One word of rank 0 and what follows from it.
@@ -171,7 +173,7 @@ impl<'a> Meetings<'a> {
         let mut words = transport.all_gather(&word)?;
         self.stood += start.elapsed();
         if words.iter().any(|word| word.first() == Some(&STOP)) {
-            return Ok(Round::Over);
+            return Ok(Round::Stopped);
         }
         let word = words.swap_remove(0);
         Ok(match word.get(1) {
@@ -195,6 +197,8 @@ impl<'a> Meetings<'a> {
 enum Round {
     /// The meeting is over.
     Over,
+    /// Somebody asked the run to stop.
+    Stopped,
     /// A question was answered.
     Answered,
     /// It had nothing to say.

@@ -173,8 +173,8 @@ fn run<T: Transport>(
     commander.take_turn(&mut world, &mut halo, observer)?;
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan);
-    meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
-    while world.step_count() < steps && !last.stopped && !commander.is_over() {
+    let mut stopped = meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
+    while world.step_count() < steps && !stopped && !commander.is_over() {
         let unwritten = log_failure.is_some()
             || commander.failure().is_some()
             || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
@@ -221,8 +221,9 @@ fn run<T: Transport>(
         observer.show(rank, &world);
         told.made(*complete);
         if last.meeting {
-            meetings.hold(&mut world, &last, &mut halo, &mut commander)?;
+            stopped = meetings.hold(&mut world, &last, &mut halo, &mut commander)?;
         }
+        stopped |= last.stopped;
         if let Some(balancer) = &mut balancer {
             let is_last = last.stopped || *complete == steps;
             balancer.after_step(&last, is_last, &mut world, &mut halo)?;
@@ -231,7 +232,7 @@ fn run<T: Transport>(
     }
     tracer.before(None);
     // Whoever asks while the last step is made gets all of them.
-    let interrupted = (last.stopped || commander.is_over() && *complete > 0) && *complete < steps;
+    let interrupted = (stopped || commander.is_over() && *complete > 0) && *complete < steps;
     let mut output_time = match recorder {
         Some(recorder) => {
             end::finish(recorder, (&world, commander.state()), interrupted, plan, observer, halo.transport())?
@@ -275,7 +276,7 @@ fn run<T: Transport>(
     facts.wall_nanos = (finished - built).saturating_sub(meetings.stood).as_nanos() as u64;
     facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
-    if !last.stopped {
+    if !stopped {
         meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
     }
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
