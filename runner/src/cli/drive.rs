@@ -140,6 +140,11 @@ impl Host for Driver {
 
     fn hear(&self, _answers: Vec<Vec<u8>>) {}
 
+    fn undone(&self) -> Option<(usize, u64)> {
+        let lines = &self.lock().lines;
+        lines.front().map(|(step, ..)| (lines.len(), *step))
+    }
+
     fn lingers(&self) -> bool {
         true
     }
@@ -168,6 +173,9 @@ mod tests {
         assert_eq!(driver.next(3, Duration::ZERO), Next::GoOn);
         let Next::Do(rest) = driver.next(5, Duration::ZERO) else { panic!("two lines are due") };
         assert!(String::from_utf8(rest).unwrap().starts_with("5\t{\"step\":4,"));
+        assert_eq!(driver.undone(), None);
+        driver.lock().hear(7, "{\"step\": 50, \"remove\": 3}".to_owned());
+        assert_eq!(driver.undone(), Some((1, 50)));
         assert!(!driver.calls(100));
     }
 

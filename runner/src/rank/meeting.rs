@@ -50,6 +50,10 @@ pub trait Host: Debug + Send + Sync {
     fn answer(&self, question: &[u8], held: &Held<'_>) -> Vec<u8>;
     /// On rank 0: the answers to its last question, by rank.
     fn hear(&self, answers: Vec<Vec<u8>>);
+    /// On rank 0, in the end: how many lines it never had done, and the first step that one was for.
+    fn undone(&self) -> Option<(usize, u64)> {
+        None
+    }
     /// What whoever looks may want to know, a sentence, such as that a command is refused.
     fn note(&self, _text: &str) {}
     /// Why the run failed.

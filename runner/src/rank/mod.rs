@@ -279,6 +279,7 @@ fn run<T: Transport>(
     if !stopped {
         meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
     }
+    commander.leave(observer);
     let tiles = atoll_core::finish(world, &mut halo).map_err(RankError::Step)?;
     if leads_process {
         facts.peak_rss_bytes = peak_rss_bytes();

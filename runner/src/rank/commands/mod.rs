@@ -75,6 +75,11 @@ fn lines_are(count: usize) -> String {
     if count == 1 { "1 line is".to_owned() } else { format!("{count} lines are") }
 }
 
+/// Tells of lines for steps that were not made.
+fn note_not_made(source: &str, lines: usize, first: u64, observer: &Observer) {
+    observer.note(&format!("{source}: {} for steps from {first} on, which were not made", lines_are(lines)));
+}
+
 /// Where a line stands. What pages say has no numbers.
 fn place(source: &str, number: u64) -> String {
     if number == 0 { "a hand on the page".to_owned() } else { format!("{source}: line {number}") }
@@ -229,10 +234,19 @@ impl Commander {
             && !self.is_over()
             && let [first, others @ ..] = &self.lines[self.next..]
         {
-            let (rest, step) = (lines_are(others.len() + 1), first.step);
-            observer.note(&format!("{}: {rest} for steps from {step} on, which were not made", self.source));
+            note_not_made(&self.source, others.len() + 1, first.step, observer);
         }
         all_well(transport, self.failure.as_ref()).map_err(Into::into)
+    }
+
+    /// Once nobody will be heard any more: tells of what was said for steps that were not made, if a refusal was not the end.
+    pub(super) fn leave(&self, observer: &Observer) {
+        if self.rank == Rank(0)
+            && !self.is_over()
+            && let Some((lines, first)) = observer.host.as_ref().and_then(|host| host.undone())
+        {
+            note_not_made(LIVE, lines, first, observer);
+        }
     }
 
     /// Does what is planned for the step that is to be made next, and answers what is asked of the world as it is. Once all steps
