@@ -50,7 +50,9 @@ impl Summary {
         row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
         let (islands, largest, colors) = (self.islands, self.largest_island, self.colors);
         let asleep = if self.asleep > 0 { format!(", {} bodies asleep", self.asleep) } else { String::new() };
-        row(f, "islands", format_args!("{islands}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
+        // One over a border is counted in each of its tiles.
+        let within = if self.tile_count > 1 { " within tiles" } else { "" };
+        row(f, "islands", format_args!("{islands}{within}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
         let [half_v2, spin2] = [self.mean_half_v2, self.mean_spin2].map(Figure);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;

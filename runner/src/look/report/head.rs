@@ -171,7 +171,8 @@ fn facts(sources: &[Source]) -> String {
             let (islands, largest) = (whole(source, "islands")?, whole(source, "largest_island")?);
             let asleep = whole(source, "asleep").filter(|asleep| asleep != "0");
             let asleep = asleep.map(|asleep| format!(", {asleep} bodies asleep")).unwrap_or_default();
-            Some(format!("{islands}, the largest of {largest} bodies{asleep}"))
+            let within = whole(source, "tile_count").filter(|tiles| tiles != "1").map_or("", |_| " within tiles");
+            Some(format!("{islands}{within}, the largest of {largest} bodies{asleep}"))
         }),
         ("Mass", |source| Some(Unit(source.number("mass")? * 1e3, "g").to_string())),
         ("Kinetic energy", |source| Some(Unit(source.number("kinetic_energy")?, "J").to_string())),
