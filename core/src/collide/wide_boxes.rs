@@ -111,7 +111,6 @@ impl<V: Wide> Shapes<V> for Boxes {
             turning,
             some: beyond.if_positive(zero, one),
             two: corner.if_positive(zero, one),
-            unsure: zero,
             normal: n,
             anchor: [offset; 2],
             separation: [zero; 2],

@@ -1,7 +1,7 @@
 //! Where and when the bodies of sixteen pairs touch within the step, in up to two points: what `touch.rs` does for one pair, in the same
 //! words and with the same bits.
 //!
-//! Where speeds overflow, or shapes say so, it cannot tell, and leaves the pair to that.
+//! Where speeds overflow, or a corner may pass over another, it cannot tell, and leaves the pair to that.
 
 use super::broad_phase::Pair;
 use super::cull::passes;
@@ -27,8 +27,6 @@ pub(super) struct Moments<V> {
     /// Whether there is a point, and whether there is a second.
     pub(super) some: V,
     pub(super) two: V,
-    /// Whether that cannot be told here.
-    pub(super) unsure: V,
     pub(super) normal: Vectors<V>,
     pub(super) anchor: [Vectors<V>; 2],
     pub(super) separation: [V; 2],
@@ -150,8 +148,6 @@ impl<V: Wide> Moments<V> {
             turning: both(positive, &yes.turning, &no.turning),
             some: positive.if_positive(yes.some, no.some),
             two: positive.if_positive(yes.two, no.two),
-            // What could not be told is not forgotten.
-            unsure: positive.if_positive(yes.unsure.max(no.unsure), no.unsure),
             normal: Vectors::pick(positive, yes.normal, no.normal),
             anchor: both(positive, &yes.anchor, &no.anchor),
             separation: [
@@ -195,7 +191,7 @@ impl Points {
         let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
-        let later = is_now.max(now.unsure).if_positive(zero, asked);
+        let later = is_now.if_positive(zero, asked);
         let near = less(separation, speculative);
         let within = pairs.ahead(near, setup);
         let later = pairs.come_near(&now, within).if_positive(later, zero);
@@ -211,7 +207,7 @@ impl Points {
         }
         meets = meets.mul(asked).mul(at.some);
         let moved = pairs.between.dot(at.normal).mul(at.time);
-        let closing = [0, 1].map(|point| pairs.closing(at.anchor[point], at.offset, at.normal));
+        let closing = pairs.closing_of_both(&at);
         for point in 0..2 {
             let (anchor, separation) = (at.anchor[point], at.separation[point]);
             let blow = at.two.if_positive(V::splat(0.5).mul(closing[1 - point].max(zero)), zero);
@@ -226,7 +222,7 @@ impl Points {
             at.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
-        let unsure = at.unsure.max(pairs.run_into_corners(&at, closing[0]));
+        let unsure = pairs.run_into_corners(&at, closing[0]);
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
@@ -280,6 +276,12 @@ impl<V: Wide> Pairs<V> {
         negated(self.between.dot(normal)).add(self.sweep(0).add(self.sweep(1)))
     }
 
+    /// How fast both points come nearer, in m/s. Written out, as a closure might be compiled without the instructions of its kernel.
+    #[inline(always)]
+    fn closing_of_both(&self, at: &Moments<V>) -> [V; 2] {
+        [self.closing(at.anchor[0], at.offset, at.normal), self.closing(at.anchor[1], at.offset, at.normal)]
+    }
+
     /// One for those that may touch within the rest of so many seconds: what is apart along a direction stays so for as long as nothing
     /// moves further along it.
     #[inline(always)]
@@ -295,7 +297,7 @@ impl<V: Wide> Pairs<V> {
     fn run_into_corners(&self, at: &Moments<V>, closing: V) -> V {
         let (_, nearest) = at.least();
         let overlap = absolute(at.anchor[1].minus(at.anchor[0]).cross(at.normal));
-        let [a, b] = [0, 1].map(|side| self.half[side].x.min(self.half[side].y));
+        let (a, b) = (self.half[0].x.min(self.half[0].y), self.half[1].x.min(self.half[1].y));
         let touching = V::splat(TOUCHING);
         let overlaps = less(overlap, touching.min(V::splat(PASSABLE).mul(a.min(b))));
         at.two.mul(overlaps).mul(less(nearest, touching)).mul(less(V::splat(CREEPING), closing))
@@ -330,10 +332,9 @@ impl<V: Wide> Pairs<V> {
         ending = ending.max(going);
         // Of two points the further one may be the first to touch.
         let never = V::splat(f32::INFINITY);
-        let [first, second] = [0, 1].map(|point| {
-            let closing = self.closing(at.anchor[point], at.offset, at.normal);
-            less(zero, closing).if_positive(at.separation[point].div(closing), never)
-        });
+        let closing = self.closing_of_both(&at);
+        let first = less(zero, closing[0]).if_positive(at.separation[0].div(closing[0]), never);
+        let second = less(zero, closing[1]).if_positive(at.separation[1].div(closing[1]), never);
         // Where one is too deep, it is that one's moment.
         let (second_is_nearest, nearest) = at.least();
         let of_nearest = second_is_nearest.if_positive(second, first);

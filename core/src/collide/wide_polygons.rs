@@ -1,6 +1,4 @@
 //! The convex pieces of sixteen pairs: what `manifold/convex.rs` does for two, in the same words and with the same bits.
-//!
-//! Where it is two corners that are nearest, it says so, and leaves the pair to that.
 
 use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
@@ -137,6 +135,55 @@ impl<V: Wide> Face<V> {
     }
 }
 
+/// The nearest points of two polygons, as far as they are known.
+#[derive(Clone, Copy)]
+struct Gap<V> {
+    distance: V,
+    /// From the first to the second, of length one.
+    normal: Vectors<V>,
+    on_first: Vectors<V>,
+    feature: V,
+}
+
+impl<V: Wide> Gap<V> {
+    /// Wider than any.
+    #[inline(always)]
+    fn none() -> Self {
+        let (zero, none) = (V::splat(0.0), Vectors::new(V::splat(0.0), V::splat(0.0)));
+        Self { distance: V::splat(f32::INFINITY), normal: none, on_first: none, feature: zero }
+    }
+
+    /// The lesser, or else the first.
+    #[inline(always)]
+    fn lesser(first: &Self, other: &Self) -> Self {
+        let less = first.distance.sub(other.distance);
+        Self {
+            distance: less.if_positive(other.distance, first.distance),
+            normal: Vectors::pick(less, other.normal, first.normal),
+            on_first: Vectors::pick(less, other.on_first, first.on_first),
+            feature: less.if_positive(other.feature, first.feature),
+        }
+    }
+
+    /// Of two that are apart: at a corner of one of them.
+    #[inline(always)]
+    fn between(a: &Polygon<V>, b: &Polygon<V>) -> Self {
+        let mut least = Self::none();
+        for (number, &point) in b.corners[..b.most].iter().enumerate() {
+            let (normal, distance, at) = a.nearest(point);
+            let on_first = point.minus(normal.scaled(distance));
+            let feature = at.mul(V::splat(8.0)).add(V::splat(256.0 + number as f32));
+            least = Self::lesser(&least, &Self { distance, normal, on_first, feature });
+        }
+        for (number, &point) in a.corners[..a.most].iter().enumerate() {
+            let (normal, distance, at) = b.nearest(point);
+            let feature = at.mul(V::splat(8.0)).add(V::splat(512.0 + number as f32));
+            least = Self::lesser(&least, &Self { distance, normal: opposite(normal), on_first: point, feature });
+        }
+        least
+    }
+}
+
 impl<V: Wide> Polygon<V> {
     /// The same, turned and then moved, as far as so many corners go.
     #[inline(always)]
@@ -177,6 +224,34 @@ impl<V: Wide> Polygon<V> {
             most = Face::pick(further, &self.face(number, least), &most);
         }
         most
+    }
+}
+
+impl<V: Wide> Polygon<V> {
+    /// As [`Convex::nearest`](crate::model::convex::Convex::nearest) of one with faces.
+    #[inline(always)]
+    fn nearest(&self, point: Vectors<V>) -> (Vectors<V>, V, V) {
+        let (one, zero, two) = (V::splat(1.0), V::splat(0.0), V::splat(2.0));
+        let mut most = Face::none();
+        for number in 0..self.most {
+            let height = point.minus(self.corners[number]).dot(self.normals[number]);
+            most = Face::pick(height.sub(most.figure), &self.face(number, height), &most);
+        }
+        let (height, [from, to]) = (most.figure, most.ends);
+        let edge = to.minus(from);
+        let before = point.minus(from).dot(edge).if_positive(zero, one);
+        let behind = less(point.minus(to).dot(edge), zero).if_positive(zero, one);
+        let outside = height.if_positive(one, zero);
+        let is_corner = before.max(behind).mul(outside);
+        let follower = most.number.add(one);
+        let next = self.count.sub(follower).if_positive(follower, zero);
+        let away = point.minus(Vectors::pick(before, from, to));
+        let distance = away.dot(away).sqrt();
+        let direction = Vectors::new(away.x.div(distance), away.y.div(distance));
+        let normal = Vectors::pick(is_corner.mul(distance.if_positive(one, zero)), direction, most.normal);
+        let at_corner = two.mul(before.if_positive(most.number, next)).add(one);
+        let at = is_corner.if_positive(at_corner, two.mul(most.number));
+        (normal, is_corner.if_positive(distance, height), at)
     }
 }
 
@@ -233,7 +308,6 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
             turning,
             some: beyond.if_positive(zero, one),
             two: spans,
-            unsure: zero,
             normal: n,
             anchor: [offset; 2],
             separation: [zero; 2],
@@ -260,7 +334,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         }
         // An end of a line has no width: those that overlap part there nevertheless.
         let is_end = none.mul(height.if_positive(zero, one));
-        at.unsure = none.mul(height.if_positive(one, zero)).mul(at.some);
+        let apart_at_corners = none.mul(height.if_positive(one, zero)).mul(at.some);
         at.two = at.two.mul(none.if_positive(zero, one));
         let slants = edge.ends[1].minus(edge.ends[0]).dot(n);
         let deepest = Vectors::pick(zero.sub(slants), edge.ends[1], edge.ends[0]);
@@ -270,8 +344,18 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let anchor = on_face.plus(n.scaled(radius.add(half.mul(separation))));
         at.separation[0] = is_end.if_positive(separation, at.separation[0]);
         at.anchor[0] = Vectors::pick(is_end, anchor, at.anchor[0]);
+        let mut normal = Vectors::pick(from_b, opposite(n), n);
+        if apart_at_corners.any_positive() {
+            let gap = Gap::between(a, b);
+            let separation = gap.distance.sub(pairs.radius[0]).sub(pairs.radius[1]);
+            let anchor = gap.on_first.plus(gap.normal.scaled(pairs.radius[0].add(half.mul(separation))));
+            normal = Vectors::pick(apart_at_corners, gap.normal, normal);
+            at.anchor[0] = Vectors::pick(apart_at_corners, anchor, at.anchor[0]);
+            at.separation[0] = apart_at_corners.if_positive(separation, at.separation[0]);
+            at.feature[0] = apart_at_corners.if_positive(gap.feature, at.feature[0]);
+        }
         // Back to the frame of the world.
-        at.normal = rotation[0].rotate(Vectors::pick(from_b, opposite(n), n));
+        at.normal = rotation[0].rotate(normal);
         for anchor in &mut at.anchor {
             *anchor = rotation[0].rotate(*anchor);
         }
