@@ -154,7 +154,7 @@ pub fn launch(
         })?;
         ranks.ranks.push(started);
     }
-    ranks.watch(options.grace, control);
+    ranks.watch(options, control);
     Ok(ranks.exits())
 }
 
@@ -200,6 +200,13 @@ impl RunningRank {
         }
     }
 
+    /// Whether somebody has stopped the process, who may never let it go on.
+    fn is_stopped(&self) -> bool {
+        // After the name, which may hold anything, in parentheses.
+        let state = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
+        state.is_ok_and(|text| text.rsplit(')').next().is_some_and(|rest| rest.trim_start().starts_with(['T', 't'])))
+    }
+
     /// Kills the process and those it started, unless it is known to have ended: then its number may be another's.
     fn kill(&mut self) {
         if self.ended.is_none() {
@@ -234,8 +241,9 @@ struct Ranks {
 
 impl Ranks {
     /// Returns when all have ended.
-    fn watch(&mut self, grace: Duration, control: &dyn Fn() -> Control) {
+    fn watch(&mut self, LaunchOptions { peer_timeout, grace }: LaunchOptions, control: &dyn Fn() -> Control) {
         let mut lost_since: Option<Instant> = None;
+        let mut stopped_since: Option<Instant> = None;
         let mut told_to_stop = false;
         loop {
             if self.notice_ends() {
@@ -256,8 +264,23 @@ impl Ranks {
             if lost_since.is_some_and(|since| since.elapsed() >= grace) {
                 return self.end_all();
             }
+            match self.last().filter(|last| last.is_stopped()).map(|last| last.rank) {
+                None => stopped_since = None,
+                Some(rank) if stopped_since.get_or_insert_with(Instant::now).elapsed() >= peer_timeout => {
+                    let reason = format!("it was stopped for {peer_timeout:?} while all others had ended");
+                    self.record.settle(Origin { error: TransportError::PeerLost { rank, reason }, reporter: rank });
+                    return self.end_all();
+                }
+                Some(_) => {}
+            }
             sleep(POLL);
         }
+    }
+
+    /// The only one that has not ended, if there were others, who would find out that it hangs.
+    fn last(&self) -> Option<&RunningRank> {
+        let mut left = self.ranks.iter().filter(|rank| rank.ended.is_none());
+        left.next().filter(|_| left.next().is_none() && self.ranks.len() > 1)
     }
 
     /// Looks which have ended since and tells the others. Returns whether one of them ended badly.
@@ -359,6 +382,19 @@ mod tests {
         assert_eq!(heard[0].stdout, b"ended 1 it was killed by signal 9\n");
         let killed = exits(Duration::from_millis(200), "sleep 1000");
         assert_eq!((killed[0].status.signal(), killed[0].killed), (Some(9), true));
+    }
+
+    #[test]
+    fn the_last_one_is_given_up_where_it_is_stopped() {
+        let options = LaunchOptions { peer_timeout: Duration::from_millis(200), ..LaunchOptions::default() };
+        let script = |rank: Rank| if rank == Rank(0) { "kill -STOP $$" } else { "true" };
+        let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();
+        assert_eq!((exits[0].status.signal(), exits[0].killed), (Some(9), true));
+        assert!(exits[1].status.success() && !exits[1].killed);
+        // Who works on, however long, is waited for.
+        let script = |rank: Rank| if rank == Rank(0) { "sleep 1" } else { "true" };
+        let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();
+        assert!(exits.iter().all(|exit| exit.status.success()), "{exits:?}");
     }
 
     #[test]
