@@ -225,9 +225,7 @@ impl<V: Wide> Polygon<V> {
         }
         most
     }
-}
 
-impl<V: Wide> Polygon<V> {
     /// As [`Convex::nearest`](crate::model::convex::Convex::nearest) of one with faces.
     #[inline(always)]
     fn nearest(&self, point: Vectors<V>) -> (Vectors<V>, V, V) {

@@ -68,9 +68,9 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
     let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
     // Whoever asked to meet alone knows of it where another asked to stop.
     let meeting = meet && !stopped;
-    // Somebody may end the run while ranks meet.
-    world.measures |= stopped || meeting;
-    world.takes_figures |= stopped;
+    let may_be_last = stopped || meeting && world.ends_in_meetings;
+    world.measures |= may_be_last;
+    world.takes_figures |= may_be_last;
     match world.setup.params.exchange {
         // No word from outside until the step's end: each tile goes through all stages while it is in the cache.
         Exchange::Step => {

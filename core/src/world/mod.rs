@@ -78,6 +78,8 @@ pub struct World {
     pub(crate) measures: bool,
     /// Whether the next step takes figures, and what the last one took.
     pub(crate) takes_figures: bool,
+    /// Whether a run may end while ranks meet.
+    pub(crate) ends_in_meetings: bool,
     figures: Option<Box<Figures>>,
     /// Whether it was said that bodies outrun their tiles.
     warned_of_leaps: bool,
@@ -149,6 +151,7 @@ impl World {
             booked: Duration::ZERO,
             measures: false,
             takes_figures: false,
+            ends_in_meetings: false,
             figures: None,
             warned_of_leaps: false,
             first: 0,
@@ -207,6 +210,12 @@ impl World {
     /// solved: [`TileFacts`](crate::TileFacts) then tell.
     pub fn measure_next_step(&mut self) {
         self.measures = true;
+    }
+
+    /// Says that the run may end in any meeting: each step that leads to one measures and takes figures as the last one of a run that
+    /// was asked to stop.
+    pub fn end_in_meetings(&mut self) {
+        self.ends_in_meetings = true;
     }
 
     /// Asks that the next step, and the last one of a run that was asked to stop, take [`figures`](Self::figures).

@@ -115,6 +115,7 @@ fn end(exit: &RankExit) -> (Result<RankEnd, RankFailure>, u64) {
     rank_report::read(exit.rank, &exit.stdout).unwrap_or_else(|| {
         let died = |how| RankFailure::Died { rank: exit.rank, how };
         let failure = match exit.status.signal() {
+            _ if exit.stalled => died("was stopped, and given up when all others had ended".to_owned()),
             _ if exit.killed => RankFailure::Outlived { rank: exit.rank },
             Some(signal) => died(format!("was killed by signal {signal}")),
             None => died(format!("ended without a report, {}", exit.status)),

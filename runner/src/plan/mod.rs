@@ -107,7 +107,8 @@ impl Plan {
             RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
             return Err(RunError::Complete { summary: folder.summary(), steps });
         }
-        let ended = ended.map(|ended| ended.steps);
+        // Before the first step there is nothing to go on from: it begins anew.
+        let ended = ended.map(|ended| ended.steps).filter(|&steps| steps > 0);
         let mut found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
         let newest = found.snapshots.first().map(Snapshot::step);
         if newest == Some(steps) {

@@ -107,7 +107,7 @@ impl<'a> Meetings<'a> {
         }
     }
 
-    /// Meets before the first step, or after the last, if that is wanted. Returns whether somebody asked the run to stop.
+    /// Meets before the first step, or after the last, if that is wanted. Returns whether the run ends here.
     ///
     /// # Errors
     /// If a rank is lost, or what is to be done cannot be.
@@ -126,8 +126,8 @@ impl<'a> Meetings<'a> {
         self.hold(world, last, halo, commander)
     }
 
-    /// Meets, until rank 0 lets time go on, or somebody asks the run to stop. Returns whether that was so, on all ranks alike: who waits
-    /// for a word allows no step.
+    /// Meets, until rank 0 lets time go on, or somebody asks the run to stop. Returns whether the run ends here, on all ranks alike:
+    /// whoever drives it allowed no further step.
     ///
     /// # Errors
     /// If a rank is lost, or what is to be done cannot be.
@@ -154,7 +154,7 @@ impl<'a> Meetings<'a> {
             }
         }
         self.sent += transport.stats().since(&before);
-        Ok(stopped)
+        Ok(stopped && self.tells_of_waiting)
     }
 
     /// One word of rank 0 and what follows from it.

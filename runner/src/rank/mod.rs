@@ -27,9 +27,9 @@ pub use observer::{Listener, Observer, PanicAt, StopFlag, Watcher};
 pub(crate) use trace::TraceSteps;
 use trouble::Refusal;
 
-use crate::error::Exit;
+use crate::error::{Exit, RunError};
 use crate::plan::Plan;
-use atoll_core::{Phase, SetupError, StepError, StepReport, TileFacts};
+use atoll_core::{Phase, SetupError, StepError, StepReport, TileFacts, World};
 use atoll_transport::{Collective, Counting, Rank, Transport, TransportError};
 use balance::{Balancer, Retiler};
 use begin::Beginning;
@@ -173,8 +173,11 @@ fn run<T: Transport>(
     commander.take_turn(&mut world, &mut halo, observer)?;
     observer.show(rank, &world);
     let mut meetings = Meetings::new(observer, plan);
-    let mut stopped = meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
-    while world.step_count() < steps && !stopped && !commander.is_over() {
+    if plan.commands.drives {
+        world.end_in_meetings();
+    }
+    last.stopped = meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
+    while world.step_count() < steps && !last.stopped && !commander.is_over() {
         let unwritten = log_failure.is_some()
             || commander.failure().is_some()
             || recorder.as_ref().is_some_and(|recorder| recorder.failure().is_some());
@@ -199,17 +202,10 @@ fn run<T: Transport>(
         migrations += last.migrations;
         *complete = world.step_count();
         observer.complete.store(*complete, Ordering::Relaxed);
+        let sides = (recorder.as_ref(), balancer.as_ref(), retiler.as_ref());
         if let Some(log) = &mut log {
-            let written = recorder.as_ref().map_or(Duration::ZERO, Recorder::time);
-            let balanced = balancer.as_ref().map_or(Duration::ZERO, Balancer::time)
-                + retiler.as_ref().map_or(Duration::ZERO, Retiler::time);
-            log.write_due(&world, &last, (migrations, written, balanced), &mut halo)?;
-            match (log.take_failure(), &recorder) {
-                // Before a snapshot that would be gone on from without the rows until then.
-                (Some(failure), Some(recorder)) => recorder.fail(failure),
-                (Some(failure), None) => log_failure = Some(failure),
-                (None, _) => {}
-            }
+            let failure = write_row(log, (&world, &last, migrations), sides, &mut halo)?;
+            log_failure = log_failure.or(failure);
         }
         commander.after_step(&world, &mut halo)?;
         if let Some(recorder) = &mut recorder {
@@ -221,9 +217,14 @@ fn run<T: Transport>(
         observer.show(rank, &world);
         told.made(*complete);
         if last.meeting {
-            stopped = meetings.hold(&mut world, &last, &mut halo, &mut commander)?;
+            last.stopped = meetings.hold(&mut world, &last, &mut halo, &mut commander)?;
+            let sides = (recorder.as_ref(), balancer.as_ref(), retiler.as_ref());
+            // For who goes on from here it is the last.
+            if let Some(log) = log.as_mut().filter(|log| last.stopped && !log.is_due(*complete)) {
+                let failure = write_row(log, (&world, &last, migrations), sides, &mut halo)?;
+                log_failure = log_failure.or(failure);
+            }
         }
-        stopped |= last.stopped;
         if let Some(balancer) = &mut balancer {
             let is_last = last.stopped || *complete == steps;
             balancer.after_step(&last, is_last, &mut world, &mut halo)?;
@@ -232,7 +233,7 @@ fn run<T: Transport>(
     }
     tracer.before(None);
     // Whoever asks while the last step is made gets all of them.
-    let interrupted = (stopped || commander.is_over() && *complete > 0) && *complete < steps;
+    let interrupted = (last.stopped || commander.is_over() && *complete > 0) && *complete < steps;
     let mut output_time = match recorder {
         Some(recorder) => {
             end::finish(recorder, (&world, commander.state()), interrupted, plan, observer, halo.transport())?
@@ -276,7 +277,7 @@ fn run<T: Transport>(
     facts.wall_nanos = (finished - built).saturating_sub(meetings.stood).as_nanos() as u64;
     facts.wait_nanos = waited.as_nanos() as u64;
     facts.output_nanos = output_time.as_nanos() as u64;
-    if !stopped {
+    if !last.stopped {
         meetings.linger(&mut world, &last, &mut halo, &mut commander)?;
     }
     commander.leave(observer);
@@ -285,6 +286,27 @@ fn run<T: Transport>(
         facts.peak_rss_bytes = peak_rss_bytes();
     }
     gather(halo.transport(), &facts, &tiles, &tracer).map_err(RankError::Transport)
+}
+
+/// Writes the row of the log that is due after a step, if one is. What keeps it from that is for the recorder to tell, or comes back
+/// where there is none.
+fn write_row<T: Transport>(
+    log: &mut Log,
+    (world, last, migrations): (&World, &StepReport, u64),
+    (recorder, balancer, retiler): (Option<&Recorder<'_>>, Option<&Balancer>, Option<&Retiler>),
+    halo: &mut RankHalo<Counting<T>>,
+) -> Result<Option<RunError>, RankError> {
+    let written = recorder.map_or(Duration::ZERO, Recorder::time);
+    let balanced = balancer.map_or(Duration::ZERO, Balancer::time) + retiler.map_or(Duration::ZERO, Retiler::time);
+    log.write_due(world, last, (migrations, written, balanced), halo)?;
+    Ok(match (log.take_failure(), recorder) {
+        // Before a snapshot that would be gone on from without the rows until then.
+        (Some(failure), Some(recorder)) => {
+            recorder.fail(failure);
+            None
+        }
+        (failure, _) => failure,
+    })
 }
 
 /// Brings everything to rank 0.

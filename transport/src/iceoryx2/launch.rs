@@ -67,6 +67,9 @@ pub struct RankExit {
     /// Whether it was the launcher that killed it: told to quit, or because another rank was lost and this one did not
     /// end within the [grace](LaunchOptions::grace).
     pub killed: bool,
+    /// Whether it was killed as somebody had stopped it, as by SIGSTOP or a debugger, for the
+    /// [peer timeout](LaunchOptions::peer_timeout), while all others had ended.
+    pub stalled: bool,
     /// What it wrote to its standard output.
     pub stdout: Vec<u8>,
 }
@@ -169,6 +172,7 @@ struct RunningRank {
     output: Receiver<Vec<u8>>,
     ended: Option<ExitStatus>,
     killed: bool,
+    stalled: bool,
 }
 
 impl RunningRank {
@@ -178,7 +182,7 @@ impl RunningRank {
         let mut child = command.spawn()?;
         let (sender, output) = channel();
         let stdout = child.stdout.take();
-        let running = RunningRank { rank: environment.rank, child, output, ended: None, killed: false };
+        let running = RunningRank { rank: environment.rank, child, output, ended: None, killed: false, stalled: false };
         // A pipe holds little; whoever writes more would wait for a reader.
         let reader = move || {
             let mut stdout = stdout;
@@ -229,7 +233,7 @@ impl RunningRank {
         while let Ok(piece) = self.output.recv_timeout(OUTPUT_TIMEOUT.saturating_sub(started.elapsed())) {
             stdout.extend(piece);
         }
-        Some(RankExit { rank: self.rank, status: self.ended?, killed: self.killed, stdout })
+        Some(RankExit { rank: self.rank, status: self.ended?, killed: self.killed, stalled: self.stalled, stdout })
     }
 }
 
@@ -264,11 +268,10 @@ impl Ranks {
             if lost_since.is_some_and(|since| since.elapsed() >= grace) {
                 return self.end_all();
             }
-            match self.last().filter(|last| last.is_stopped()).map(|last| last.rank) {
+            match self.last().filter(|last| last.is_stopped()) {
                 None => stopped_since = None,
-                Some(rank) if stopped_since.get_or_insert_with(Instant::now).elapsed() >= peer_timeout => {
-                    let reason = format!("it was stopped for {peer_timeout:?} while all others had ended");
-                    self.record.settle(Origin { error: TransportError::PeerLost { rank, reason }, reporter: rank });
+                Some(last) if stopped_since.get_or_insert_with(Instant::now).elapsed() >= peer_timeout => {
+                    last.stalled = true;
                     return self.end_all();
                 }
                 Some(_) => {}
@@ -278,9 +281,11 @@ impl Ranks {
     }
 
     /// The only one that has not ended, if there were others, who would find out that it hangs.
-    fn last(&self) -> Option<&RunningRank> {
-        let mut left = self.ranks.iter().filter(|rank| rank.ended.is_none());
-        left.next().filter(|_| left.next().is_none() && self.ranks.len() > 1)
+    fn last(&mut self) -> Option<&mut RunningRank> {
+        let are_others = self.ranks.len() > 1;
+        let mut left = self.ranks.iter_mut().filter(|rank| rank.ended.is_none());
+        let last = left.next()?;
+        (are_others && left.next().is_none()).then_some(last)
     }
 
     /// Looks which have ended since and tells the others. Returns whether one of them ended badly.
@@ -389,8 +394,8 @@ mod tests {
         let options = LaunchOptions { peer_timeout: Duration::from_millis(200), ..LaunchOptions::default() };
         let script = |rank: Rank| if rank == Rank(0) { "kill -STOP $$" } else { "true" };
         let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();
-        assert_eq!((exits[0].status.signal(), exits[0].killed), (Some(9), true));
-        assert!(exits[1].status.success() && !exits[1].killed);
+        assert_eq!((exits[0].status.signal(), exits[0].killed, exits[0].stalled), (Some(9), true, true));
+        assert!(exits[1].status.success() && !exits[1].killed && !exits[1].stalled);
         // Who works on, however long, is waited for.
         let script = |rank: Rank| if rank == Rank(0) { "sleep 1" } else { "true" };
         let exits = launch(2, options, &|| Control::Run, |rank| shell(script(rank))).unwrap();

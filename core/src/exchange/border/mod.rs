@@ -300,7 +300,10 @@ impl Border {
                 }
                 for theirs in impulse.points.iter().filter(|point| point.feature != ContactPoint::ABSENT) {
                     let is_known = solver.move_together(&tile.contacts, border, totals, theirs, bounced);
-                    if is_known && theirs.blow > max(solver.groups.blow(border.contact), 0.0) {
+                    if is_known
+                        && theirs.blow > max(solver.groups.blow(border.contact), 0.0)
+                        && solver.groups.may_pass_on(border.contact)
+                    {
                         self.heard.push((border.contact, theirs.blow));
                     }
                 }

@@ -11,7 +11,7 @@ pub(crate) enum Answer {
     Hold,
     /// It came in fast, and parts.
     Part(Parting),
-    /// Both bodies flew, and came no nearer, or slowly. Where what pressed takes more than a speed it was a blow within the step, which
+    /// Its surfaces came no nearer, or slowly, and no load pressed there. Where what pressed takes more than a speed it was a blow within the step, which
     /// is passed on in the next one, as one between bodies that come in fast.
     NotYet(Passing),
 }
@@ -21,9 +21,10 @@ pub(crate) enum Answer {
 pub(crate) struct Passing {
     /// What takes no more is no blow.
     pub(super) least: f32,
-    /// No blow makes bodies come nearer faster: what takes more pressed from two sides.
+    /// No blow makes bodies come nearer faster: what takes more pressed from two sides. Until it is known how fast blows are, the speed at
+    /// which the two moved apart.
     pub(super) most: f32,
-    /// Whether something held one of the two as the step began: then `most` is the speed at which they moved apart.
+    /// Whether something held one of the two as the step began: then it stays that.
     pub(super) held: bool,
 }
 

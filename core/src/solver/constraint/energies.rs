@@ -4,7 +4,8 @@
 //! from another within the step: as the step began its bodies moved apart, and by `energy = impulse * (speed apart before + after) / 2` it
 //! gives what nobody had. In columns that fall and bounce that came to many times the energy of the fall. So bodies in contacts that
 //! bounce, one next to the other, go from where the solver left them only as far towards what bounces make of them as they keep to the energy of
-//! motion that they came with. Impulses do so too, and momentum is what it was.
+//! motion that they came with. Impulses do so too, and momentum is what it was. Not where something gives energy from outside, a static that
+//! moves, or a ghost.
 
 use super::columns::Columns;
 use super::groups::{Bounce, Lane};
@@ -28,9 +29,9 @@ pub(super) struct Energies {
     /// Of the clusters, one after the other: bodies, and contacts.
     bodies: Vec<Body>,
     contacts: Vec<u32>,
-    /// What the solver left: velocities of the bodies, and at each contact's points the impulses along normal and tangent.
+    /// What the solver left: velocities of the bodies, and what each contact pressed.
     solved: Vec<Quad>,
-    pressed: Vec<[[f32; 2]; 2]>,
+    pressed: Vec<[Pressed; 2]>,
     /// Buffers: bounces, each with where its batch and its cluster begin; and bodies of a cluster.
     sorted: Vec<(u32, u32, u32)>,
     moving: Vec<u32>,
@@ -45,6 +46,13 @@ struct Body {
     weight: [f32; 2],
     /// Twice its energy of motion as the step begins, in J.
     twice_energy: f64,
+}
+
+/// The impulses of a point along normal and tangent: over the step, and those that the next one is to start with.
+#[derive(Clone, Copy, Default, Debug)]
+struct Pressed {
+    totals: [f32; 2],
+    last: [f32; 2],
 }
 
 /// Two contacts or more, each of which shares a body with another.
@@ -125,8 +133,13 @@ impl Energies {
         for cluster in clusters {
             solved.extend(bodies[cluster.bodies.clone()].iter().map(|body| solver.velocity[body.place as usize]));
             pressed.extend(contacts[cluster.contacts.clone()].iter().map(|&contact| {
-                let (_, _, totals, lane) = lanes[contact as usize].totals_mut(columns);
-                std::array::from_fn(|k| totals.get(k).map_or([0.0; 2], |totals| totals.of(lane)))
+                let (_, points, totals, lane) = lanes[contact as usize].totals_mut(columns);
+                let mut pressed = [Pressed::default(); 2];
+                for ((point, totals), pressed) in points.iter().zip(totals).zip(&mut pressed) {
+                    let last = [point.normal_impulse[lane], point.tangent_impulse[lane]];
+                    *pressed = Pressed { totals: totals.of(lane), last };
+                }
+                pressed
             }));
         }
         bounce(columns, &mut solver.velocity);
@@ -144,10 +157,16 @@ impl Energies {
                 (0..3).for_each(|k| to[k] = blend(from[k], to[k]));
             }
             for (&contact, from) in contacts.iter().zip(pressed) {
-                let (_, _, totals, lane) = lanes[contact as usize].totals_mut(columns);
-                for (totals, from) in totals.iter_mut().zip(from) {
-                    totals.normal[lane] = blend(from[0], totals.normal[lane]);
-                    totals.tangent[lane] = blend(from[1], totals.tangent[lane]);
+                let (_, points, totals, lane) = lanes[contact as usize].totals_mut(columns);
+                for ((point, totals), &Pressed { totals: [normal, tangent], last }) in
+                    points.iter_mut().zip(totals).zip(from)
+                {
+                    totals.normal[lane] = blend(normal, totals.normal[lane]);
+                    totals.tangent[lane] = blend(tangent, totals.tangent[lane]);
+                    // Not all of it was given back.
+                    if totals.normal[lane] > 0.0 {
+                        [point.normal_impulse[lane], point.tangent_impulse[lane]] = last;
+                    }
                 }
             }
         }

@@ -28,14 +28,15 @@ pub(crate) struct Groups {
     pub(super) lanes: Vec<Lane>,
     /// Contacts that may bounce, of batches that keep their rows.
     pub(super) bounces: Vec<Bounce>,
-    /// These contacts, ascending, each with the speed of the blow that it gives back or passes on, in m/s.
-    pub(super) bouncing: Vec<(u32, f32)>,
+    /// These contacts, ascending, each with the speed of the blow that it gives back or passes on, in m/s, and whether it could pass on
+    /// a faster one.
+    pub(super) bouncing: Vec<(u32, f32, bool)>,
     /// The same of batches that are solved at once: batch by batch.
     pub(super) bounces_at_once: Vec<Bounce>,
     /// What bounces may have.
     pub(super) energies: Energies,
-    /// For each of the solver's bodies when something moved it last, while contacts bounce.
-    pub(super) moved: Vec<u32>,
+    /// While contacts bounce.
+    pub(super) times: Times,
     /// For each body whether something held it as the step began, where that was asked.
     pub(super) held: Vec<Option<bool>>,
     /// For each body a lower one that a blow may go on to, or come from, or itself.
@@ -43,6 +44,15 @@ pub(crate) struct Groups {
     /// For each body whether a blow comes to it or goes on from it; and of those that it goes on to, and that know of this one as the
     /// lowest, the speed of the fastest, in m/s, or zero.
     pub(super) struck: Vec<(bool, f32)>,
+}
+
+/// When what happened last while contacts bounce, each with a time of its own.
+#[derive(Default, Debug)]
+pub(super) struct Times {
+    /// For each of the solver's bodies: something moved it.
+    pub(super) moved: Vec<u32>,
+    /// For each contact that bounces: it was looked at.
+    pub(super) looked: Vec<u32>,
 }
 
 /// A contact that may bounce.

@@ -2,7 +2,7 @@
 
 use super::bounce::{Answer, Parting, Passing};
 use super::columns::Columns;
-use super::groups::{Bounce, Groups, Lane};
+use super::groups::{Bounce, Groups, Lane, Times};
 use super::rows::Source;
 use crate::islands::union_find::{join, root_of};
 use crate::model::kind::KindRow;
@@ -67,8 +67,8 @@ impl Groups {
             self.bounces.clear();
             self.bounces_at_once.clear();
         }
-        self.bouncing.extend(self.bounces.iter().map(|bounce| (bounce.contact, bounce.blow)));
-        self.bouncing.sort_unstable_by_key(|(contact, _)| *contact);
+        self.bouncing.extend(self.bounces.iter().map(|bounce| (bounce.contact, bounce.blow, bounce.passes_on())));
+        self.bouncing.sort_unstable_by_key(|(contact, ..)| *contact);
         let name = |bounce: &Bounce| source.tile.pair_of(source.tile.contacts.keys[bounce.contact as usize]);
         if source.setup.params.exchange == Exchange::Substep {
             // By names: then both tiles that solve a contact at their border come to the same, if they know the same.
@@ -210,25 +210,34 @@ impl Groups {
 
     /// Speed of the blow that such a contact gives back or passes on, in m/s; less than zero if it does not bounce.
     pub(crate) fn blow(&self, contact: u32) -> f32 {
-        let place = self.bouncing.binary_search_by_key(&contact, |(contact, _)| *contact);
-        place.map_or(-1.0, |place| self.bouncing[place].1)
+        self.bouncing_of(contact).map_or(-1.0, |(_, blow, _)| *blow)
+    }
+
+    /// Whether a contact could pass on a blow that comes from elsewhere, as far as is known: it does not only part, or hold.
+    pub(crate) fn may_pass_on(&self, contact: u32) -> bool {
+        self.bouncing_of(contact).is_none_or(|(.., passes_on)| *passes_on)
+    }
+
+    fn bouncing_of(&self, contact: u32) -> Option<&(u32, f32, bool)> {
+        let place = self.bouncing.binary_search_by_key(&contact, |(contact, ..)| *contact);
+        place.ok().map(|place| &self.bouncing[place])
     }
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, lanes, kept, energies, moved, .. } = self;
-        energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity, moved));
+        let Self { bounces, lanes, kept, energies, times, .. } = self;
+        energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity, times));
     }
 
     /// Bounces of a batch that is solved at once.
     pub(crate) fn apply_restitution_at_once(&mut self, batch: &Batch, bodies: &mut SolverBodies) {
-        let Self { bounces_at_once: bounces, lanes, at_once, energies, moved, .. } = self;
+        let Self { bounces_at_once: bounces, lanes, at_once, energies, times, .. } = self;
         let before =
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
         let bounces = &bounces[own];
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
-            bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], moved);
+            bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], times);
         });
     }
 }
@@ -271,11 +280,13 @@ impl Answer {
 /// restitution 1 nothing is lost or gained where each point parts as fast as it came.
 ///
 /// A contact is passed over while nothing has moved its bodies since it let them be.
-fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &mut [Quad], moved: &mut Vec<u32>) {
+fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &mut [Quad], times: &mut Times) {
     let Some(first) = bounces.iter().map(|bounce| lanes[bounce.contact as usize].base as usize).min() else { return };
+    let Times { moved, looked } = times;
     moved.clear();
     moved.resize(velocity.len() - first, 0);
-    let mut looked = vec![0; bounces.len()];
+    looked.clear();
+    looked.resize(bounces.len(), 0);
     let mut time = 0;
     let mut pass = |looked: &mut u32, bounce: &Bounce| {
         let at = lanes[bounce.contact as usize];
@@ -294,7 +305,7 @@ fn bounce(bounces: &[Bounce], lanes: &[Lane], columns: &mut Columns, velocity: &
         acts
     };
     let mut acts = |all: bool| {
-        let which = bounces.iter().zip(&mut looked).filter(|(bounce, _)| all || bounce.off_static);
+        let which = bounces.iter().zip(&mut *looked).filter(|(bounce, _)| all || bounce.off_static);
         which.fold(false, |acts, (bounce, looked)| pass(looked, bounce) | acts)
     };
     if (0..PASSES).all(|_| acts(true)) {

@@ -160,7 +160,8 @@ impl Log {
         }
     }
 
-    fn is_due(&self, step: u64) -> bool {
+    /// Whether a row is written after that step in any case.
+    pub(super) fn is_due(&self, step: u64) -> bool {
         let due = |every: u64| step.is_multiple_of(every);
         due(self.every) || self.checkpoint_every.is_some_and(due) || step == self.steps
     }

@@ -7,6 +7,7 @@ use super::SceneError;
 use super::file::write::World;
 use super::file::{FARTHEST, is_turn};
 use crate::scene::record::KindText;
+use crate::wording::unmarked;
 use atoll_core::{Body, Dynamics, GlobalId, Kind, Material, Rot, StaticBody};
 use glam::DVec2;
 use std::collections::{BTreeMap, HashMap};
@@ -52,12 +53,10 @@ fn text(path: &Path) -> Result<String, SceneError> {
     if !data.is_file() || data.len() > LONGEST {
         return Err(SceneError::read(path, WHAT, "it is no regular file of at most 4 GiB; name one"));
     }
-    let mut bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
-    // Some editors mark it as UTF-8 by a character of no width in front.
-    if bytes.starts_with("\u{feff}".as_bytes()) {
-        bytes.drain(..3);
-    }
-    String::from_utf8(bytes).map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))
+    let bytes = fs::read(path).map_err(|error| SceneError::read(path, WHAT, error))?;
+    String::from_utf8(bytes)
+        .map(unmarked)
+        .map_err(|_| SceneError::whole(path, "it is not UTF-8; save the file as that"))
 }
 
 /// Whether a file of another program can be read; whatever it is, it is refused in one line or makes a world.
@@ -109,11 +108,13 @@ impl Imported {
     fn check(&self, path: &Path) -> Result<(), SceneError> {
         let refuse = |what: String| Err(SceneError::whole(path, what));
         let is_place = |place: DVec2| place.is_finite() && place.abs().cmple(DVec2::splat(FARTHEST)).all();
-        if let Some(at) = self.kinds.iter().position(|kind| !kind.is_valid()) {
+        let named = self.kinds.iter().zip(self.names.iter().map(Option::as_deref));
+        let mut kinds = named.chain(self.statics.iter().map(|fixed| (&fixed.kind, None)));
+        if let Some((kind, name)) = kinds.find(|(kind, _)| !kind.is_valid()) {
             return refuse(format!(
                 "it has a shape or a material that cannot be: {}; sizes and densities must be above 0, a restitution at most 1, \
                  others but the gravity at least 0, all finite",
-                told(&self.kinds[at], self.names[at].as_deref())
+                told(kind, name)
             ));
         }
         if let Some(gravity) = self.gravity.filter(|gravity| !gravity.iter().all(|along| (*along as f32).is_finite())) {
@@ -122,7 +123,7 @@ impl Imported {
         let is_good = |place: DVec2, rotation: Rot| is_place(place) && is_turn(rotation);
         let is_static = |fixed: &StaticBody| {
             let moves = fixed.path.is_none_or(|path| path.is_valid());
-            is_good(fixed.position, fixed.rotation) && fixed.kind.is_valid() && moves
+            is_good(fixed.position, fixed.rotation) && moves
         };
         let cannot_be = |what: &str, numbers: &[usize], at: usize, id: GlobalId| {
             let which =

@@ -49,7 +49,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Imported, SceneError> {
     for (list, what) in [("joint", "joints"), ("image", "images")] {
         imported.leave_out(what, world.get(list).and_then(Value::as_array).map_or(0, Vec::len) as u64);
     }
-    for (number, body) in objects(world, "body").enumerate() {
+    let bodies = world["body"].as_array().into_iter().flatten().enumerate();
+    for (number, body) in bodies.filter_map(|(number, body)| Some((number, body.as_object()?))) {
         add(&mut imported, body);
         let Imported { statics, bodies, numbers: [of_statics, of_bodies], .. } = &mut imported;
         of_statics.resize(statics.len(), number);

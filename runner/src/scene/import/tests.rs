@@ -238,7 +238,12 @@ fn what_is_no_such_file_is_refused_in_one_line() {
         ),
         (RUBE, "\"y\": 6}", "\"y\": []}", "body 2 of its list, from 0, has a number that cannot be"),
         (RUBE, "\"radius\": 0.75", "\"radius\": -1", "it has a shape or a material that cannot be: "),
-        (RUBE, "\"radius\": 0.5", "\"radius\": 0", "body 0 of its list, from 0, has a number that cannot be"),
+        (
+            RUBE,
+            "\"radius\": 0.5",
+            "\"radius\": 0",
+            "it has a shape or a material that cannot be: within 0 m of its middle, density 1",
+        ),
         (RUBE, "\"y\": -10", "\"y\": \"7fc00000\"", "its gravity cannot be: [0.0, NaN] m/s^2"),
         (RUBE, "\"y\": -10", "\"y\": -1e39", "its gravity cannot be: [0.0, -1e39] m/s^2"),
         (LAMMPS, LAMMPS, "", "it is no data file of LAMMPS with discs: it has no section Atoms"),
