@@ -3,6 +3,7 @@
 use atoll::Config;
 use atoll::internals::{Plan, part_of_scene};
 use atoll_core::{Body, Command as Act, GlobalId, KindId, Loopback, World, step};
+use atoll_tests::processes;
 use atoll_tests::program::{self, Ended};
 use atoll_tests::ways::Way;
 use atoll_tests::world::noise;
@@ -498,6 +499,43 @@ fn a_driver_is_waited_for_and_may_go_on_after_the_run_was_lost() {
     again.arg("run").arg(path("lost").join("run.toml")).args(["--quiet", "--json"]).arg(path("again.json"));
     run(again.arg("--commands").arg(path("lost").join("commands.jsonl")));
     assert_eq!(end(&program::summary(&path("again.json"))), expected);
+}
+
+/// Defect: it made a step more, which nobody had allowed, and on which nobody could act.
+#[test]
+fn who_waits_for_a_word_and_is_interrupted_makes_no_step() {
+    let folder = tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let options = ["--quiet", "--steps", "20", "--commands", "-", "--log-every", "5"];
+    run(Way::Channel.command(2, CONFIG).args(&options[..3]).args(&options[5..]).arg("--out").arg(path("whole")));
+    let column = |run: &str, name: &str| -> Vec<u64> {
+        let rows = program::log(&path(run).join("log.csv"));
+        let place = rows[0].iter().position(|column| column == name).unwrap();
+        rows[1..].iter().map(|row| row[place].parse().unwrap()).collect()
+    };
+    for until in [0, 7] {
+        let name = format!("until-{until}");
+        let mut command = Way::Channel.command(2, CONFIG);
+        command.args(options).args(["--answers", "-", "--out"]).arg(path(&name));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let (mut say, hear) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        writeln!(say, "{{\"until\": {until}}}").unwrap();
+        let waits = format!("{{\"step\":{until},\"waits\":true}}");
+        let mut told = std::io::BufRead::lines(std::io::BufReader::new(hear));
+        assert!(told.any(|line| line.unwrap() == waits), "it does not wait after step {until}");
+        processes::send_signal(child.id(), "INT");
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert_eq!(program::summary(&path(&name).join("summary.json"))["steps"], json!(until));
+        let mut resumed = Way::Channel.resume(3, &path(&name));
+        run(resumed.args(["--quiet", "--commands", "-"]).stdin(Stdio::null()));
+        let of = |run: &str| end(&program::summary(&path(run).join("summary.json")));
+        assert_eq!(of(&name), of("whole"), "after step {until}");
+        // Where it ended there is a row more, from which it went on.
+        let steps: Vec<u64> = if until == 0 { vec![0, 5, 10, 15, 20] } else { vec![0, 5, 7, 10, 15, 20] };
+        assert_eq!(column(&name, "step"), steps);
+        let migrations = |run: &str| column(run, "migrations").iter().sum::<u64>();
+        assert_eq!(migrations(&name), migrations("whole"), "after step {until}");
+    }
 }
 
 /// The file of docs/worlds.md, and what it answers.
