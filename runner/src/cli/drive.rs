@@ -173,10 +173,10 @@ mod tests {
         assert_eq!(driver.next(3, Duration::ZERO), Next::GoOn);
         let Next::Do(rest) = driver.next(5, Duration::ZERO) else { panic!("two lines are due") };
         assert!(String::from_utf8(rest).unwrap().starts_with("5\t{\"step\":4,"));
+        assert!(!driver.calls(100));
         assert_eq!(driver.undone(), None);
         driver.lock().hear(7, "{\"step\": 50, \"remove\": 3}".to_owned());
         assert_eq!(driver.undone(), Some((1, 50)));
-        assert!(!driver.calls(100));
     }
 
     #[test]
