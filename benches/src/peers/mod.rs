@@ -13,8 +13,8 @@
 //!
 //! # What each engine keeps
 //!
-//! - **Atoll**: `f64` positions; segments are solid from one side, those of the others from both; the tiles and the exchange of the configuration. All tiles are in one process, and no
-//!   transport is between them.
+//! - **Atoll**: `f64` positions; segments that are solid from one side, where those of the others are from both; the tiles and the
+//!   exchange of the configuration. All tiles are in one process, and no transport is between them.
 //! - **Box2D**: its cap of 400 m/s, its turn of at most an eighth a step, its margins, `f32` positions; its AVX2 kernels,
 //!   compiled by the C compiler at `-O3`. More threads are its own scheduler's. It counts a solver block's bodies in 16
 //!   bits, so a world never gets more than [`box2d::MOST_BODIES`]; rooms that nothing can leave are worlds of their own,

@@ -1,7 +1,7 @@
 //! Serves the page and its socket to browsers.
 //!
-//! Listening on loopback is not enough: any page in the user's browser can reach it. So a request must name this server as
-//! its host, exactly; come from this server's own page, if it says where it comes from; and know the token that is in the
+//! Listening on loopback is not enough: any page in the user's browser can reach it. So a request must call this server by
+//! the number of its address, of any where it listens at all, as no name that is made to lead here does; come from the page that it names so, if it says where it comes from; and know the token that is in the
 //! address which only the user was told. Everything that is read is bounded in size and time, and each connection has a
 //! thread of its own, so that a slow or broken one holds up nobody.
 
