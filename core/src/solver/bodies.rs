@@ -99,12 +99,14 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// A body of the solver whose velocity is given from outside: a ghost, or a [`Carrier`].
+/// A body of the solver whose velocity is given from outside, or a part of it: a ghost, a [`Carrier`], or one that a force pushes at.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ghost {
     pub(crate) place: SolverIndex,
     /// What it is given in every substep, mass-weighted; its velocity, if it is held.
     pub(crate) given: [f32; 3],
+    /// The part of that which is by forces.
+    pushed: [f32; 3],
     /// Whether nothing else moves it.
     pub(crate) held: bool,
 }
@@ -252,9 +254,14 @@ impl SolverBodies {
             if let Some(&factors) = setup.factors.get(bodies.kind[i].0 as usize) {
                 self.factors[place.get()] = factors;
             }
+            let pushed = tile.gain(i).map(|[x, y, spin]| [x * root_mass, y * root_mass, spin * root_inertia]);
             if i >= tile.owned {
-                let given = if self.frozen { velocity } else { self.given(place, &tile.unseen[i - tile.owned]) };
-                self.ghosts.push(Ghost { place, given, held: self.frozen });
+                let pushed = pushed.unwrap_or_default();
+                let given =
+                    if self.frozen { velocity } else { self.given(place, &tile.unseen[i - tile.owned], pushed) };
+                self.ghosts.push(Ghost { place, given, pushed, held: self.frozen });
+            } else if let Some(pushed) = pushed {
+                self.ghosts.push(Ghost { place, given: pushed, pushed, held: false });
             }
         }
         self.load_carriers(tile, contacts, setup);
@@ -278,7 +285,7 @@ impl SolverBodies {
             let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
             self.velocity[place.get()] = [given[0], given[1], given[2], marked(1.0 / CARRIER, kind)];
             self.weight[place.get()] = [CARRIER, CARRIER, 1.0 / CARRIER, 1.0 / CARRIER];
-            self.ghosts.push(Ghost { place, given, held: true });
+            self.ghosts.push(Ghost { place, given, pushed: [0.0; 3], held: true });
         }
     }
 
@@ -290,9 +297,13 @@ impl SolverBodies {
     }
 
     /// Mass-weighted, what a ghost is given per substep.
-    fn given(&self, place: SolverIndex, unseen: &Unseen) -> [f32; 3] {
+    fn given(&self, place: SolverIndex, unseen: &Unseen, pushed: [f32; 3]) -> [f32; 3] {
         let [_, _, root_inv_inertia, root_inv_mass] = self.weight[place.get()];
-        [unseen.linear.x * root_inv_mass, unseen.linear.y * root_inv_mass, unseen.angular * root_inv_inertia]
+        [
+            unseen.linear.x * root_inv_mass + pushed[0],
+            unseen.linear.y * root_inv_mass + pushed[1],
+            unseen.angular * root_inv_inertia + pushed[2],
+        ]
     }
 
     /// Takes over a ghost's state from its owner, if it has a contact here. Its share of the next warm start stays this tile's own.
@@ -309,7 +320,7 @@ impl SolverBodies {
         }
         self.pose[i] = refresh.pose;
         let ghost = self.ghosts.binary_search_by_key(&place, |ghost| ghost.place).expect("only ghosts are refreshed");
-        self.ghosts[ghost].given = self.given(place, &refresh.unseen);
+        self.ghosts[ghost].given = self.given(place, &refresh.unseen, self.ghosts[ghost].pushed);
     }
 
     /// Whether a body with a contact is solved: not if it sleeps.

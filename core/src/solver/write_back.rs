@@ -12,6 +12,7 @@ use crate::parallel::team::Team;
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
+use crate::tiling::pushes::Push;
 use crate::tiling::tile::Tile;
 use bytemuck::cast_slice_mut;
 use std::ops::Range;
@@ -22,7 +23,7 @@ const GRAIN: usize = 2048;
 /// Writes the solved bodies' new state back, and moves those without contacts. Ghosts' results are scratch: their
 /// owners' stand. Who sleeps is left alone. Notes who may concern other tiles from now on.
 pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, team: Team) {
-    let mover = Mover { solved, motion: Motion::new(setup), interior: &tile.interior, setup };
+    let mover = Mover { solved, motion: Motion::new(setup), interior: &tile.interior, pushes: &tile.pushes, setup };
     let mut rim = std::mem::take(&mut tile.rim.bodies);
     rim.clear();
     let (bodies, owned) = (&mut tile.bodies, tile.owned);
@@ -174,7 +175,7 @@ struct Motions<V> {
 impl WriteBack<'_> {
     #[inline(always)]
     fn eights<V: Lanes, const N: usize>(&mut self, first: usize) {
-        let (are_within, are_finite) = self.mover.go::<V, N>(self.owned.eights(first));
+        let (are_within, are_finite) = self.mover.go::<V, N>(self.owned.eights(first), self.first + first);
         for (block, are_within) in are_within.into_iter().enumerate() {
             if !are_within {
                 let first = first + block * LANES;
@@ -213,7 +214,7 @@ impl WriteBack<'_> {
             kind: &kind,
             asleep: if owned.asleep.is_empty() { &[] } else { &asleep },
         };
-        self.mover.go::<V, 1>(eight);
+        self.mover.go::<V, 1>(eight, self.first + first);
         let owned = &mut self.owned;
         owned.position[rest.clone()].copy_from_slice(&position[0][..count]);
         owned.rotation[rest.clone()].copy_from_slice(&rotation[0][..count]);
@@ -248,6 +249,8 @@ struct Mover<'a> {
     solved: &'a SolverBodies,
     motion: Motion,
     interior: &'a Region,
+    /// By body.
+    pushes: &'a [Push],
     setup: &'a Setup,
 }
 
@@ -255,7 +258,7 @@ impl Mover<'_> {
     /// Moves blocks of eight bodies, but those that sleep. Those that were solved and those that flew lie in no order, so both is done
     /// for all of them where there are some of either. Whether those of each block concern no other tile now, and all are finite.
     #[inline(always)]
-    fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>) -> ([bool; N], bool) {
+    fn go<V: Lanes, const N: usize>(&self, eights: Eights<'_, N>, first: usize) -> ([bool; N], bool) {
         let Eights { position, rotation, velocity, spin, place, kind, asleep } = eights;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let nothing = Vectors::new(zero, zero);
@@ -277,7 +280,7 @@ impl Mover<'_> {
             (motions[block].velocity, motions[block].spin) = (Vectors::new(vx, vy), V::load(&spin[block]));
         }
         if flying > 0 {
-            self.fly(&mut motions, kind);
+            self.fly(&mut motions, kind, first);
         }
         if flying < (N * LANES) as u32 {
             for block in 0..N {
@@ -320,24 +323,41 @@ impl Mover<'_> {
         (are_within, are_finite)
     }
 
-    /// Bodies without contacts, through all substeps.
+    /// Bodies without contacts, through all substeps; `first` is the first of them.
     #[inline(always)]
-    fn fly<V: Lanes, const N: usize>(&self, blocks: &mut [Motions<V>; N], kinds: &[[KindId; LANES]; N]) {
+    fn fly<V: Lanes, const N: usize>(
+        &self,
+        blocks: &mut [Motions<V>; N],
+        kinds: &[[KindId; LANES]; N],
+        first: usize,
+    ) {
         let alike = self.motion.outer();
-        if self.setup.factors.is_empty() {
-            return self.fly_by::<V, N, false>(blocks, &[alike; N]);
+        if self.setup.factors.is_empty() && self.pushes.is_empty() {
+            return self.fly_by::<V, N, false, false>(blocks, &[alike; N], 0);
         }
         let mut outer = [alike; N];
-        for (outer, kinds) in outer.iter_mut().zip(kinds) {
-            *outer = self.motion.outer_of(&kinds.map(|kind| self.setup.factors[kind.0 as usize]));
+        if !self.setup.factors.is_empty() {
+            for (outer, kinds) in outer.iter_mut().zip(kinds) {
+                *outer = self.motion.outer_of(&kinds.map(|kind| self.setup.factors[kind.0 as usize]));
+            }
         }
-        self.fly_by::<V, N, true>(blocks, &outer);
+        if self.pushes.is_empty() {
+            self.fly_by::<V, N, true, false>(blocks, &outer, 0);
+        } else {
+            self.fly_by::<V, N, true, true>(blocks, &outer, first);
+        }
     }
 
-    /// As [`fly`](Self::fly), by what moves each block, or all of them alike: that stays in registers.
+    /// As [`fly`](Self::fly), by what moves each block, or all of them alike: that stays in registers; and by forces, where there are some.
     #[inline(always)]
-    fn fly_by<V: Lanes, const N: usize, const EACH: bool>(&self, blocks: &mut [Motions<V>; N], outer: &[Outer<V>; N]) {
+    fn fly_by<V: Lanes, const N: usize, const EACH: bool, const PUSHED: bool>(
+        &self,
+        blocks: &mut [Motions<V>; N],
+        outer: &[Outer<V>; N],
+        first: usize,
+    ) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
+        let gains = if PUSHED { self.gains(first) } else { [[[0.0; LANES]; 4]; N] };
         for block in &mut *blocks {
             (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
         }
@@ -345,12 +365,34 @@ impl Mover<'_> {
             for (i, block) in blocks.iter_mut().enumerate() {
                 let outer = if EACH { outer[i] } else { self.motion.outer() };
                 let velocity = [block.velocity.x, block.velocity.y, block.spin];
-                let [vx, vy, spin] = self.motion.accelerate(outer, velocity, one, one);
+                let [mut vx, mut vy, mut spin] = self.motion.accelerate(outer, velocity, one, one);
+                if PUSHED {
+                    let [x, y, w, is_pushed] = &gains[i];
+                    let (pushed, after) = (V::load(is_pushed), [vx.add(V::load(x)), vy.add(V::load(y)), spin.add(V::load(w))]);
+                    let after = self.motion.limit(after, one, one);
+                    vx = pushed.if_positive(after[0], vx);
+                    vy = pushed.if_positive(after[1], vy);
+                    spin = pushed.if_positive(after[2], spin);
+                }
                 (block.velocity, block.spin) = (Vectors::new(vx, vy), spin);
                 block.moved = Vectors::new(block.moved.x.add(h.mul(vx)), block.moved.y.add(h.mul(vy)));
                 block.turned = self.motion.turn_on(block.turned, spin);
             }
         }
+    }
+
+    /// What forces give bodies in a substep, and one for those that they push at.
+    fn gains<const N: usize>(&self, first: usize) -> [[Row; 4]; N] {
+        let mut gains = [[[0.0; LANES]; 4]; N];
+        let from = self.pushes.partition_point(|push| (push.body as usize) < first);
+        for push in &self.pushes[from..] {
+            let place = push.body as usize - first;
+            let Some(block) = gains.get_mut(place / LANES) else { break };
+            for (column, part) in block.iter_mut().zip([push.gain[0], push.gain[1], push.gain[2], 1.0]) {
+                column[place % LANES] = part;
+            }
+        }
+        gains
     }
 
     /// Bodies with contacts, as the solver left them.

@@ -66,6 +66,7 @@ fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, Step
     world.push();
     world.begin_step();
     let Verdict { stop: stopped, meet, .. } = migrate(world, halo)?;
+    world.aim();
     // Whoever asked to meet alone knows of it where another asked to stop.
     let meeting = meet && !stopped;
     let may_be_last = stopped || meeting && world.ends_in_meetings;

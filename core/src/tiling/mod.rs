@@ -4,6 +4,7 @@ pub(crate) mod blueprint;
 pub(crate) mod changes;
 mod memory;
 pub(crate) mod partition;
+pub(crate) mod pushes;
 pub(crate) mod regroup;
 pub(crate) mod statics;
 pub(crate) mod terrain;

@@ -16,6 +16,7 @@ use crate::step::standstill::Standstill;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::changes::Changes;
 use crate::tiling::partition::Region;
+use crate::tiling::pushes::Push;
 use crate::tiling::statics::Near;
 use std::time::Duration;
 
@@ -37,6 +38,8 @@ pub(crate) struct Tile {
     pub(crate) newcomers: Vec<u32>,
     /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
     pub(crate) gaps: Vec<u32>,
+    /// Who is pushed by forces in the step under way, by body; before its first sync point owned ones alone.
+    pub(crate) pushes: Vec<Push>,
     /// Owned bodies that may concern other tiles, for the next step.
     pub(crate) rim: Rim,
     /// One per ghost: the impulse it is given in every substep.
@@ -123,6 +126,7 @@ impl Tile {
             owned: 0,
             changes: None,
             newcomers: Vec::new(),
+            pushes: Vec::new(),
             gaps: Vec::new(),
             rim: Rim::default(),
             unseen: Vec::new(),

@@ -1,6 +1,7 @@
 //! What may be done to a world between two steps, as values that can be sent, written down and repeated.
 
 use super::World;
+use super::forces::{Force, Load};
 use super::locator::Place;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
@@ -39,7 +40,9 @@ pub enum Command {
         /// Beside that, about its center, in N m s, counter-clockwise.
         angular: f32,
     },
-    /// A body is pushed through some steps: with each of them its velocity changes by force times time over mass at once.
+    /// A body is pushed through some steps: its velocity changes in every substep, as by gravity, and by force times time over mass in a
+    /// step. Of what would move it by more than half of [`Params::speculative_distance`] within one step from rest the rest comes as a
+    /// blow, as that step begins: so it is known where it goes.
     Force {
         /// Which.
         id: GlobalId,
@@ -65,16 +68,6 @@ pub enum Command {
     Wake(GlobalId),
 }
 
-/// What pushes at a body for some steps.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Force {
-    id: GlobalId,
-    force: Vec2,
-    torque: f32,
-    /// Steps to come.
-    left: u64,
-}
-
 impl World {
     /// Does something to the world, now: the next step begins with it done. Says whether it concerned a body of this world, or all.
     /// With several ranks give each the same commands in the same order, between the same two steps; then the result does not
@@ -95,7 +88,7 @@ impl World {
                 let body = self.look_up(id).map(|Place { tile, at }| self.tiles[tile as usize].at(at));
                 body.map_or(Ok(()), |body| self.outcome(command, body).map(drop))?;
                 if steps > 0 {
-                    self.forces.push(Force { id, force, torque, left: steps });
+                    self.forces.push(Force::new(id, Load { force, torque }, steps));
                 }
                 Ok(body.is_some())
             }
@@ -161,7 +154,10 @@ impl World {
                 (after.velocity, after.angular_velocity) = (velocity, angular_velocity);
             }
             Command::Impulse { impulse, at, angular, .. } => strike(&mut after, kind, impulse, at, angular),
-            Command::Force { force, torque, .. } => after = self.pushed(body, force, torque),
+            Command::Force { force, torque, .. } => {
+                let dt = self.setup.params.dt;
+                strike(&mut after, kind, force * dt, None, torque * dt);
+            }
             Command::SetKind { kind, .. } => after.kind = kind,
             Command::Add(_) | Command::Remove(_) | Command::AddKind(_) | Command::SetGravity(_) | Command::Wake(_) => {}
         }
@@ -173,15 +169,8 @@ impl World {
         }
     }
 
-    /// What a force makes of a body within a step.
-    fn pushed(&self, mut body: Body, force: Vec2, torque: f32) -> Body {
-        let (kind, dt) = (self.setup.kind(body.kind), self.setup.params.dt);
-        strike(&mut body, kind, force * dt, None, torque * dt);
-        Body { angular_velocity: kind.turning(body.angular_velocity), ..body }
-    }
-
     /// Changes a body, which wakes; says whether it is here.
-    fn change(
+    pub(super) fn change(
         &mut self,
         id: GlobalId,
         change: impl FnOnce(&Self, Body) -> Result<Body, SetupError>,
@@ -191,18 +180,6 @@ impl World {
         self.tiles[tile as usize].change_at(at, body);
         self.questions.forget();
         Ok(true)
-    }
-
-    /// Before a step: lets forces push.
-    pub(crate) fn push(&mut self) {
-        let mut forces = std::mem::take(&mut self.forces);
-        for Force { id, force, torque, left } in &mut forces {
-            // The step says who is no longer finite.
-            self.change(*id, |world, body| Ok(world.pushed(body, *force, *torque))).expect("nothing is refused");
-            *left -= 1;
-        }
-        forces.retain(|force| force.left > 0);
-        self.forces = forces;
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod command;
+mod forces;
 mod handover;
 mod locator;
 mod retile;
@@ -24,9 +25,10 @@ use crate::tiling::blueprint::{Blueprint, Setup};
 use crate::tiling::partition::Partition;
 use crate::tiling::tile::Tile;
 pub use command::Command;
-use command::Force;
+use forces::{Force, Load};
 use locator::Locator;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
@@ -57,6 +59,8 @@ pub struct World {
     pub(crate) questions: Questions,
     /// What pushes at bodies for some steps.
     forces: Vec<Force>,
+    /// What of these acts in the step under way, all together upon each body.
+    loads: FxHashMap<GlobalId, Load>,
     /// One per thread.
     hands: Vec<Mutex<Hand>>,
     /// Which thread takes which of the busy tiles.
@@ -140,6 +144,7 @@ impl World {
             locator: OnceLock::new(),
             questions: Questions::default(),
             forces: Vec::new(),
+            loads: FxHashMap::default(),
             hands: Vec::new(),
             schedule: Schedule::default(),
             inbox,

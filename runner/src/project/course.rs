@@ -109,6 +109,8 @@ impl Course {
             let changed = course.retile(plan, step, &mut world).map_err(RunError::Setup)?;
             if changed || course.windows.last().is_none_or(|window| window.step + TRAFFIC <= step) {
                 course.end_window(&mut tap);
+                // Those of the first step have come, and have no place yet.
+                world.settle();
                 course.windows.push(Window { step, told: Vec::new(), bodies: bodies(&world) });
             }
             // What was done until here is none of the step's.

@@ -100,7 +100,7 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
     let (mut all, mut last, mut tiles_moved) = (Sums::default(), Sums::default(), 0);
     let steps = course.moments.last().map_or(0, |moment| moment.step + moment.steps);
     for moment in &course.moments {
-        let mut moving = (0, 0.0);
+        let (mut moving, mut counting_alone) = ((0, 0.0), 0.0);
         if let Some(new) = course.tilings.get(next).filter(|tiling| tiling.step <= moment.step) {
             let bodies = &course.windows[course.window(moment.step.max(1) - 1)].bodies;
             (assignment, moving) = follow(&assignment, new, bodies, &network);
@@ -109,6 +109,7 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
         }
         while let Some((_, counting)) = countings.next_if(|(step, _)| *step <= moment.step) {
             moving.1 += counting.seconds(ranks, &network);
+            counting_alone += counting.seconds(1, &network);
         }
         let window = course.window(moment.step);
         if loads_of != Some(window) {
@@ -122,7 +123,9 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
         let time = with_messages + course.syncs * network.sync(ranks);
         let mut one = Sums {
             time,
-            alone: moment.tiles.iter().copied().map(f64::from).sum::<f64>() + moment.rest,
+            alone: moment.tiles.iter().copied().map(f64::from).sum::<f64>()
+                + moment.rest
+                + counting_alone / moment.steps as f64,
             work: busiest,
             mean_work: mean,
             imbalance: busiest / mean.max(f64::MIN_POSITIVE),
@@ -148,7 +151,7 @@ pub(super) fn predict(course: &Course, machine: Machine, balance: Balance) -> Pr
         one.moving = moving.1 / moment.steps as f64;
         one.time += one.moving;
         all.add(moment.steps as f64, one);
-        if moment.step >= steps - steps / 4 {
+        if moment.step >= steps - steps.div_ceil(4) {
             last.add(moment.steps as f64, one);
         }
     }

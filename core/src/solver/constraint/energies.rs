@@ -197,12 +197,13 @@ fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies) -> Option<f32> 
 }
 
 impl Source<'_> {
-    /// Whether something gives a contact's bodies energy from outside: a static that moves, or what a ghost meets elsewhere.
+    /// Whether something gives a contact's bodies energy from outside: a static that moves, a force, or what a ghost meets elsewhere.
     fn is_driven(self, contact: usize) -> bool {
         let tile = self.tile;
         let statics = tile.owned + tile.ghosts();
         self.contacts.bodies[contact].into_iter().map(|body| body as usize).any(|body| {
-            (tile.owned..statics).contains(&body) || body >= statics && self.setup.drives(tile.bodies.kind[body])
+            let is_driven_static = body >= statics && self.setup.drives(tile.bodies.kind[body]);
+            (tile.owned..statics).contains(&body) || is_driven_static || tile.gain(body).is_some()
         })
     }
 
