@@ -6,7 +6,8 @@ use crate::model::math::{Rot, dot, max, min};
 use crate::model::piece::Piece;
 use glam::Vec2;
 
-/// Each step of the search goes on by such a part of the way at least, and may by so much come too deep.
+/// Each step of the search goes on by such a part of the way at least, and may by so much come too deep; but by no more than a body may
+/// come deeper anyway: who is fast and thin would step over what is as thin.
 const LEAST: f32 = 1.0 / 128.0;
 
 /// A body comes deeper into another within a step by this part of its inner radius, and no more; and how exactly that is found.
@@ -91,7 +92,7 @@ impl<'a> Passage<'a> {
             if left <= EXACT * depth {
                 return part;
             }
-            part += max(left / bound, LEAST);
+            part += max(left / bound, min(LEAST, depth / bound));
         }
         1.0
     }

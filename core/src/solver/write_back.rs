@@ -325,12 +325,7 @@ impl Mover<'_> {
 
     /// Bodies without contacts, through all substeps; `first` is the first of them.
     #[inline(always)]
-    fn fly<V: Lanes, const N: usize>(
-        &self,
-        blocks: &mut [Motions<V>; N],
-        kinds: &[[KindId; LANES]; N],
-        first: usize,
-    ) {
+    fn fly<V: Lanes, const N: usize>(&self, blocks: &mut [Motions<V>; N], kinds: &[[KindId; LANES]; N], first: usize) {
         let alike = self.motion.outer();
         if self.setup.factors.is_empty() && self.pushes.is_empty() {
             return self.fly_by::<V, N, false, false>(blocks, &[alike; N], 0);
@@ -368,7 +363,8 @@ impl Mover<'_> {
                 let [mut vx, mut vy, mut spin] = self.motion.accelerate(outer, velocity, one, one);
                 if PUSHED {
                     let [x, y, w, is_pushed] = &gains[i];
-                    let (pushed, after) = (V::load(is_pushed), [vx.add(V::load(x)), vy.add(V::load(y)), spin.add(V::load(w))]);
+                    let (pushed, after) =
+                        (V::load(is_pushed), [vx.add(V::load(x)), vy.add(V::load(y)), spin.add(V::load(w))]);
                     let after = self.motion.limit(after, one, one);
                     vx = pushed.if_positive(after[0], vx);
                     vy = pushed.if_positive(after[1], vy);

@@ -36,19 +36,19 @@ impl Load {
         (self.force * kind.inv_mass, kind.turning(self.torque / kind.inertia))
     }
 
-    /// The part of it that acts in every substep. Contacts are made of what moves as it does now, and comes as near as the speculative
-    /// distance: half of that is left to gravity.
+    /// The part of it that acts in every substep. Contacts are made of what comes as near as the speculative distance, moving as it does
+    /// as the step begins: a tenth of that is left to gravity.
     fn steady(self, kind: &KindRow, setup: &Setup) -> f32 {
-        let ((linear, angular), dt) = (self.acceleration(kind), setup.params.dt);
-        let way = (linear.length() + angular.abs() * kind.bounding_radius) * dt * dt;
-        min(0.5 * setup.params.speculative_distance / max(way, f32::MIN_POSITIVE), 1.0)
+        let ((linear, angular), substeps) = (self.acceleration(kind), setup.params.integrations() as f32);
+        let gained = (linear.length() + angular.abs() * kind.bounding_radius) * setup.params.dt;
+        let way = gained * 0.5 * (substeps + 1.0) * setup.h;
+        min(0.9 * setup.params.speculative_distance / max(way, f32::MIN_POSITIVE), 1.0)
     }
 
     /// What the rest of it makes of a body at once.
     pub(crate) fn strike(self, body: Body, setup: &Setup) -> Body {
         let kind = setup.kind(body.kind);
-        let ((linear, angular), time) =
-            (self.acceleration(kind), (1.0 - self.steady(kind, setup)) * setup.params.dt);
+        let ((linear, angular), time) = (self.acceleration(kind), (1.0 - self.steady(kind, setup)) * setup.params.dt);
         Body {
             velocity: body.velocity + linear * time,
             angular_velocity: body.angular_velocity + angular * time,
@@ -69,11 +69,13 @@ impl Tile {
         self.pushes.push(load.push(place, id, setup.kind(kind), setup));
     }
 
-    /// After it: finds those that came, or changed their places, and ghosts; or any body anywhere.
-    pub(crate) fn aim(&mut self, loads: &FxHashMap<GlobalId, Load>, anywhere: bool, setup: &Setup) {
+    /// After it: finds those that came, and ghosts. Of a tile that has changed, or where one is not where it was, as it left, or all were
+    /// sorted anew, every body is looked at.
+    pub(crate) fn aim(&mut self, loads: &FxHashMap<GlobalId, Load>, has_changed: bool, setup: &Setup) {
         let (bodies, owned, dynamic) = (&self.bodies, self.owned, self.owned + self.ghosts());
+        let known = self.pushes.len();
         self.pushes.retain(|push| bodies.id[..owned].get(push.body as usize) == Some(&push.id));
-        let all = if anywhere { 0..dynamic } else { owned..dynamic };
+        let all = if has_changed || self.pushes.len() < known { 0..dynamic } else { owned..dynamic };
         for body in all.map(|body| body as u32).chain(self.newcomers.iter().copied()) {
             let (id, kind) = (bodies.id[body as usize], bodies.kind[body as usize]);
             if let Some(load) = loads.get(&id) {

@@ -41,8 +41,8 @@ pub enum Command {
         angular: f32,
     },
     /// A body is pushed through some steps: its velocity changes in every substep, as by gravity, and by force times time over mass in a
-    /// step. Of what would move it by more than half of [`Params::speculative_distance`] within one step from rest the rest comes as a
-    /// blow, as that step begins: so it is known where it goes.
+    /// step. What of it would move it, from rest, by more than nine tenths of [`Params::speculative_distance`] within one step comes as
+    /// a blow, as that step begins: so it is known where it goes.
     Force {
         /// Which.
         id: GlobalId,

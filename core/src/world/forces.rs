@@ -48,8 +48,8 @@ impl World {
     /// Once bodies are with their tiles, and their ghosts: lets each tile know who of them is pushed.
     pub(crate) fn aim(&mut self) {
         if !self.loads.is_empty() {
-            let (loads, anywhere) = (std::mem::take(&mut self.loads), self.borders_moved);
-            self.each_tile(|bench| bench.stage(Phase::Migrate, |b| b.tile.aim(&loads, anywhere, b.setup)));
+            let (loads, has_changed) = (std::mem::take(&mut self.loads), self.borders_moved);
+            self.each_tile(|bench| bench.stage(Phase::Migrate, |b| b.tile.aim(&loads, has_changed, b.setup)));
             self.loads = loads;
         }
     }

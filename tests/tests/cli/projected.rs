@@ -51,6 +51,27 @@ fn a_projection_follows_tiles_that_are_cut_and_joined() {
         assert!(number("imbalance") >= 1.0 - 1e-9 && number("imbalance") < 3.0, "{row}");
         assert!(number("speedup") > 0.0 && number("idle_ranks") == 0.0, "{row}");
     }
+    // What looking for new tiles takes is taken alone as well.
+    assert!((rows[0]["speedup"].as_f64().unwrap() - 1.0).abs() < 1e-9, "{}", rows[0]);
+}
+
+/// As in a run, tiles are dealt by the bodies that they begin with: all are in a quarter of the domain here, which was one rank's.
+#[test]
+fn a_projection_deals_tiles_by_bodies() {
+    let mut scene =
+        String::from("format = \"atoll-scene/1\"\ndomain = [[0.0, 0.0], [40.0, 40.0]]\n[[kinds]]\ncircle = 0.25\n");
+    for k in 0..900 {
+        scene += &format!("[[body]]\nx = {}\ny = {}\n", 1.0 + 0.6 * f64::from(k % 30), 1.0 + 0.6 * f64::from(k / 30));
+    }
+    let desk = Desk::new(&scene);
+    let ended = project(&desk, "--tiles 8x8 --steps 3 --times 3 --ranks 4 --json p.json --quiet");
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{ended}");
+    let json: Value = serde_json::from_slice(&fs::read(desk.path().join("p.json")).unwrap()).unwrap();
+    let off = &json["predictions"][0];
+    // Of four ranks; no more than noise.
+    assert!(off["imbalance"].as_f64().unwrap() < 2.5, "{off}");
+    // Of three steps the last is the last quarter.
+    assert!(off["last_quarter_ms"].as_f64().unwrap() > 0.0, "{off}");
 }
 
 #[test]

@@ -213,6 +213,51 @@ fn a_force_is_its_time_over_the_mass() {
     assert_eq!(world.insert(Body::at_rest(id, KindId(0), DVec2::ONE)).unwrap(), GlobalId(2));
 }
 
+/// What is held by its weight hangs still; what is pushed by less than friction holds does not creep; and two that are pressed together,
+/// each by a tile of its own, stay, though nothing bears on either but what the other tile tells of it.
+#[test]
+fn forces_that_are_in_balance_move_nobody() {
+    for (exchange, columns) in
+        [(Exchange::Substep, 1), (Exchange::Substep, 2), (Exchange::Step, 1), (Exchange::Step, 2)]
+    {
+        let mut world = World::whole(&blueprint(exchange, columns, false)).unwrap();
+        let mass = world.setup.kind(KindId(1)).mass;
+        let places = [(0.0, 6.0), (-3.0, 0.25), (-0.25, 3.0), (0.25, 3.0), (4.0, 0.25)].map(DVec2::from);
+        let forces = [(0.0, 10.0), (5.9, 0.0), (40.0, 10.0), (-40.0, 10.0), (0.0, -90.0)].map(Vec2::from);
+        let ids = places.map(|place| world.insert(Body::at_rest(GlobalId(0), KindId(1), place)).unwrap());
+        for (id, force) in ids.into_iter().zip(forces) {
+            // In two parts, to be added up.
+            let half = Command::Force { id, force: 0.5 * mass * force, torque: 0.0, steps: 200 };
+            (0..2).for_each(|_| assert!(world.command(&half).unwrap()));
+        }
+        (0..120).for_each(|_| assert!(step(&mut world, &mut Loopback).is_ok()));
+        for (id, place) in ids.into_iter().zip(places) {
+            let body = world.get(id).unwrap();
+            let moved = (body.position - place).length();
+            assert!(
+                moved < 2e-3 && body.velocity.length() < 1e-4,
+                "{exchange:?}, {columns} tiles: {moved} m, {body:?}"
+            );
+        }
+        // What presses a body to the ground, its weight and the force, is told whole.
+        let pressed = world.touching(ids[4]);
+        let impulse: f32 = pressed.iter().map(|contact| contact.normal_impulse).sum();
+        assert!((impulse - 100.0 * mass / 240.0).abs() < 1e-4, "{impulse}");
+    }
+}
+
+/// Who would be through a wall before anything is known of it is not.
+#[test]
+fn a_strong_force_drives_nobody_through_what_is_thin() {
+    let mut world = world(Exchange::Step, 5);
+    let id = world.insert(Body::at_rest(GlobalId(0), KindId(0), DVec2::new(7.2, 3.0))).unwrap();
+    let force = Command::Force { id, force: Vec2::new(0.0, -1e4), torque: 0.0, steps: 3 };
+    assert!(world.command(&force).unwrap());
+    (0..30).for_each(|_| assert!(step(&mut world, &mut Loopback).is_ok()));
+    let height = world.get(id).unwrap().position.y;
+    assert!((0.2..0.3).contains(&height), "{height}");
+}
+
 #[test]
 fn what_cannot_be_done_changes_nothing() {
     let mut world = world(Exchange::Substep, 5);
