@@ -318,7 +318,7 @@ fn what_is_slim_and_fast_never_passes_a_thin_wall() {
     for (grid, exchange) in [((1, 1), Exchange::Step), ((3, 3), Exchange::Substep)] {
         let mut scene = Scene::new(MIDDLE, 0.0);
         scene.half = DVec2::splat(300.0);
-        scene.wall(MIDDLE, (0.005, 290.0), 0.0, Material::default());
+        scene.wall(MIDDLE, (0.01, 580.0), 0.0, Material::default());
         let shapes =
             [Shape::capsule(0.05, 0.01).unwrap(), Shape::rectangle(0.1, 0.04), Shape::capsule(0.2, 0.01).unwrap()];
         let kinds = shapes.map(|shape| scene.kind(shape, Material::default()));
