@@ -123,6 +123,32 @@ fn a_film_has_as_many_pictures_as_asked_for() {
 }
 
 #[test]
+fn who_came_and_went_by_commands_is_followed_where_it_is() {
+    let folder = tempdir().unwrap();
+    let (commands, run) = (folder.path().join("acts.jsonl"), folder.path().join("run"));
+    fs::write(
+        &commands,
+        "{\"step\": 4, \"add\": [{\"id\": 70000, \"x\": 5, \"y\": 5}]}\n{\"step\": 11, \"remove\": 70000}\n",
+    )
+    .unwrap();
+    let options = ["--quiet", "--record-every", "4", "--commands"];
+    let mut command = program::command();
+    command.arg("run").args(WORLD).args(options).arg(&commands).arg("--out").arg(&run);
+    let ended = program::run(&mut command);
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let recorded = [run.to_str().unwrap()];
+    picture(&recorded, &folder, &["--follow", "70000", "--step", "8"]);
+    for step in ["0", "12"] {
+        let ended = render(&recorded, &folder.path().join("a.png"), &["--follow", "70000", "--step", step]);
+        let expected = format!("--follow 70000: there is no body of that name at step {step}; give the id of another");
+        assert!(ended.code == Some(2) && ended.stderr.contains(&expected), "{ended}");
+    }
+    let ended = render(&recorded, &folder.path().join("film.gif"), &["--follow", "70000"]);
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_eq!(pictures_of_gif(&fs::read(folder.path().join("film.gif")).unwrap()), 4);
+}
+
+#[test]
 fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
     let folder = tempdir().unwrap();
     let run = record(&folder, "1");
@@ -161,7 +187,7 @@ fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
     refused(&recorded, "a.png", &["--every", "4"], "--every 4: a .png is one picture; leave it out, or name a film");
     refused(&recorded, "a.gif", &["--step", "4"], "--step 4: a film shows many steps; leave it out, or name a .png");
     refused(&recorded, "a.png", &["--steps", "4"], "--steps: what is recorded stays as it is; name a configuration");
-    refused(&recorded, "a.png", &["--follow", "0"], "--follow 0: that one never moves; name a dynamic body");
+    refused(&recorded, "a.png", &["--follow", "0"], "--follow 0: no body moves that one; name a dynamic body");
     refused(&recorded, "a.png", &["--follow", "99999"], "--follow 99999: there is no body of that name");
     for option in ["--ghosts", "--contacts", "--color=asleep", "--color=contacts"] {
         let named = option.replace('=', " ");

@@ -7,22 +7,22 @@ use crate::parallel::lanes::{Arithmetic, Kernel, Lanes, Quad, WIDE, Wide, WideRo
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 
-/// Appends those of some candidates that are pairs which the tile solves, and come near each other within the step.
+/// Writes down those of some candidates that are pairs which the tile solves, and come near each other within the step, and says how many
+/// these are: there is room for all.
 pub(super) struct Cull<'a> {
     pub(super) bodies: &'a Bodies,
     pub(super) proxies: &'a Proxies,
     pub(super) setup: &'a Setup,
     pub(super) candidates: &'a [Pair],
-    pub(super) near: &'a mut Vec<Pair>,
+    pub(super) near: &'a mut [Pair],
 }
 
 impl Kernel for Cull<'_> {
-    type Output = ();
+    type Output = usize;
 
     #[inline(always)]
-    fn run<V: Lanes>(mut self) {
-        let mut kept = self.near.len();
-        self.near.resize(kept + self.candidates.len(), [0, 0]);
+    fn run<V: Lanes>(mut self) -> usize {
+        let mut kept = 0;
         let (blocks, rest) = self.candidates.as_chunks::<WIDE>();
         for pairs in blocks {
             kept = self.keep::<V>(kept, pairs, WIDE);
@@ -32,7 +32,7 @@ impl Kernel for Cull<'_> {
             pairs[..rest.len()].copy_from_slice(rest);
             kept = self.keep::<V>(kept, &pairs, rest.len());
         }
-        self.near.truncate(kept);
+        kept
     }
 }
 
@@ -143,10 +143,10 @@ mod tests {
             let is_near = |&pair: &Pair| proxies.is_wanted(pair) && tile.is_pair(pair) && !passes(pair);
             let expected: Vec<Pair> = all.iter().copied().filter(is_near).collect();
             for instructions in [Instructions::Auto, Instructions::Portable] {
-                let mut near = vec![[7, 8]];
+                let mut near = vec![[7, 8]; all.len()];
                 let cull = Cull { bodies, proxies, setup, candidates: &all, near: &mut near };
-                LaneSet::of(instructions).unwrap().run(cull);
-                prop_assert_eq!(&near[1..], &expected);
+                let kept = LaneSet::of(instructions).unwrap().run(cull);
+                prop_assert_eq!(&near[..kept], &expected);
             }
         }
     }

@@ -10,7 +10,7 @@ use crate::parallel::team::Team;
 use crate::parallel::vectors::{Vectors, absolute};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Region;
-use crate::tiling::tile::Tile;
+use crate::tiling::tile::{Fastest, Tile};
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 
@@ -20,8 +20,9 @@ const AHEAD: usize = 128;
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 8192;
 
-/// The mean velocity of a tile is that of one body of so many.
+/// The mean velocity of a tile is that of one body of so many, at least, or of so many of them.
 const SAMPLED: usize = 13;
+const SAMPLES: usize = 128;
 
 /// The extent of a sensor, which touches nobody.
 pub(super) const NO_PAIRS: f32 = f32::INFINITY;
@@ -57,7 +58,7 @@ impl Proxies {
     }
 
     /// Fills in the proxies of a tile's bodies, of which so many are owned and so many more ghosts. Local coordinates
-    /// count from `origin`, which had best be near most of them, as they are rounded. Returns the fastest spin, in rad/s.
+    /// count from `origin`, which had best be near most of them, as they are rounded. Returns how fast any is.
     pub(crate) fn load(
         &mut self,
         bodies: &Bodies,
@@ -66,7 +67,7 @@ impl Proxies {
         origin: DVec2,
         setup: &Setup,
         team: Team,
-    ) -> f32 {
+    ) -> Fastest {
         let (total, dynamic) = (bodies.len(), owned + ghosts);
         let mean = mean(&bodies.velocity[..dynamic]);
         let load = Load { bodies, dynamic, origin, mean, setup };
@@ -98,7 +99,10 @@ impl Proxies {
         self.weight.resize(total, 1);
         self.size = rectangle.size().as_vec2().to_array();
         self.lanes = setup.lanes;
-        fastest.into_iter().fold(0.0, math::max)
+        fastest.into_iter().fold(Fastest::default(), |all, part| Fastest {
+            spin: math::max(all.spin, part.spin),
+            way: math::max(all.way, part.way),
+        })
     }
 
     /// Statics have no margin. Those that move get room for all that they sweep in the step.
@@ -182,7 +186,7 @@ pub(crate) fn amid(positions: &[DVec2]) -> DVec2 {
 /// About the mean of some velocities. Any vector would do, and what is not finite would not.
 fn mean(velocities: &[Vec2]) -> Vec2 {
     let (mut sum, mut count) = (Vec2::ZERO, 0.0_f32);
-    for &velocity in velocities.iter().step_by(SAMPLED) {
+    for &velocity in velocities.iter().step_by(SAMPLED.max(velocities.len() / SAMPLES)) {
         (sum, count) = (sum + velocity, count + 1.0);
     }
     let mean = sum / math::max(count, 1.0);
@@ -208,38 +212,52 @@ struct Part<'a> {
 }
 
 impl Kernel for Part<'_> {
-    /// The fastest spin.
-    type Output = f32;
+    type Output = Fastest;
 
     #[inline(always)]
-    fn run<V: Lanes>(self) -> f32 {
+    fn run<V: Lanes>(self) -> Fastest {
         let Self { load, range, columns: [x, y, extent, radius], outline } = self;
         let (x, x_rest) = x.as_chunks_mut::<LANES>();
         let (y, y_rest) = y.as_chunks_mut::<LANES>();
         let (extent, extent_rest) = extent.as_chunks_mut::<LANES>();
         let (radius, radius_rest) = radius.as_chunks_mut::<LANES>();
         let (outline, outline_rest) = outline.as_chunks_mut::<LANES>();
-        let (mut first, mut fastest) = (range.start, V::splat(0.0));
+        let (mut first, mut fastest) = (range.start, [V::splat(0.0); 2]);
         for ((((x, y), extent), radius), outline) in x.iter_mut().zip(y).zip(extent).zip(radius).zip(outline) {
-            fastest = load.load::<V>(first, LANES, [x, y, extent, radius], outline).max(fastest);
+            fastest = faster(load.load::<V>(first, LANES, [x, y, extent, radius], outline), fastest);
             first += LANES;
         }
         let (mut rows, mut quads) = ([[0.0; LANES]; 4], [[0.0; 4]; LANES]);
-        fastest = load.load::<V>(first, range.end - first, rows.each_mut(), &mut quads).max(fastest);
+        fastest = faster(load.load::<V>(first, range.end - first, rows.each_mut(), &mut quads), fastest);
         for (rest, row) in [x_rest, y_rest, extent_rest, radius_rest].into_iter().zip(&rows) {
             rest.copy_from_slice(&row[..rest.len()]);
         }
         outline_rest.copy_from_slice(&quads[..outline_rest.len()]);
-        let mut spins = [0.0; LANES];
-        fastest.store(&mut spins);
-        spins.into_iter().fold(0.0, math::max)
+        let [spin, way] = fastest.map(|fastest| {
+            let mut row = [0.0; LANES];
+            fastest.store(&mut row);
+            row.into_iter().fold(0.0, math::max)
+        });
+        Fastest { spin, way }
     }
 }
 
+/// The greater ones of each.
+#[inline(always)]
+fn faster<V: Lanes>(a: [V; 2], b: [V; 2]) -> [V; 2] {
+    [a[0].max(b[0]), a[1].max(b[1])]
+}
+
 impl Load<'_> {
-    /// Fills in the proxies of up to eight bodies. Returns their spins.
+    /// Fills in the proxies of up to eight bodies. Returns their spins, and how far they go along an axis.
     #[inline(always)]
-    fn load<V: Lanes>(&self, first: usize, count: usize, columns: [&mut Row; 4], outline: &mut [Quad; LANES]) -> V {
+    fn load<V: Lanes>(
+        &self,
+        first: usize,
+        count: usize,
+        columns: [&mut Row; 4],
+        outline: &mut [Quad; LANES],
+    ) -> [V; 2] {
         let (mut spin, mut grows): (Row, Row) = Default::default();
         let (mut places, mut kinds) = ([[0.0; 2]; LANES], [[0.0; 4]; LANES]);
         let (mut velocities, mut rotations) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);
@@ -274,8 +292,9 @@ impl Load<'_> {
         let (c, s) = (absolute(c), absolute(s));
         let speed = velocity.dot(velocity).sqrt();
         let any_way = speed.mul(dt).max(V::splat(params.margin_floor)).min(V::splat(params.margin_cap));
-        let margin_x = absolute(vx).mul(dt).max(any_way).mul(grows);
-        let margin_y = absolute(vy).mul(dt).max(any_way).mul(grows);
+        let (way_x, way_y) = (absolute(vx).mul(dt), absolute(vy).mul(dt));
+        let margin_x = way_x.max(any_way).mul(grows);
+        let margin_y = way_y.max(any_way).mul(grows);
         // Turning brings no point of a round body nearer.
         let spin = absolute(V::load(&spin));
         let sweep = not_round.mul(bound.mul(spin)).mul(dt);
@@ -293,6 +312,6 @@ impl Load<'_> {
         reach.add(slack.add(slack)).add(far).store(radius);
         let bound = width.if_positive(bound, zero.sub(bound));
         V::store_quads([half_x, half_y, reach, bound], outline);
-        spin
+        [spin, way_x.max(way_y)]
     }
 }

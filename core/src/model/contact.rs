@@ -225,12 +225,12 @@ impl ContactCache {
         self.contacts.clear();
     }
 
-    /// Becomes a copy of another.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
+    /// Becomes a copy of others.
+    pub(crate) fn copy_from(&mut self, keys: &[PairKey], contacts: &[Contact]) {
         self.clear();
-        self.reserve(other.len());
-        self.keys.extend_from_slice(&other.keys);
-        self.contacts.extend_from_slice(&other.contacts);
+        self.reserve(keys.len());
+        self.keys.extend_from_slice(keys);
+        self.contacts.extend_from_slice(contacts);
     }
 
     /// Whether another has the same, bit for bit.

@@ -6,10 +6,11 @@ use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::record::{GhostRefresh, Unseen};
 use crate::model::kind::KindRow;
-use crate::model::math::right_perp;
+use crate::model::math::{max, right_perp};
 use crate::model::params::{Ghosts, Parallel};
-use crate::parallel::lanes::Quad;
+use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad};
 use crate::parallel::team::Team;
+use crate::parallel::vectors::absolute;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -347,14 +348,14 @@ impl SolverBodies {
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
     }
 
-    /// Whether any has gone further than that in the step, in m, or what is so many meters from its center has. True for some that
-    /// have not quite.
-    pub(crate) fn any_moves(&self, arm: f32, least: f32) -> bool {
-        let both = self.pose.iter().zip(&self.weight);
-        both.fold(false, |any, (&[x, y, lost, s], &[.., root_inv_inertia, root_inv_mass])| {
-            let turned = (lost.abs() + s.abs()) * root_inv_inertia;
-            any | ((x.abs() + y.abs()) * root_inv_mass + arm * turned > least)
-        })
+    /// How far any has gone in the step, in m, or what is so many meters from its center has, at most.
+    pub(crate) fn furthest(&self, arm: f32, lanes: LaneSet) -> f32 {
+        lanes.run(Furthest { pose: &self.pose, weight: &self.weight, arm })
+    }
+
+    /// Those bodies of the tile that have contacts and are its own, ascending.
+    pub(crate) fn owned(&self) -> &[u32] {
+        &self.touched[..self.first_ghost]
     }
 
     /// Whether there are any that stand for statics whose surface moves.
@@ -378,5 +379,35 @@ impl SolverBodies {
     #[inline(always)]
     pub(crate) fn place_of(&self, body: u32) -> SolverIndex {
         self.index[body as usize]
+    }
+}
+
+/// Looks for [how far](SolverBodies::furthest) any has gone.
+struct Furthest<'a> {
+    pose: &'a [Quad],
+    weight: &'a [Quad],
+    arm: f32,
+}
+
+impl Kernel for Furthest<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<V: Lanes>(self) -> f32 {
+        let (mut furthest, arm) = (V::splat(0.0), V::splat(self.arm));
+        let ((poses, rest), (weights, rest_weights)) = (self.pose.as_chunks(), self.weight.as_chunks());
+        let (mut last, mut last_weights) = ([ZERO; LANES], [ZERO; LANES]);
+        last[..rest.len()].copy_from_slice(rest);
+        last_weights[..rest.len()].copy_from_slice(rest_weights);
+        for (pose, weight) in poses.iter().zip(weights).chain([(&last, &last_weights)]) {
+            let [x, y, lost, s] = V::load_quads(pose);
+            let [_, _, root_inv_inertia, root_inv_mass] = V::load_quads(weight);
+            let turned = absolute(lost).add(absolute(s)).mul(root_inv_inertia);
+            let way = absolute(x).add(absolute(y)).mul(root_inv_mass).add(arm.mul(turned));
+            furthest = way.max(furthest);
+        }
+        let mut ways = [0.0; LANES];
+        furthest.store(&mut ways);
+        ways.into_iter().fold(0.0, max)
     }
 }

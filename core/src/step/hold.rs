@@ -3,7 +3,7 @@
 //! met a static.
 
 use crate::collide::passage::Passage;
-use crate::exchange::far::{self, StaticsByPlace};
+use crate::exchange::far::StaticsByPlace;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::kind::KindRow;
@@ -11,7 +11,7 @@ use crate::model::math::{Rot, dot};
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::terrain::ascend;
-use crate::tiling::tile::Tile;
+use crate::tiling::tile::{Fastest, Tile};
 use glam::DVec2;
 
 /// A body that may come to the other side of something in this step, and how it begins it.
@@ -28,19 +28,17 @@ const FAR_TURN: f32 = 2.5;
 /// Before the bodies that a tile owns are moved: those that go or turn so far that something thin could be passed; and those that a
 /// static has turned aside, as in a corner, and that could come with their middle into another.
 pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way> {
-    let bodies = &tile.bodies;
-    let slimness = &setup.slimness;
-    // Looser than what is asked of each below, so that nothing depends on who shares a tile.
-    let any_moves = |far: f32| solved.any_moves(slimness.longest_arm, 0.49 * far);
     if setup.statics.is_empty() {
         return Vec::new();
     }
+    let (bodies, slimness) = (&tile.bodies, &setup.slimness);
     let turns_far = |spin: f32| spin.abs() * setup.params.dt > FAR_TURN;
-    let any_turns_far = turns_far(tile.counts.fastest_spin);
-    let any_goes_far = any_turns_far || far::any(&bodies.velocity[..tile.owned], setup);
-    if !any_goes_far && !any_moves(slimness.of_bodies) {
-        return Vec::new();
-    }
+    let Fastest { spin, way } = tile.counts.fastest;
+    let any_turns_far = turns_far(spin);
+    let any_goes_far = any_turns_far || way > setup.params.margin_cap;
+    // Looser than what is asked of each below, so that nothing depends on who shares a tile.
+    let furthest = solved.furthest(slimness.longest_arm, setup.lanes);
+    let any_moves = |far: f32| furthest > 0.49 * far;
     let goes = |row: usize, far: f32| {
         let kind = setup.kind(bodies.kind[row]);
         solved.moved(row).is_some_and(|(moved, turned)| {
@@ -48,22 +46,29 @@ pub(crate) fn ways(tile: &Tile, solved: &SolverBodies, setup: &Setup) -> Vec<Way
             dot(moved, moved).sqrt() + swept > 0.5 * (kind.inner_radius + far)
         })
     };
-    let thrown = tile.contacts.keys[..tile.contacts.own()].iter().filter_map(|key| {
-        match (key.low().kind(), key.high().kind()) {
-            (SlotKind::Owned(row), SlotKind::Static(_)) => Some(row),
-            _ => None,
-        }
-    });
-    let mut rows: Vec<usize> = thrown.filter(|&row| goes(row, 0.0)).collect();
-    if any_goes_far || any_moves(slimness.of_both) {
+    let mut rows = Vec::new();
+    if any_goes_far || any_moves(slimness.of_bodies) {
+        let thrown = tile.contacts.keys[..tile.contacts.own()].iter().filter_map(|key| {
+            match (key.low().kind(), key.high().kind()) {
+                (SlotKind::Owned(row), SlotKind::Static(_)) => Some(row),
+                _ => None,
+            }
+        });
+        rows.extend(thrown.filter(|&row| goes(row, 0.0)));
+    }
+    if any_moves(slimness.of_both) {
+        let met = solved.owned().iter().map(|&row| row as usize);
+        rows.extend(met.filter(|&row| goes(row, slimness.of_statics)));
+    }
+    if any_goes_far {
         let may = |&row: &usize| {
             let is_round = || setup.kind(bodies.kind[row]).not_round == 0.0;
             let turns_far = any_turns_far && turns_far(bodies.angular_velocity[row]) && !is_round();
-            turns_far || setup.goes_far(bodies.velocity[row]) || goes(row, slimness.of_statics)
+            turns_far || setup.goes_far(bodies.velocity[row])
         };
         rows.extend((0..tile.owned).filter(may));
-        rows.sort_unstable();
     }
+    rows.sort_unstable();
     rows.dedup();
     let way = |row| Way { row, start: bodies.position[row], rotation: bodies.rotation[row] };
     rows.into_iter().map(way).collect()

@@ -204,7 +204,7 @@ fn collide(bench: &mut Bench<'_>) {
         };
         let fastest = proxies.load(&tile.bodies, counts, &tile.rectangle, origin, b.setup, b.team);
         proxies.pair_ghosts(tile, b.setup);
-        b.tile.counts.fastest_spin = fastest;
+        b.tile.counts.fastest = fastest;
         if let Some(quadtree) = &mut b.tile.quadtree {
             quadtree.flush(proxies, &b.tile.bodies.id);
         }

@@ -72,6 +72,15 @@ pub(crate) struct Tile {
     pub(crate) booked: Duration,
 }
 
+/// How fast anything in a tile is as a step begins, at most.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Fastest {
+    /// In rad/s.
+    pub(crate) spin: f32,
+    /// How far it would go in the step along an axis, in m.
+    pub(crate) way: f32,
+}
+
 /// What a tile counts in a step.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct TileCounts {
@@ -84,8 +93,7 @@ pub(crate) struct TileCounts {
     pub(crate) leaps: u64,
     /// Whether an owned body reaches further in the step than the halo.
     pub(crate) far: bool,
-    /// Of anything in the tile, in rad/s.
-    pub(crate) fastest_spin: f32,
+    pub(crate) fastest: Fastest,
     pub(crate) islands: u64,
     pub(crate) largest_island: u64,
     pub(crate) asleep: u64,

@@ -41,16 +41,20 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
     let setting = source.setting().clone();
     let (shown, rate) = paced(source.shown(args, kind)?, setting.hertz, args, kind)?;
     if let Some(id) = args.follow {
-        source.check_followed(GlobalId(id), &setting)?;
+        source.check_followed(GlobalId(id), &setting, shown)?;
     }
 
     let mut film = Film::create(&args.out, args.size, rate)?;
     let layers = Layers { tiles: args.tiles, ghosts: args.ghosts, contacts: args.contacts };
     let look = Look { size: args.size, color: args.color, layers, bare: args.bare };
     let mut painter = Painter::new(&setting, look);
+    let mut seen = args.view.unwrap_or_else(|| whole_view(&setting));
     let mut draw = |frame: &Frame| {
-        let view = view(args, &setting, frame)?;
-        film.add(painter.draw(frame, &view))
+        // Where it is not there yet, or no longer, the last of it is.
+        if let Some(around) = args.follow.and_then(|id| view_around(id, args, &setting, frame)) {
+            seen = around;
+        }
+        film.add(painter.draw(frame, &seen))
     };
     let out = args.out.clone();
     let stop = stop_on_signals(true, move || {
@@ -217,21 +221,27 @@ impl Source {
         }
     }
 
-    /// Whether there is a body to follow.
-    fn check_followed(&self, id: GlobalId, setting: &Setting) -> Result<(), RunError> {
-        let refused = |reason| Err(unsuitable(format!("--follow {id}"), reason));
+    /// Whether there is a body to follow, in one of the frames at least.
+    fn check_followed(&self, id: GlobalId, setting: &Setting, shown: Shown) -> Result<(), RunError> {
+        let refused = |reason: &str| Err(unsuitable(format!("--follow {id}"), reason));
         if setting.statics.iter().any(|body| body.id == id) {
-            return refused("that one never moves; name a dynamic body, or use --view");
+            return refused("no body moves that one; name a dynamic body, or use --view");
         }
-        let known = match self {
+        let mut rows = Vec::new();
+        match self {
             Self::Recorded(recorded) => {
-                let mut rows = Vec::new();
-                recorded.recording().read(0, &mut rows)?;
-                rows.iter().any(|row| row.id == id.0)
+                for step in shown.steps() {
+                    recorded.recording().read(step, &mut rows)?;
+                    if rows.iter().any(|row| row.id == id.0) {
+                        return Ok(());
+                    }
+                }
             }
-            Self::Live(live) => live.has(id)?,
-        };
-        if known { Ok(()) } else { refused("there is no body of that name; give the id of another") }
+            Self::Live(live) if live.has(id)? => return Ok(()),
+            Self::Live(_) => {}
+        }
+        let when = if shown.count() == 1 { format!(" at step {}", shown.first) } else { String::new() };
+        refused(&format!("there is no body of that name{when}; give the id of another"))
     }
 }
 
@@ -254,18 +264,12 @@ fn paced(shown: Shown, hertz: f64, args: &RenderArgs, kind: FilmKind) -> Result<
     Ok((shown, Rate { added, shown: args.fps.map_or(repeated, f64::from) }))
 }
 
-/// The part of the world that a frame shows.
-fn view(args: &RenderArgs, setting: &Setting, frame: &Frame) -> Result<View, RunError> {
-    if let Some(view) = args.view {
-        return Ok(view);
-    }
-    let Some(id) = args.follow else { return Ok(whole_view(setting)) };
-    let body = frame.bodies.iter().find(|body| body.id == id).ok_or_else(|| {
-        unsuitable(format!("--follow {id}"), format!("this body is gone after step {}; give another", frame.step))
-    })?;
+/// The part of the world around a body, if it is there.
+fn view_around(id: u64, args: &RenderArgs, setting: &Setting, frame: &Frame) -> Option<View> {
+    let body = frame.bodies.iter().find(|body| body.id == id)?;
     let size = 2.0 * f64::from(setting.kinds[body.kind as usize].shape.bounding_radius());
     let width = args.width.unwrap_or(AROUND * size);
     let [columns, rows] = args.size.map(f64::from);
     let (center, half) = (DVec2::new(body.x, body.y), DVec2::new(0.5 * width, 0.5 * width * rows / columns));
-    Ok(View { low: center - half, high: center + half })
+    Some(View { low: center - half, high: center + half })
 }

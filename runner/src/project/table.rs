@@ -51,7 +51,7 @@ impl fmt::Display for Projection {
                 one.speedup
             )?;
         }
-        if let Some(one) = self.predictions.iter().find(|one| one.idle_ranks > 0) {
+        if let Some(one) = self.predictions.iter().filter(|one| one.idle_ranks > 0).min_by_key(|one| one.ranks) {
             let (ranks, tiles) = (one.ranks, one.ranks - one.idle_ranks);
             writeln!(f)?;
             writeln!(f, "from {ranks} ranks on some have nothing to do: there are only {tiles} tiles")?;

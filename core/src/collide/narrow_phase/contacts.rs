@@ -1,9 +1,10 @@
 //! The contacts of a tile, as a step finds them.
 
 use crate::collide::broad_phase::Pair;
-use crate::model::contact::ContactCache;
+use crate::model::contact::{Contact, ContactCache, PairKey};
 use crate::parallel::team::Team;
 use crate::tiling::tile::Tile;
+use bytemuck::Zeroable;
 
 /// What a step knows of each of a tile's contacts beside what outlives it, in their canonical order: ascending by their bodies' slots,
 /// whatever order the pairs came in.
@@ -25,23 +26,23 @@ impl Contacts {
 
     /// Puts together what was found in several parts, one after another.
     pub(super) fn gather(&mut self, parts: &[Found], cache: &mut ContactCache, team: Team) {
-        let count = parts.iter().map(|part| part.cache.len()).sum();
+        let count = parts.iter().map(|part| part.len).sum();
         cache.resize(count);
         self.separation.resize(count, [0.0; 2]);
         self.bodies.resize(count, [0, 0]);
         let (mut keys, mut contacts) = (&mut cache.keys[..], &mut cache.contacts[..]);
         let (mut separation, mut bodies) = (&mut self.separation[..], &mut self.bodies[..]);
         let copies = parts.iter().map(|part| {
-            let count = part.cache.len();
+            let count = part.len;
             let keys = keys.split_off_mut(..count).zip(contacts.split_off_mut(..count));
             let beside = separation.split_off_mut(..count).zip(bodies.split_off_mut(..count));
             (part, keys.zip(beside).expect("there is room for all"))
         });
         team.for_each(copies.collect(), |(part, ((keys, contacts), (separation, bodies)))| {
-            keys.copy_from_slice(&part.cache.keys);
-            contacts.copy_from_slice(&part.cache.contacts);
-            separation.copy_from_slice(&part.separation);
-            bodies.copy_from_slice(&part.bodies);
+            keys.copy_from_slice(part.keys());
+            contacts.copy_from_slice(part.contacts());
+            separation.copy_from_slice(&part.separation[..part.len]);
+            bodies.copy_from_slice(&part.bodies[..part.len]);
         });
     }
 
@@ -71,18 +72,76 @@ impl Contacts {
 }
 
 /// All that is found of contacts, a column for each.
+///
+/// Columns may be longer than there are contacts: what an earlier step left there is written over, which saves filling it with zeros.
 #[derive(Default, Debug)]
 pub(super) struct Found {
-    pub(super) cache: ContactCache,
+    keys: Vec<PairKey>,
+    contacts: Vec<Contact>,
     /// As in [`Contacts`].
     pub(super) separation: Vec<[f32; 2]>,
     pub(super) bodies: Vec<Pair>,
+    len: usize,
+}
+
+/// Places for contacts, a column for each.
+pub(super) struct Places<'a> {
+    pub(super) keys: &'a mut [PairKey],
+    pub(super) contacts: &'a mut [Contact],
+    pub(super) separation: &'a mut [[f32; 2]],
+    pub(super) bodies: &'a mut [Pair],
 }
 
 impl Found {
     pub(super) fn clear(&mut self) {
-        self.cache.clear();
-        self.separation.clear();
-        self.bodies.clear();
+        self.len = 0;
+    }
+
+    pub(super) fn keys(&self) -> &[PairKey] {
+        &self.keys[..self.len]
+    }
+
+    pub(super) fn contacts(&self) -> &[Contact] {
+        &self.contacts[..self.len]
+    }
+
+    /// Places for so many more, of which those count that are [added](Self::add).
+    #[inline(always)]
+    pub(super) fn places(&mut self, more: usize) -> Places<'_> {
+        let most = self.len + more;
+        if self.keys.len() < most {
+            self.keys.resize(most, PairKey::default());
+            self.contacts.resize(most, Contact::zeroed());
+        }
+        if self.separation.len() < most {
+            self.separation.resize(most, [0.0; 2]);
+        }
+        if self.bodies.len() < most {
+            self.bodies.resize(most, [0, 0]);
+        }
+        let places = self.len..most;
+        Places {
+            keys: &mut self.keys[places.clone()],
+            contacts: &mut self.contacts[places.clone()],
+            separation: &mut self.separation[places.clone()],
+            bodies: &mut self.bodies[places],
+        }
+    }
+
+    /// Counts so many, which were written to the first of the [places](Self::places).
+    pub(super) fn add(&mut self, count: usize) {
+        self.len += count;
+    }
+
+    pub(super) fn push(&mut self, key: PairKey, contact: Contact, separation: [f32; 2], bodies: Pair) {
+        let to = self.places(1);
+        (to.keys[0], to.contacts[0], to.separation[0], to.bodies[0]) = (key, contact, separation, bodies);
+        self.add(1);
+    }
+
+    /// Leaves nothing behind the last one, of what others take.
+    pub(super) fn end(&mut self) {
+        self.separation.truncate(self.len);
+        self.bodies.truncate(self.len);
     }
 }

@@ -15,13 +15,13 @@ use crate::collide::wide_boxes::WideBoxes;
 use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
 use crate::collide::wide_polygons::WidePolygons;
-use crate::model::contact::{Contact, ContactCache, PairKey};
+use crate::model::contact::{Contact, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use bytemuck::Zeroable;
-use contacts::Found;
+use contacts::{Found, Places};
 use meetings::Meetings;
 use names::{Named, Names};
 use sorted::Sorted;
@@ -75,9 +75,10 @@ impl NarrowPhase {
         std::mem::swap(&mut contacts.separation, &mut found.separation);
         found.clear();
         setup.lanes.run((among, &mut *found));
+        found.end();
         std::mem::swap(&mut contacts.bodies, &mut found.bodies);
         std::mem::swap(&mut contacts.separation, &mut found.separation);
-        tile.contacts.copy_from(&found.cache);
+        tile.contacts.copy_from(found.keys(), found.contacts());
     }
 
     fn mark_newcomers(&mut self, tile: &Tile) {
@@ -248,41 +249,27 @@ impl Block<'_> {
     /// Appends the contacts of so many pairs. Every one is written down, and counted if there is one: a branch would be a coin toss.
     #[inline(always)]
     fn keep(&self, pairs: usize, found: &mut Found) {
-        let Found { cache: ContactCache { keys, contacts }, separation, bodies } = found;
-        let mut kept = keys.len();
-        let most = kept + pairs;
-        keys.resize(most, PairKey::default());
-        contacts.resize(most, Contact::zeroed());
-        separation.resize(most, [0.0; 2]);
-        bodies.resize(most, [0, 0]);
+        let mut kept = 0;
         // One length for all: each place is checked once, not once per column.
-        let (to_keys, to_contacts) = (&mut keys[..most], &mut contacts[..most]);
-        let (to_separation, to_bodies) = (&mut separation[..most], &mut bodies[..most]);
+        let Places { keys, contacts, separation, bodies } = found.places(pairs);
+        let (keys, contacts) = (&mut keys[..pairs], &mut contacts[..pairs]);
+        let (separation, bodies) = (&mut separation[..pairs], &mut bodies[..pairs]);
         for i in 0..pairs {
             let (named, found) = (&self.named[i], &self.found[i]);
             let contact = if self.outcome[i] == Outcome::Known { named.known.unwrap_or(found) } else { found };
-            (to_keys[kept], to_bodies[kept]) = (named.key, named.bodies);
-            (to_contacts[kept], to_separation[kept]) = (*contact, self.separation[i]);
+            (keys[kept], bodies[kept]) = (named.key, named.bodies);
+            (contacts[kept], separation[kept]) = (*contact, self.separation[i]);
             kept += usize::from(self.outcome[i] != Outcome::Nothing);
         }
-        keys.truncate(kept);
-        contacts.truncate(kept);
-        separation.truncate(kept);
-        bodies.truncate(kept);
+        found.add(kept);
     }
 
     /// As [`keep`](Self::keep), with those contacts of pairs of which one body is made of pieces.
     #[inline(never)]
     fn keep_several(&self, pairs: usize, meetings: &Meetings<'_>, found: &mut Found) {
-        let Found { cache, separation, bodies } = found;
         let mut meetings = meetings.found();
         for (named, place) in self.named[..pairs].iter().zip(0..) {
-            let mut keep = |contact: &Contact, now: [f32; 2]| {
-                cache.keys.push(named.key);
-                cache.contacts.push(*contact);
-                separation.push(now);
-                bodies.push(named.bodies);
-            };
+            let mut keep = |contact: &Contact, now| found.push(named.key, *contact, now, named.bodies);
             match self.outcome[place] {
                 Outcome::Nothing => {}
                 Outcome::Known => keep(named.known.expect("it is known"), self.separation[place]),

@@ -20,23 +20,29 @@ pub(super) struct Sorted {
 
 #[derive(Default, Debug)]
 struct Near {
+    /// The first `kept` of these; what an earlier step left behind them is written over, which saves filling it with zeros.
     pairs: Vec<Pair>,
+    kept: usize,
     /// The same pairs by the part of the bodies in which their first one lies, where there are several.
     of_part: Vec<Vec<Pair>>,
 }
 
 impl Near {
+    fn pairs(&self) -> &[Pair] {
+        &self.pairs[..self.kept]
+    }
+
     /// Deals out the pairs to parts, into which so many bodies are cut.
     fn deal(&mut self, bodies: usize, parts: usize) {
         self.of_part.resize_with(parts, Vec::new);
         self.of_part.iter_mut().for_each(Vec::clear);
-        for &pair in &self.pairs {
+        for &pair in &self.pairs[..self.kept] {
             self.of_part[pair[0] as usize * parts / bodies].push(pair);
         }
     }
 
     fn of_part(&self, part: usize) -> &[Pair] {
-        self.of_part.get(part).unwrap_or(&self.pairs)
+        self.of_part.get(part).map_or(self.pairs(), |pairs| pairs)
     }
 }
 
@@ -49,12 +55,16 @@ impl Sorted {
         self.near.resize_with(pieces, Near::default);
         let near = team.ranges(candidates.len(), GRAIN).zip(&mut self.near).collect();
         team.for_each(near, |(range, near)| {
-            near.pairs.clear();
-            let (candidates, near_pairs) = (&candidates[range], &mut near.pairs);
-            setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates, near: near_pairs });
+            if near.pairs.len() < range.len() {
+                near.pairs.resize(range.len(), [0, 0]);
+            }
+            let (candidates, kept) = (&candidates[range], &mut near.pairs);
+            near.kept = setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates, near: kept });
             if setup.filters {
                 let kind = |body: u32| setup.kind(tile.bodies.kind[body as usize]);
+                near.pairs.truncate(near.kept);
                 near.pairs.retain(|&[a, b]| kind(a).touches(kind(b)));
+                near.kept = near.pairs.len();
             }
             near.of_part.clear();
             if parts > 1 {
@@ -62,7 +72,7 @@ impl Sorted {
             }
         });
         self.ends.resize(bodies, 0);
-        self.pairs.resize(self.near.iter().map(|near| near.pairs.len()).sum(), [0, 0]);
+        self.pairs.resize(self.near.iter().map(|near| near.kept).sum(), [0, 0]);
         let (near, mut ends, mut pairs) = (&self.near, &mut self.ends[..], &mut self.pairs[..]);
         let parts = (0..parts).map(|part| {
             const ENOUGH: &str = "as many are left";
