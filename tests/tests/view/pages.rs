@@ -81,7 +81,9 @@ fn drawn(browser: &mut Browser, source: &str, step: u64, color: &str) -> [f64; 2
          return [c.width, c.height, m.x - w, m.y - h, m.x + w, m.y + h]; })()",
     );
     let view: Vec<String> = view.as_array().unwrap().iter().map(Value::to_string).collect();
-    let out = DESK.path().join(format!("{}.png", std::process::id()));
+    // Other tests draw at the same time.
+    let folder = tempdir().unwrap();
+    let out = folder.path().join("picture.png");
     let mut command = program::command();
     command.current_dir(DESK.path()).args([
         "render",
