@@ -216,6 +216,27 @@ fn without_gravity_a_lone_body_at_rest_sleeps_too() {
     assert!(sim.body(GlobalId(0)).velocity.x > 1.0);
 }
 
+#[test]
+fn under_weak_gravity_nobody_falls_asleep_in_the_air() {
+    for gravity in [0.08, 0.01] {
+        let mut scene = Scene::new(DVec2::ZERO, -gravity);
+        scene.params.sleep = true;
+        scene.wall(DVec2::new(0.0, -1.0), (40.0, 2.0), 0.0, Material::default());
+        let kind = scene.kind(Shape::rectangle(0.5, 0.5), Material::default());
+        // One falls from rest, as do two upon each other; one is thrown up.
+        let fall = f64::from(0.5 * gravity) * 16.0;
+        let bodies = [(-5.0, 0.25, 0.0), (0.0, 0.25, 0.0), (0.0, 0.75, 0.0), (5.0, 0.25 - fall, 4.0 * gravity)];
+        let bodies = bodies.map(|(x, y, up)| scene.body(kind, DVec2::new(x, y + fall), Vec2::new(0.0, up)));
+        let mut sim = scene.start(WHOLE);
+        sim.run(4 * 60 - 12);
+        assert_eq!(sim.report.asleep, 0, "{gravity} m/s^2");
+        let fallen = 0.5 * f64::from(gravity) * 3.8 * 3.8;
+        assert!((sim.body(bodies[0]).position.y - (0.25 + fall - fallen)).abs() < 0.02 * fall);
+        sim.run(10 * 60);
+        assert_eq!(sim.report.asleep, 4, "{gravity} m/s^2");
+    }
+}
+
 /// How long a body has rested belongs to the future of the world, so to its hash.
 #[test]
 fn rest_shows_in_the_contact_hash() {

@@ -1,6 +1,6 @@
 //! Sleeping: islands that rest are left out until something touches them.
 //!
-//! A body rests while its fastest point is slower than `sleep_speed`. An island has rested as long as the one of its
+//! A body rests while its fastest point is slower than `sleep_speed`, and slower than who falls. An island has rested as long as the one of its
 //! bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
 //! rest anew. An island sleeps once it has rested for `sleep_time`; decided before each solve, on the step's contacts.
 //! Whatever comes to touch it makes one larger island, which is awake as the newcomer is. A body without contacts is an
@@ -203,11 +203,11 @@ impl Sleep {
         count
     }
 
-    /// Counts on for those that rest. `speed` tells that of a body's fastest point, in m/s.
-    pub(crate) fn count_on(&mut self, speed: impl Fn(usize) -> f32, setup: &Setup) {
+    /// Counts on for those that rest, as they are slow.
+    pub(crate) fn count_on(&mut self, rests: impl Fn(usize) -> bool, setup: &Setup) {
         for (i, still) in self.still.iter_mut().enumerate().filter(|&(i, _)| !self.asleep[i]) {
             let longer = math::min(*still + setup.params.dt, setup.params.sleep_time);
-            *still = if speed(i) < setup.params.sleep_speed { longer } else { 0.0 };
+            *still = if rests(i) { longer } else { 0.0 };
         }
     }
 }

@@ -160,7 +160,7 @@ pub struct Params {
     pub instructions: Instructions,
     /// What ghosts are (dynamic).
     pub ghosts: Ghosts,
-    /// Islands that rest are left out until something touches them (no). On one tile only.
+    /// Islands that rest are left out until something touches them (no).
     pub sleep: bool,
     /// Speed of a body's fastest point below which it counts as resting, in m/s (0.05).
     pub sleep_speed: f32,

@@ -341,6 +341,19 @@ impl Setup {
         2.0 * if large { self.wide_halo } else { self.halo_width }
     }
 
+    /// Below which speed a body of a kind rests, in m/s: so low that who falls, or turns back as it is thrown up, is slower for half of
+    /// `sleep_time` at most, however weak gravity is. Nobody is to fall asleep in the air.
+    pub(crate) fn sleep_speed(&self, kind: KindId) -> f32 {
+        let (params, dynamics) = (&self.params, &self.kind(kind).dynamics);
+        let gravity = math::dot(params.gravity, params.gravity).sqrt() * dynamics.gravity_scale.abs();
+        if gravity == 0.0 {
+            return params.sleep_speed;
+        }
+        let (time, damping) =
+            (math::max(params.sleep_time, params.dt), params.linear_damping + dynamics.linear_damping);
+        math::min(params.sleep_speed, 0.25 * gravity * time / (1.0 + damping * time))
+    }
+
     /// Whether a body goes further in a step than the halo has room for.
     #[inline(always)]
     pub(crate) fn goes_far(&self, velocity: Vec2) -> bool {

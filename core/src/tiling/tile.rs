@@ -283,7 +283,8 @@ impl Tile {
                 let reach = setup.kind(bodies.kind[i]).bounding_radius;
                 bodies.velocity[i].length() + reach * bodies.angular_velocity[i].abs()
             };
-            self.sleep.count_on(speed, setup);
+            let rests = |i: usize| speed(i) < setup.sleep_speed(bodies.kind[i]);
+            self.sleep.count_on(rests, setup);
         }
     }
 

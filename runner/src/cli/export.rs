@@ -26,9 +26,10 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     if let Some(progress) = progress {
         progress.finish();
     }
-    let vtk::Written { collection, steps, bodies, bytes } = exported?;
+    let vtk::Written { collection, steps, bodies: [fewest, most], bytes } = exported?;
     let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
     let records = if steps.len() == 1 { "record" } else { "records" };
+    let bodies = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
     output::show(&format!(
         "{} {records} of {bodies} bodies, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
         steps.len(),

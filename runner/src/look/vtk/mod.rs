@@ -46,8 +46,8 @@ pub(crate) struct Written {
     pub collection: PathBuf,
     /// The steps.
     pub steps: Vec<u64>,
-    /// Bodies in the last of them.
-    pub bodies: usize,
+    /// Bodies in the one with the fewest, and with the most.
+    pub bodies: [usize; 2],
     /// Bytes of all files.
     pub bytes: u64,
 }
@@ -68,9 +68,11 @@ pub(crate) fn export(
     let steps: Vec<u64> = shown.steps().collect();
     let mut fixed = None;
     let mut frame = Frame::default();
+    let [mut fewest, mut most] = [usize::MAX, 0];
     for (done, &step) in (1..).zip(&steps) {
         recorded.read(step, &mut frame)?;
         write_frame(setting, &frame, &mut target)?;
+        (fewest, most) = (fewest.min(frame.bodies.len()), most.max(frame.bodies.len()));
         let name = statics_of(setting, step);
         if fixed.as_ref() != Some(&name) {
             target.write(&name, |file| write_statics(setting, step, file))?;
@@ -80,7 +82,7 @@ pub(crate) fn export(
     }
     let text = collection(setting, &steps);
     target.write(COLLECTION, |file| file.write_all(text.as_bytes()))?;
-    Ok(Written { collection: out.join(COLLECTION), steps, bodies: frame.bodies.len(), bytes: target.finish() })
+    Ok(Written { collection: out.join(COLLECTION), steps, bodies: [fewest.min(most), most], bytes: target.finish() })
 }
 
 /// The name of a step, without an ending.
@@ -88,7 +90,7 @@ fn name_of(step: u64) -> String {
     format!("bodies-{step:010}")
 }
 
-/// A step: a file for each rank that has bodies, and one that names those.
+/// A step: a file for each rank that has bodies, or one without any where there are none, and one that names those.
 fn write_frame(setting: &Setting, frame: &Frame, target: &mut Target) -> Result<(), RunError> {
     let name = name_of(frame.step);
     target.folder(&name)?;
@@ -96,7 +98,7 @@ fn write_frame(setting: &Setting, frame: &Frame, target: &mut Target) -> Result<
     for &(rank, end) in &frame.ranks {
         let rows = &frame.bodies[start..end];
         start = end;
-        if !rows.is_empty() {
+        if !rows.is_empty() || frame.bodies.is_empty() && pieces.is_empty() {
             let piece = format!("{name}/rank-{rank:05}.vtu");
             target.write(&piece, |file| write_bodies(setting, frame.partition(setting), rows, rank, file))?;
             pieces.push(piece);

@@ -56,7 +56,7 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
     let mut told = Vec::new();
     let written =
         export(&recorded, &out, records(&recorded, Some(10)).unwrap(), |done, of| told.push((done, of))).unwrap();
-    assert_eq!((written.steps.as_slice(), written.bodies, told), (&[0, 10][..], 20, vec![(1, 2), (2, 2)]));
+    assert_eq!((written.steps.as_slice(), written.bodies, told), (&[0, 10][..], [20, 20], vec![(1, 2), (2, 2)]));
     assert_eq!(written.collection, out.join("run.pvd"));
     let steps = ["bodies-0000000000", "bodies-0000000000.pvtu", "bodies-0000000010", "bodies-0000000010.pvtu"];
     assert_eq!(names(&out), [&steps[..], &["run.pvd", "statics.vtu"]].concat());
@@ -116,6 +116,20 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
     };
     let folders = ["bodies-0000000000", "bodies-0000000010"].map(|name| bytes(&out.join(name)));
     assert_eq!(written.bytes, bytes(&out) + folders.iter().sum::<u64>());
+}
+
+#[test]
+fn a_record_without_bodies_has_a_file_without_any() {
+    let folder = tempfile::tempdir().unwrap();
+    let some = |step| if step == 5 { bodies(step) } else { Vec::new() };
+    record(folder.path(), &facts(5), 2, (0..=10).step_by(5), some);
+    let (recorded, out) = (Recorded::open(folder.path()).unwrap(), folder.path().join("out"));
+    let written = export(&recorded, &out, records(&recorded, None).unwrap(), |_, _| {}).unwrap();
+    assert_eq!(written.bodies, [0, 20]);
+    let nobody = Piece::read(&out.join("bodies-0000000010/rank-00000.vtu"));
+    assert!(nobody.text.contains("NumberOfCells=\"0\"") && nobody.column("id").is_empty());
+    let step = fs::read_to_string(out.join("bodies-0000000010.pvtu")).unwrap();
+    assert_eq!(step.matches("<Piece Source=").count(), 1, "{step}");
 }
 
 #[test]
