@@ -99,6 +99,17 @@ impl Path {
         }
     }
 
+    /// How its velocity changes in the middle of a step, in m/s^2.
+    pub(crate) fn acceleration(&self, step: u64, dt: f32) -> Vec2 {
+        let time = (step as f64 + 0.5) * f64::from(dt);
+        let along = |period: f64| -(TAU / period) * (TAU / period);
+        let acceleration = match self.travel {
+            Travel::Rest | Travel::Line { .. } => DVec2::ZERO,
+            Travel::Sine { period, .. } | Travel::Circle { period, .. } => self.travelled(time) * along(period),
+        };
+        acceleration.as_vec2()
+    }
+
     /// Where a body on this path is as a step begins, that stands at a place and is turned so where it is given to be: its center in
     /// meters, and its rotation. `dt` is the length of a step in seconds.
     pub fn pose(&self, position: DVec2, rotation: Rot, step: u64, dt: f32) -> (DVec2, Rot) {
@@ -192,6 +203,9 @@ mod tests {
                 let (at, next) = (course(path, step), course(path, step + 1));
                 let led = at.position + at.velocity.as_dvec2() / 64.0;
                 assert!((led - next.position).length() < 1e-6 * (1.0 + next.position.length()), "{path:?}, {step}");
+                let faster = (next.velocity - at.velocity) * 64.0;
+                let half_way = 0.5 * (path.acceleration(step, 1.0 / 64.0) + path.acceleration(step + 1, 1.0 / 64.0));
+                assert!((faster - half_way).length() < 0.01 * (1.0 + faster.length()), "{path:?}, {step}");
                 let gone = at.position - DVec2::new(3.0, 4.0);
                 assert!(gone.cmpge(low - 1e-9).all() && gone.cmple(high + 1e-9).all());
             }

@@ -104,10 +104,10 @@ impl<'a> Parts<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ghost {
     pub(crate) place: SolverIndex,
-    /// What it is given in every substep, mass-weighted; its velocity, if it is held.
+    /// What it is given in every substep, mass-weighted; its velocity in the first, if it is held.
     pub(crate) given: [f32; 3],
-    /// The part of that which is by forces.
-    pushed: [f32; 3],
+    /// The part of that which is by forces; how much faster it is from each substep to the next, if it is held.
+    pub(crate) gain: [f32; 3],
     /// Whether nothing else moves it.
     pub(crate) held: bool,
 }
@@ -225,7 +225,7 @@ impl SolverBodies {
     }
 
     /// Takes in the bodies of the batches.
-    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, batches: &Batches, setup: &Setup) {
+    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, batches: &Batches, setup: &Setup, step: u64) {
         let total = batches.all.last().map_or(0, |batch| batch.bodies.end);
         for column in [&mut self.velocity, &mut self.pose, &mut self.start, &mut self.weight] {
             column.clear();
@@ -260,18 +260,25 @@ impl SolverBodies {
                 let pushed = pushed.unwrap_or_default();
                 let given =
                     if self.frozen { velocity } else { self.given(place, &tile.unseen[i - tile.owned], pushed) };
-                self.ghosts.push(Ghost { place, given, pushed, held: self.frozen });
+                self.ghosts.push(Ghost {
+                    place,
+                    given,
+                    gain: if self.frozen { [0.0; 3] } else { pushed },
+                    held: self.frozen,
+                });
             } else if let Some(pushed) = pushed {
-                self.ghosts.push(Ghost { place, given: pushed, pushed, held: false });
+                self.ghosts.push(Ghost { place, given: pushed, gain: pushed, held: false });
             }
         }
-        self.load_carriers(tile, contacts, setup);
+        self.load_carriers(tile, contacts, setup, step);
         self.ghosts.sort_unstable_by_key(|ghost| ghost.place);
     }
 
-    /// A carrier goes as its static does; where that is a belt, along the contact as well, which the separation does not show.
-    fn load_carriers(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
+    /// A carrier goes as its static does, in each substep as that does then and over all as far; where that is a belt, along the contact as
+    /// well, which the separation does not show.
+    fn load_carriers(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, step: u64) {
         let bodies = &tile.bodies;
+        let later = 0.5 * (setup.params.integrations() - 1) as f32;
         for (&Carrier { contact, body, .. }, &place) in self.carriers.iter().zip(&self.index[bodies.len()..]) {
             if place == SolverIndex::NOT_SOLVED {
                 continue;
@@ -283,10 +290,15 @@ impl SolverBodies {
             let kind = setup.kind(bodies.kind[i]);
             let runs = right_perp(outward) * kind.material.surface_speed;
             let velocity = bodies.velocity[i] + runs;
+            let row = tile.statics.get(i - tile.owned - tile.ghosts()).copied();
+            let row = row.or_else(|| setup.row_of_going(bodies.id[i]));
+            let faster = row.map_or(Vec2::ZERO, |row| setup.acceleration_at(row, step)) * setup.params.substep();
+            let velocity = if faster == Vec2::ZERO { velocity } else { velocity - faster * later };
             let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
+            let gain = [faster.x, faster.y, 0.0].map(|speed| speed * CARRIER);
             self.velocity[place.get()] = [given[0], given[1], given[2], marked(1.0 / CARRIER, kind)];
             self.weight[place.get()] = [CARRIER, CARRIER, 1.0 / CARRIER, 1.0 / CARRIER];
-            self.ghosts.push(Ghost { place, given, pushed: [0.0; 3], held: true });
+            self.ghosts.push(Ghost { place, given, gain, held: true });
         }
     }
 
@@ -321,7 +333,7 @@ impl SolverBodies {
         }
         self.pose[i] = refresh.pose;
         let ghost = self.ghosts.binary_search_by_key(&place, |ghost| ghost.place).expect("only ghosts are refreshed");
-        self.ghosts[ghost].given = self.given(place, &refresh.unseen, self.ghosts[ghost].pushed);
+        self.ghosts[ghost].given = self.given(place, &refresh.unseen, self.ghosts[ghost].gain);
     }
 
     /// Whether a body with a contact is solved: not if it sleeps.

@@ -98,7 +98,7 @@ impl<'a> Job<'a> {
     /// What moves bodies but contacts; then last substep's impulses once more, unless this is the first, and what ghosts
     /// are given.
     #[inline(always)]
-    pub(crate) fn integrate_velocities<V: Lanes>(&self, member: &Member<'a>, motion: &Motion, first: bool) {
+    pub(crate) fn integrate_velocities<V: Lanes>(&self, member: &Member<'a>, motion: &Motion, substep: u32) {
         for range in self.bodies(member) {
             // SAFETY: the pieces of a stage are different bodies.
             let (velocities, starts) = unsafe { (self.velocity.range(range.clone()), self.start.range(range.clone())) };
@@ -115,7 +115,7 @@ impl<'a> Job<'a> {
                 };
                 let new = motion.accelerate(outer, [vx, vy, w], root_mass, root_inertia);
                 let [nx, ny, nw] = new;
-                let warm = if first {
+                let warm = if substep == 0 {
                     new
                 } else {
                     let [sx, sy, sw, _] = V::load_quads(start);
@@ -126,9 +126,10 @@ impl<'a> Job<'a> {
             }
             for ghost in self.ghosts_in(&range) {
                 let i = ghost.place.get() - self.base - range.start;
-                for (k, given) in ghost.given.into_iter().enumerate() {
+                for (k, (given, gain)) in ghost.given.into_iter().zip(ghost.gain).enumerate() {
                     if ghost.held {
-                        (starts[i][k], velocities[i][k]) = (given, given);
+                        let now = if gain == 0.0 { given } else { given + substep as f32 * gain };
+                        (starts[i][k], velocities[i][k]) = (now, now);
                     } else {
                         starts[i][k] += given;
                         velocities[i][k] += given;

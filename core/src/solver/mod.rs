@@ -146,8 +146,8 @@ impl Solver {
     }
 
     /// Takes in the bodies of the batches.
-    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup) {
-        self.bodies.load(tile, contacts, &self.batches, setup);
+    pub(crate) fn load(&mut self, tile: &Tile, contacts: &Contacts, setup: &Setup, step: u64) {
+        self.bodies.load(tile, contacts, &self.batches, setup, step);
     }
 
     /// Colors the contacts and gives each its place, as long as they do not have both. Returns how many colors there are.

@@ -24,7 +24,7 @@ use crate::tiling::blueprint::Setup;
 #[inline(always)]
 pub(crate) fn substep<'a, V: Lanes>(job: &Job<'a>, member: &Member<'a>, substep: u32, setup: &Setup) {
     let motion = Motion::new(setup);
-    job.integrate_velocities::<V>(member, &motion, substep == 0);
+    job.integrate_velocities::<V>(member, &motion, substep);
     if substep == 0 {
         job.each_color::<V>(member, WarmStart);
     }

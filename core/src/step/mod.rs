@@ -233,7 +233,7 @@ fn prepare(bench: &mut Bench<'_>) {
         let (solver, contacts) = (&mut b.work.solver, &b.work.contacts);
         let sent = if b.setup.params.exchange == Exchange::Substep { b.work.border.sent() } else { &[] };
         let islands = solver.arrange(b.tile, contacts, sent, b.measures, b.setup, b.team);
-        solver.load(b.tile, contacts, b.setup);
+        solver.load(b.tile, contacts, b.setup, b.step);
         let (found, counts) = (contacts.count(b.tile), &mut b.tile.counts);
         (counts.islands, counts.largest_island) = (islands.islands, islands.largest);
         (counts.contacts, counts.border_contacts) = found;

@@ -407,6 +407,16 @@ impl Setup {
         Body { position, rotation, velocity, angular_velocity, ..body }
     }
 
+    /// How a static's velocity changes in a step, in m/s^2.
+    pub(crate) fn acceleration_at(&self, row: u32, step: u64) -> Vec2 {
+        self.path(row).map_or(Vec2::ZERO, |path| path.acceleration(step, self.params.dt))
+    }
+
+    /// The row of a static on a path.
+    pub(crate) fn row_of_going(&self, id: GlobalId) -> Option<u32> {
+        self.going.iter().copied().find(|&row| self.statics[row as usize].id == id)
+    }
+
     /// The low and the high corner of all that a static sweeps in a step.
     pub(crate) fn static_box(&self, row: u32, step: u64) -> [DVec2; 2] {
         let fixed = self.static_at(row, step);
