@@ -80,7 +80,7 @@ impl<'a> Passage<'a> {
         let (mut part, mut deepest) = (0.0, depth);
         while part < 1.0 {
             let rotations = [self.rotation_at(part), other.rotation_at(part)];
-            let manifold = collide(pieces, rotations, offset + (other.way - self.way) * part, f32::INFINITY, false);
+            let manifold = collide(pieces, rotations, offset + (other.way - self.way) * part, f32::INFINITY, None);
             let Some(nearest) = manifold.nearest() else { return 1.0 };
             if part == 0.0 {
                 deepest = depth + max(-nearest.separation, 0.0);

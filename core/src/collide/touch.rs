@@ -13,6 +13,7 @@ pub(super) use meeting::{Meeting, Met, meet};
 pub(super) use stopped::Stopped;
 
 use crate::collide::broad_phase::Pair;
+use crate::collide::manifold::chain::Lies;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
 use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
@@ -121,8 +122,8 @@ struct Approach<'a> {
     pieces: Option<[&'a Piece; 2]>,
     /// Their numbers, as features of contacts name them (see [`Contact::pieces`]).
     features: u32,
-    /// Whether one is a segment of a chain, and the other lay on its face in the last step.
-    lies: bool,
+    /// Where one is a segment of a chain, and the other lay on its face in the last step: how far behind it that may be.
+    lies: Lies,
 }
 
 /// A manifold, and the moment in which it is one.
@@ -157,7 +158,7 @@ impl<'a> Approach<'a> {
         let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
         let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
         let between = b.velocity - a.velocity;
-        Self { a, b, offset, between, pieces: None, features: 0, lies: false }
+        Self { a, b, offset, between, pieces: None, features: 0, lies: None }
     }
 
     /// Of two pieces, if they have some.

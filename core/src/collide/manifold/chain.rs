@@ -7,7 +7,7 @@ use super::Manifold;
 use super::convex::clip;
 use crate::model::contact::ContactPoint;
 use crate::model::convex::Convex;
-use crate::model::math::{dot, max};
+use crate::model::math::{dot, max, min};
 use crate::model::piece::{Joint, Side};
 use glam::Vec2;
 
@@ -20,13 +20,16 @@ const FAR: f32 = 0.05;
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
 const BEYOND: f32 = 1e-5;
 
+/// How far the whole of a piece may be behind a segment that it lies on, in m; none for one that does not.
+pub(in crate::collide) type Lies = Option<f32>;
+
 /// The distance of a piece from an end of a segment, and their manifold.
 type AtEnd = Option<(f32, Manifold)>;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
-/// the piece, which is before the segment, or over it where it `lies` there already, however deep it was pressed. What has no contact with it here, as
-/// another segment has, only [tells how far it is](Manifold::is_distance).
-pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2, lies: bool) -> Manifold {
+/// the piece, which is before the segment, or over it and no further behind than it may be where it [lies](Lies) there already. What
+/// has no contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
+pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2, lies: Lies) -> Manifold {
     let [to, from] = own.edge(0);
     let along = to - from;
     let length = dot(along, along).sqrt();
@@ -34,13 +37,21 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let n = Vec2::new(-along.y, along.x);
     let heights = other.corners().zip(0..).map(|(corner, number)| (dot(corner - from, n), corner, number));
     let none = (f32::INFINITY, from, 0);
+    let highest = heights.clone().fold(f32::NEG_INFINITY, |most, at| max(at.0, most));
     let (lowest, corner, number) = heights.fold(none, |least, at| if at.0 < least.0 { at } else { least });
     let is_over = (0.0..=length).contains(&dot(corner - from, along));
-    let lies = lies && (0.0..=length).contains(&dot(center - from, along));
-    let is_before = lies || dot(center - from, n) >= 0.0;
+    let is_center_over = (0.0..=length).contains(&dot(center - from, along));
+    let is_pressed = is_center_over && lies.is_some_and(|most| highest + radius >= -most);
+    let is_before = is_pressed || dot(center - from, n) >= 0.0;
     // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
     let of_lowest = || is_over.then(|| of_corner(corner, lowest, n, radius, 1 << 9 | number));
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
+    // What has come behind the segment around an end of it is not pressed into its face.
+    let is_behind = |over: &Manifold| over.nearest().is_some_and(|nearest| nearest.separation < 0.0);
+    let level = if highest > 0.0 { 0.0 } else { -(radius + lies.unwrap_or(0.0)) };
+    let goes_around =
+        || lowest < level && level < highest && !crosses(other, [from + n * level, along, n], length, radius);
+    let over = over.filter(|over| !(is_behind(over) && goes_around()));
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over
         && lowest > 0.0
@@ -96,6 +107,23 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
         (None, None, Some((_, nearest))) => nearest,
         (None, None, None) => touched.map_or(Manifold::EMPTY, |(_, at_end)| at_end),
     }
+}
+
+/// Whether the outline of a piece comes through a line between two ends, or within a radius of these. The line is told by where it
+/// starts, its direction and its normal.
+fn crosses(other: &Convex, [from, along, n]: [Vec2; 3], length: f32, radius: f32) -> bool {
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut before = other.corner(other.count() - 1) - from;
+    for corner in other.corners() {
+        let (here, there) = (before, corner - from);
+        let (over, under) = (dot(here, n), dot(there, n));
+        if (over >= 0.0) != (under >= 0.0) {
+            let place = dot(here + (there - here) * (over / (over - under)), along);
+            (low, high) = (min(low, place), max(high, place));
+        }
+        before = there;
+    }
+    low <= length + radius && high >= -radius
 }
 
 /// Along the segment's own normal, as far as the piece is over it.

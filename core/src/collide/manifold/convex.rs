@@ -5,21 +5,22 @@
 //! around polygons as in Box2D (E. Catto).
 
 use super::box_box::PREFERENCE;
-use super::{Manifold, ManifoldPoint, chain};
+use super::chain::{self, Lies};
+use super::{Manifold, ManifoldPoint};
 use crate::model::convex::Convex;
 use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::Piece;
 use glam::Vec2;
 
 /// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. Where one is
-/// a segment of a chain, `lies` tells that the other has lain on its face.
+/// a segment of a chain, `lies` tells how far behind it the other may be that has lain on its face.
 #[inline(never)]
 pub(in crate::collide) fn collide(
     [a, b]: [&Piece; 2],
     [rot_a, rot_b]: [Rot; 2],
     offset: Vec2,
     reach: f32,
-    lies: bool,
+    lies: Lies,
 ) -> Manifold {
     if b.side.is_some() {
         let back = collide([b, a], [rot_b, rot_a], -offset, reach, lies);

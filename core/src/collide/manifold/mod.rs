@@ -4,7 +4,7 @@
 //! the convex pieces meet one by one.
 
 pub(super) mod box_box;
-mod chain;
+pub(super) mod chain;
 pub(super) mod convex;
 mod round;
 #[cfg(test)]
@@ -106,7 +106,7 @@ pub(crate) fn nearest(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: 
     let pairs = a.pieces.iter().flat_map(|a| b.pieces.iter().map(move |b| [a, b]));
     let mut least = (f32::INFINITY, Manifold::EMPTY);
     for pair in pairs {
-        let manifold = convex::collide(pair, [rot_a, rot_b], offset, reach, false);
+        let manifold = convex::collide(pair, [rot_a, rot_b], offset, reach, None);
         if let Some(nearest) = manifold.nearest()
             && nearest.separation < least.0
         {

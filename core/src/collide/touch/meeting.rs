@@ -89,7 +89,7 @@ pub(in crate::collide) fn meet<'a>(
             ([&pieces_a[number_a], &pieces_b[number_b]], Contact::features_of(number_a as u32, number_b as u32));
         (pair.pieces, pair.features) = (Some(pieces), features);
         let known = known.iter().copied().find(|known| known.pieces() == features);
-        pair.lies = false;
+        pair.lies = None;
         let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
         let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
         let outcome = match (kept, rolled) {
@@ -97,7 +97,7 @@ pub(in crate::collide) fn meet<'a>(
             (None, Some((contact, separation))) => Met::Found(contact, separation),
             _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
             _ => {
-                pair.lies = pair.has_lain(known);
+                pair.lies = pair.has_lain(known).then_some(0.5 * setup.params.speculative_distance);
                 Met::from(pair.touch(known, far, setup))
             }
         };
