@@ -43,7 +43,7 @@ impl Summary {
         let mega = 1e-6;
         row(f, "bodies", format_args!("{}, {} lost, {} escaped", self.bodies, self.bodies_lost, self.escaped))?;
         let border = 100.0 * self.border_contact_fraction;
-        row(f, "contacts", format_args!("{} touching, {border:.2} % across tiles", self.contacts))?;
+        row(f, "contacts", format_args!("{} near or touching, {border:.2} % across tiles", self.contacts))?;
         let [mean, most] = [self.mean_penetration, self.max_penetration].map(Figure);
         row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
         let [mean, most] = [self.constraint_violation, self.max_constraint_violation].map(Figure);
