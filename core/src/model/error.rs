@@ -26,7 +26,8 @@ pub enum SetupError {
     },
     /// A static body.
     #[error(
-        "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive"
+        "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive, its speed \
+         at most 1e9 m/s"
     )]
     BadStatic {
         /// Its name.

@@ -4,6 +4,7 @@ use crate::model::error::SetupError;
 use crate::model::id::KindId;
 use crate::model::math::{Rot, min};
 use crate::model::params::Params;
+use crate::model::path::Path;
 use crate::model::piece::{Piece, pieces};
 use crate::model::shape::Shape;
 use glam::Vec2;
@@ -36,7 +37,7 @@ impl Material {
             && self.friction >= 0.0
             && self.friction.is_finite()
             && (0.0..=1.0).contains(&self.restitution)
-            && self.surface_speed.is_finite()
+            && f64::from(self.surface_speed.abs()) <= Path::FASTEST
     }
 }
 

@@ -57,16 +57,22 @@ pub(crate) struct Course {
 }
 
 impl Path {
-    /// Whether its numbers are finite, and periods not zero.
+    /// No static, and no surface of one, is faster than this, in m/s or rad/s.
+    pub const FASTEST: f64 = 1e9;
+
+    /// Whether its numbers are finite, periods not zero, and it nowhere faster than [`FASTEST`](Self::FASTEST).
     pub fn is_valid(&self) -> bool {
-        let turns = |period: f64, phase: f64| period != 0.0 && (1.0 / period).is_finite() && phase.is_finite();
-        let travels = match self.travel {
-            Travel::Rest => true,
-            Travel::Line { velocity } => velocity.is_finite(),
-            Travel::Sine { amplitude, period, phase } => amplitude.is_finite() && turns(period, phase),
-            Travel::Circle { radius, period, phase } => radius.is_finite() && turns(period, phase),
+        let turns = |period: f64, phase: f64| period != 0.0 && phase.is_finite();
+        let speed = match self.travel {
+            Travel::Rest => 0.0,
+            Travel::Line { velocity } => velocity.length(),
+            Travel::Sine { amplitude, period, phase } if turns(period, phase) => {
+                amplitude.length() * (TAU / period).abs()
+            }
+            Travel::Circle { radius, period, phase } if turns(period, phase) => (radius * TAU / period).abs(),
+            Travel::Sine { .. } | Travel::Circle { .. } => f64::NAN,
         };
-        travels && self.turning.is_finite()
+        speed <= Self::FASTEST && self.turning.abs() <= Self::FASTEST
     }
 
     /// How far its center has come at a time, in m.
@@ -216,6 +222,8 @@ mod tests {
     fn what_is_no_path_is_refused() {
         for travel in [
             Travel::Line { velocity: DVec2::new(f64::NAN, 0.0) },
+            Travel::Line { velocity: DVec2::new(1e30, 0.0) },
+            Travel::Sine { amplitude: DVec2::ONE, period: 1e-9, phase: 0.0 },
             Travel::Sine { amplitude: DVec2::ONE, period: 0.0, phase: 0.0 },
             Travel::Circle { radius: f64::INFINITY, period: 1.0, phase: 0.0 },
         ] {

@@ -3,7 +3,7 @@
 use super::super::SceneError;
 use super::entries::{Entries, float, keep, number, pair, place};
 use super::row::is_turn;
-use atoll_core::{Dynamics, Filter, Kind, Material, Part, Rot, Shape};
+use atoll_core::{Dynamics, Filter, Kind, Material, Part, Path as Course, Rot, Shape};
 use glam::{DVec2, Vec2};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -253,11 +253,13 @@ fn within(
 pub(super) fn of_shape(entries: &mut Entries<'_>, shape: Shape) -> Result<Kind, SceneError> {
     let Kind { material, dynamics, filter, .. } = Kind::new(shape.clone(), Material::default());
     let restitution = |number| (0.0..=1.0).contains(&number);
+    const RUNS: &str = "a number within -1e9 to 1e9, in m/s";
+    let runs = |speed: f32| f64::from(speed.abs()) <= Course::FASTEST;
     let material = Material {
         density: within(entries, "density", "a positive number, in kg/m^2", material.density, |number| number > 0.0)?,
         friction: amount(entries, "friction", "a number, at least 0", material.friction)?,
         restitution: within(entries, "restitution", "a number within 0 to 1", material.restitution, restitution)?,
-        surface_speed: entries.float("surface_speed", "a number, in m/s")?.unwrap_or(material.surface_speed),
+        surface_speed: within(entries, "surface_speed", RUNS, material.surface_speed, runs)?,
     };
     const RATE: &str = "a number, at least 0, in 1/s";
     let dynamics = Dynamics {

@@ -282,6 +282,8 @@ fn what_cannot_be_is_refused_in_one_line() {
         ("circle = 1\npath = { line = [1, inf] }", "path, line = [...]: must be a velocity"),
         ("circle = 1\npath = { line = [1, 0], period = 1 }", "path, period = 1: unknown key"),
         ("circle = 1\npath = { sine = [1, 0] }", "path, period: is missing: must be a number of seconds other than 0"),
+        ("circle = 1\npath = { line = [1e30, 0] }", "path, line = [...]: nothing here goes faster than 1e9 m/s"),
+        ("circle = 1\nsurface_speed = -1e10", ": must be a number within -1e9 to 1e9, in m/s"),
         ("circle = 1\npath = { circle = 1, period = 0 }", "path, period = 0: must be a number of seconds other than 0"),
         ("circle = 1\npath = { spin = 1 }", "path, spin = 1: unknown key"),
     ];

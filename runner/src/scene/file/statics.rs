@@ -216,5 +216,17 @@ fn path(entries: &mut Entries<'_>) -> Result<Option<Course>, SceneError> {
     own.finish()?;
     let path = Course { travel, turning };
     // All else is finite already.
-    if path.is_valid() { Ok(Some(path)) } else { Err(own.refuse("period", format!("must be {PERIOD}"))) }
+    let travels = match path.travel {
+        Travel::Sine { period, .. } | Travel::Circle { period, .. } => period != 0.0,
+        Travel::Rest | Travel::Line { .. } => true,
+    };
+    match path.is_valid() {
+        true => Ok(Some(path)),
+        false if travels => {
+            let key =
+                if turning.abs() > Course::FASTEST { "turning" } else { given.first().copied().unwrap_or("turning") };
+            Err(own.refuse(key, format!("nothing here goes faster than {:e} m/s, or rad/s", Course::FASTEST)))
+        }
+        false => Err(own.refuse("period", format!("must be {PERIOD}"))),
+    }
 }
