@@ -20,7 +20,7 @@ const AHEAD: usize = 128;
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 8192;
 
-/// The mean velocity of a tile is that of one body of so many, at least, or of so many of them.
+/// The mean velocity of a tile is that of one body of so many; in large tiles, of about so many bodies.
 const SAMPLED: usize = 13;
 const SAMPLES: usize = 128;
 

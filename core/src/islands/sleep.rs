@@ -1,7 +1,7 @@
 //! Sleeping: islands that rest are left out until something touches them.
 //!
-//! A body rests while its fastest point is slower than `sleep_speed`, and slower than who falls. An island has rested as long as the one of its
-//! bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
+//! A body rests while its fastest point is slower than `sleep_speed`, and than who falls will be in half of `sleep_time`. An
+//! island has rested as long as the one of its bodies that has rested least, and so has each of them from then on: who loses a support that was struck away must
 //! rest anew. An island sleeps once it has rested for `sleep_time`; decided before each solve, on the step's contacts.
 //! Whatever comes to touch it makes one larger island, which is awake as the newcomer is. A body without contacts is an
 //! island of its own. Sleeping bodies have no velocity, feel no gravity, and keep their contacts with

@@ -162,7 +162,8 @@ pub struct Params {
     pub ghosts: Ghosts,
     /// Islands that rest are left out until something touches them (no).
     pub sleep: bool,
-    /// Speed of a body's fastest point below which it counts as resting, in m/s (0.05).
+    /// Speed of a body's fastest point below which it counts as resting, in m/s (0.05); or a quarter of what gravity gives it in
+    /// `sleep_time`, if that is less.
     pub sleep_speed: f32,
     /// An island falls asleep once all its bodies have rested for so long, in s (0.5).
     pub sleep_time: f32,

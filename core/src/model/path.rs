@@ -105,12 +105,17 @@ impl Path {
         }
     }
 
-    /// How its velocity changes in the middle of a step, in m/s^2.
+    /// How its velocity changes in the middle of a step, in m/s^2; zero where it turns back within so few steps that a step is no small part of
+    /// its way.
     pub(crate) fn acceleration(&self, step: u64, dt: f32) -> Vec2 {
+        const FEW: f64 = 4.0;
         let time = (step as f64 + 0.5) * f64::from(dt);
         let along = |period: f64| -(TAU / period) * (TAU / period);
         let acceleration = match self.travel {
             Travel::Rest | Travel::Line { .. } => DVec2::ZERO,
+            Travel::Sine { period, .. } | Travel::Circle { period, .. } if period.abs() < FEW * f64::from(dt) => {
+                DVec2::ZERO
+            }
             Travel::Sine { period, .. } | Travel::Circle { period, .. } => self.travelled(time) * along(period),
         };
         acceleration.as_vec2()

@@ -50,7 +50,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
     let mut painter = Painter::new(&setting, look);
     let mut seen = args.view.unwrap_or_else(|| whole_view(&setting));
     let mut draw = |frame: &Frame| {
-        // Where it is not there yet, or no longer, the last of it is.
+        // Before it is there, all of the world; where it is no longer, its last place.
         if let Some(around) = args.follow.and_then(|id| view_around(id, args, &setting, frame)) {
             seen = around;
         }
@@ -240,7 +240,8 @@ impl Source {
             Self::Live(live) if live.has(id)? => return Ok(()),
             Self::Live(_) => {}
         }
-        let when = if shown.count() == 1 { format!(" at step {}", shown.first) } else { String::new() };
+        let when =
+            if shown.count() == 1 { format!(" at step {}", shown.first) } else { " at any step shown".to_owned() };
         refused(&format!("there is no body of that name{when}; give the id of another"))
     }
 }

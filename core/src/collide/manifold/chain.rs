@@ -10,6 +10,7 @@ use crate::model::convex::Convex;
 use crate::model::math::{dot, max, min};
 use crate::model::piece::{Joint, Side};
 use glam::Vec2;
+use std::ops::RangeInclusive;
 
 /// Normals of faces that differ by less count as one.
 const SAME: f32 = 1e-5;
@@ -27,8 +28,8 @@ pub(in crate::collide) type Lies = Option<f32>;
 type AtEnd = Option<(f32, Manifold)>;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
-/// the piece, which is before the segment, or over it and no further behind than it may be where it [lies](Lies) there already. What
-/// has no contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
+/// the piece, which is before the segment; or over it, where the piece [lies](Lies) there already and no more than so far behind. What has no
+/// contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
 pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2, lies: Lies) -> Manifold {
     let [to, from] = own.edge(0);
     let along = to - from;
@@ -48,10 +49,8 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
     // What has come behind the segment around an end of it is not pressed into its face.
     let is_behind = |over: &Manifold| over.nearest().is_some_and(|nearest| nearest.separation < 0.0);
-    let level = if highest > 0.0 { 0.0 } else { -(radius + lies.unwrap_or(0.0)) };
-    let goes_around =
-        || lowest < level && level < highest && !crosses(other, [from + n * level, along, n], length, radius);
-    let over = over.filter(|over| !(is_behind(over) && goes_around()));
+    let band = -(radius + lies.unwrap_or(0.0))..=radius;
+    let over = over.filter(|over| !is_behind(over) || comes_to(other, [from, along, n], length, radius, band));
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over
         && lowest > 0.0
@@ -109,19 +108,29 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     }
 }
 
-/// Whether the outline of a piece comes through a line between two ends, or within a radius of these. The line is told by where it
-/// starts, its direction and its normal.
-fn crosses(other: &Convex, [from, along, n]: [Vec2; 3], length: f32, radius: f32) -> bool {
+/// Whether the corners and edges of a piece come between the ends of a segment, or within a radius of these, at one of some heights over it.
+/// The segment is told by where it starts, its direction and its normal.
+fn comes_to(
+    other: &Convex,
+    [from, along, n]: [Vec2; 3],
+    length: f32,
+    radius: f32,
+    heights: RangeInclusive<f32>,
+) -> bool {
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-    let mut before = other.corner(other.count() - 1) - from;
+    let mut here = other.corner(other.count() - 1) - from;
     for corner in other.corners() {
-        let (here, there) = (before, corner - from);
-        let (over, under) = (dot(here, n), dot(there, n));
-        if (over >= 0.0) != (under >= 0.0) {
-            let place = dot(here + (there - here) * (over / (over - under)), along);
-            (low, high) = (min(low, place), max(high, place));
+        let there = corner - from;
+        let (first, last) = (dot(here, n), dot(there, n));
+        let (lowest, highest) = (max(min(first, last), *heights.start()), min(max(first, last), *heights.end()));
+        if lowest <= highest {
+            let part_at = |height: f32| (first - height) / (first - last);
+            let parts = if first == last { [0.0, 1.0] } else { [lowest, highest].map(part_at) };
+            for place in parts.map(|part| dot(here + (there - here) * part, along)) {
+                (low, high) = (min(low, place), max(high, place));
+            }
         }
-        before = there;
+        here = there;
     }
     low <= length + radius && high >= -radius
 }

@@ -361,3 +361,41 @@ fn who_touches_a_segment_is_near_it() {
     }
     assert!(around > 1000 && within > 1000, "{around}, {within}");
 }
+
+/// Whoever overlaps several segments of flat ground has a contact with each of them, tilted and rounded as it may be.
+#[test]
+fn who_lies_on_a_chain_of_short_segments_is_held_by_each() {
+    let polygon = |half: Vec2, radius| {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec2::new(x, y) * half);
+        Shape::polygon(&corners, radius).unwrap()
+    };
+    let at = |x: f32| Vec2::new(x, 0.0);
+    // How it is turned, in degrees, and how high its center is; from where to where it overlaps the ground.
+    for (shape, degrees, height, [first, last]) in [
+        (Shape::capsule(0.4, 0.01).unwrap(), 1.0, 0.002, [-0.2, 0.2]),
+        (Shape::capsule(0.4, 0.01).unwrap(), 1.0, -0.002, [-0.2, 0.2]),
+        (polygon(Vec2::new(0.2, 0.1), 0.005), 0.5, 0.098, [-0.2, 0.2]),
+        (Shape::rectangle(0.5, 0.1), 5.0, -0.055, [-0.05, 0.25]),
+        (Shape::rectangle(0.5, 0.1), 5.0, 0.045, [-0.25, 0.05]),
+        (Shape::circle(0.2), 0.0, 0.15, [-0.1, 0.1]),
+        (Shape::circle(0.2), 0.0, -0.205, [-0.05, 0.05]),
+    ] {
+        let piece = &crate::model::piece::pieces(&shape)[0];
+        for number in -3..3 {
+            let (from, to) = (at(0.1 * number as f32 + 0.05), at(0.1 * number as f32 + 0.15));
+            let is_over = from.x.max(first) + 0.02 < to.x.min(last);
+            let middle = 0.5 * (from + to);
+            let ends = [from - at(0.1), from, to, to + at(0.1)].map(|end| end - middle);
+            let segment = Segment::new(Some(ends[0]), ends[1], ends[2], Some(ends[3])).unwrap().0;
+            let ground = &crate::model::piece::pieces(&Shape::Segment(segment))[0];
+            let offset = Vec2::new(0.0, height) - middle;
+            let rotations = [Rot::IDENTITY, Rot::from_angle(f32::to_radians(degrees))];
+            let manifold = convex::collide([ground, piece], rotations, offset, f32::INFINITY, Some(0.01));
+            let touches = !manifold.is_distance() && manifold.nearest().is_some_and(|nearest| nearest.separation < 0.0);
+            // Where the center is behind, those segments hold it that are below that.
+            let is_below = from.x <= 0.0 && 0.0 <= to.x;
+            let is_held = is_over && (height > 0.0 || is_below);
+            assert!(touches || !is_held, "{shape:?} at {height} over {from}: {manifold:?}");
+        }
+    }
+}

@@ -58,8 +58,8 @@ impl Sorted {
             if near.pairs.len() < range.len() {
                 near.pairs.resize(range.len(), [0, 0]);
             }
-            let (candidates, kept) = (&candidates[range], &mut near.pairs);
-            near.kept = setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates, near: kept });
+            let (candidates, room) = (&candidates[range], &mut near.pairs);
+            near.kept = setup.lanes.run(Cull { bodies: &tile.bodies, proxies, setup, candidates, near: room });
             if setup.filters {
                 let kind = |body: u32| setup.kind(tile.bodies.kind[body as usize]);
                 near.pairs.truncate(near.kept);

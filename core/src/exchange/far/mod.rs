@@ -33,7 +33,7 @@ use std::ops::Range;
 use unseen::unseen_of;
 
 /// Whether some bodies' velocities take one of them far. Without a branch, as hardly ever does one.
-pub(crate) fn any(velocities: &[Vec2], setup: &Setup) -> bool {
+fn any(velocities: &[Vec2], setup: &Setup) -> bool {
     velocities.iter().fold(false, |any, &velocity| any | setup.goes_far(velocity))
 }
 
