@@ -377,7 +377,7 @@ fn who_lies_on_a_chain_of_short_segments_is_held_by_each() {
         (polygon(Vec2::new(0.2, 0.1), 0.005), 0.5, 0.098, [-0.2, 0.2]),
         (Shape::rectangle(0.5, 0.1), 5.0, -0.055, [-0.05, 0.25]),
         (Shape::rectangle(0.5, 0.1), 5.0, 0.045, [-0.25, 0.05]),
-        (Shape::circle(0.2), 0.0, 0.15, [-0.1, 0.1]),
+        (Shape::circle(0.2), 0.0, 0.15, [-0.05, 0.05]),
         (Shape::circle(0.2), 0.0, -0.205, [-0.05, 0.05]),
     ] {
         let piece = &crate::model::piece::pieces(&shape)[0];
