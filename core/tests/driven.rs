@@ -99,7 +99,6 @@ fn platforms_carry_and_push_and_feel_nothing() {
     }
 }
 
-/// A paddle that turns hits a disc: with restitution 1 the disc leaves with twice the speed of what hits it.
 /// By Coulomb's friction its mean speed over whole periods dies away. With the speed of the static as it is on the mean of a step it went on by
 /// 0.12 m/s for ever, as friction then turns round between two steps alone, and a period of whole steps has them always alike.
 #[test]
@@ -121,6 +120,52 @@ fn what_slides_on_a_shaker_goes_nowhere() {
     }
 }
 
+/// Who bounces off a plate that goes up and down leaves as fast as Newton's restitution has it of the speed of the plate as they meet:
+/// each speed against a search for that moment.
+#[test]
+fn a_plate_that_oscillates_throws_back_as_fast_as_it_is_when_it_is_hit() {
+    const RESTITUTION: f64 = 0.8;
+    const AMPLITUDE: f64 = 0.1;
+    const PERIOD: f64 = 0.4;
+    let gravity = f64::from(G);
+    for tiles in TILES {
+        let ball = Material { restitution: RESTITUTION as f32, ..Material::default() };
+        let travel = Travel::Sine { amplitude: DVec2::new(0.0, AMPLITUDE), period: PERIOD, phase: 0.0 };
+        let plate = StaticBody {
+            path: Some(Path { travel, turning: 0.0 }),
+            ..fixed(100, Shape::rectangle(39.0, 1.0), 20.0, 19.5)
+        };
+        let mut world = world(tiles, vec![Kind::new(Shape::circle(0.1), ball)], vec![plate]);
+        (0..100).for_each(|i| put(&mut world, i, 0, 1.0 + 0.38 * i as f64, 22.0 + 0.0173 * i as f64));
+        let mut bounces = 0;
+        let mut falling: Vec<Body> = world.bodies().collect();
+        falling.sort_by_key(|body| body.id);
+        for at in 0..90 {
+            run(&mut world, 1);
+            for body in world.bodies() {
+                let fell = &mut falling[body.id.0 as usize];
+                if fell.velocity.y > 0.0 || body.velocity.y <= 0.0 {
+                    *fell = body;
+                    continue;
+                }
+                let phase = |time: f64| TAU * (f64::from(at) / 60.0 + time) / PERIOD;
+                let top = |time: f64| 20.1 + AMPLITUDE * phase(time).sin();
+                let speed = f64::from(fell.velocity.y);
+                let falls = |time: f64| fell.position.y + speed * time - 0.5 * gravity * time * time;
+                let hit = (0..).map(|i| f64::from(i) * 1e-5).find(|&time| falls(time) <= top(time)).unwrap();
+                let plate = AMPLITUDE * (TAU / PERIOD) * phase(hit).cos();
+                let leaves = (1.0 + RESTITUTION) * plate + RESTITUTION * (gravity * hit - speed);
+                let off = (f64::from(body.velocity.y) - leaves).abs();
+                assert!(off < 0.02, "{} m/s and not {leaves} off a plate of {plate} m/s on {tiles:?}", body.velocity.y);
+                bounces += 1;
+                *fell = body;
+            }
+        }
+        assert!(bounces > 110);
+    }
+}
+
+/// A paddle that turns hits a disc: with restitution 1 the disc leaves with twice the speed of what hits it.
 #[test]
 fn a_paddle_hits_as_hard_as_it_turns() {
     for tiles in TILES {

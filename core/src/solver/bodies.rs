@@ -382,9 +382,22 @@ impl SolverBodies {
         if !places.contains(&SolverIndex::STATIC) {
             return places;
         }
-        let Ok(found) = self.carriers.binary_search_by_key(&contact, |carrier| carrier.contact) else { return places };
-        let carrier = self.index[self.index.len() - self.carriers.len() + found];
+        let Some(carrier) = self.carrier_in(contact) else { return places };
         places.map(|place| if place == SolverIndex::STATIC { carrier } else { place })
+    }
+
+    /// How much faster the static of a contact gets from each substep to the next, in m/s.
+    pub(crate) fn static_gain_in(&self, contact: u32) -> Vec2 {
+        let ghost = self.carrier_in(contact).and_then(|place| {
+            let found = self.ghosts.binary_search_by_key(&place, |ghost| ghost.place);
+            found.ok().map(|found| &self.ghosts[found])
+        });
+        ghost.map_or(Vec2::ZERO, |Ghost { gain: [x, y, _], .. }| Vec2::new(*x, *y) / CARRIER)
+    }
+
+    fn carrier_in(&self, contact: u32) -> Option<SolverIndex> {
+        let found = self.carriers.binary_search_by_key(&contact, |carrier| carrier.contact);
+        found.ok().map(|found| self.index[self.index.len() - self.carriers.len() + found])
     }
 
     /// Which of these a body of the tile is.

@@ -11,6 +11,7 @@ use crate::model::params::Exchange;
 use crate::parallel::lanes::Quad;
 use crate::solver::batches::{Batch, Batches};
 use crate::solver::bodies::SolverBodies;
+use crate::tiling::blueprint::Setup;
 use glam::Vec2;
 
 /// At most so many passes over contacts that bounce, and over those with statics after that.
@@ -45,10 +46,10 @@ impl Groups {
                 let mut answers = [Answer::Hold; 2];
                 let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
-                    let [closing, slip] = source.meeting_speeds(i, point);
+                    let Meeting { closing, slip, lead } = source.meeting(i, point);
                     fastest = max(fastest, closing);
                     *answer = if closing > threshold {
-                        Answer::Part(Parting { closing, slip, speed: restitution * closing })
+                        Answer::Part(Parting { closing, slip, speed: max(restitution * closing + lead, 0.0) })
                     } else if source.holds(i, point, closing) {
                         Answer::Hold
                     } else {
@@ -109,7 +110,7 @@ impl Groups {
             let is_dead = kinds.iter().all(|kind| kind.material.restitution == 0.0);
             let is_beside = || source.moving(i).any(|body| self.struck[body as usize].0);
             if is_dead && is_beside() && self.is_solved(i as u32) {
-                let speeds = (0..contact.point_count()).map(|point| source.meeting_speeds(i, point)[0]);
+                let speeds = (0..contact.point_count()).map(|point| source.meeting(i, point).closing);
                 let fastest = speeds.fold(f32::NEG_INFINITY, max);
                 self.add_bounce(i, (fastest, [Answer::Hold; 2]), source, batches);
             }
@@ -138,7 +139,7 @@ impl Groups {
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let mut points = 0..contact.point_count();
             if sides(i).iter().any(|&body| held[body] == Some(false))
-                && points.any(|point| source.holds(i, point, source.meeting_speeds(i, point)[0]))
+                && points.any(|point| source.holds(i, point, source.meeting(i, point).closing))
             {
                 sides(i).into_iter().for_each(|body| held[body] = held[body].and(Some(true)));
             }
@@ -341,27 +342,46 @@ impl<'a> Source<'a> {
         self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && is_slow()
     }
 
-    /// Speeds at which a point's surfaces will come nearer as they touch, and slide along each other, in m/s. The first is that of now,
-    /// and what a gravity that only one of the bodies feels adds over the gap between them. Without that each bounce loses a step's fall.
-    fn meeting_speeds(self, contact: usize, point: usize) -> [f32; 2] {
-        let (bodies, setup, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
-        let separation = self.contacts.separation[contact][point];
+    /// How a point's surfaces meet. Each bounce would lose a step's fall without what gravity adds over the gap between them; and what a static
+    /// that oscillates does there, it would take or give.
+    fn meeting(self, contact: usize, point: usize) -> Meeting {
+        let (bodies, Setup { params, .. }, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
+        let separation = max(self.contacts.separation[contact][point], 0.0);
+        let gain = self.bodies.static_gain_in(contact as u32);
         let contact = &self.tile.contacts.contacts[contact];
         let anchor = contact.points[point].anchor;
         let tangent = right_perp(contact.normal);
         let motion = |body: u32, arm: Vec2, runs: f32| {
             let i = body as usize;
-            let kind = setup.kind(bodies.kind[i]);
+            let kind = self.setup.kind(bodies.kind[i]);
             let falls = kind.inv_mass > 0.0;
-            let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
+            let gravity = if falls { params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
             let belt = tangent * (runs * kind.material.surface_speed);
-            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
+            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity, falls)
         };
-        let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
+        let ((velocity_a, gravity_a, a_falls), (velocity_b, gravity_b, _)) =
             (motion(a, anchor, 1.0), motion(b, anchor - contact.offset, -1.0));
-        let closing = -dot(velocity_b - velocity_a, contact.normal);
-        let pull = -dot(gravity_b - gravity_a, contact.normal);
-        let touching = max(closing * closing + 2.0 * pull * max(separation, 0.0), 0.0).sqrt();
-        [if closing > 0.0 { touching } else { closing }, dot(velocity_b - velocity_a, tangent)]
+        // The velocity of a static is its mean of the step.
+        let gain = dot(gain, contact.normal) * if a_falls { -1.0 } else { 1.0 };
+        let comes = gain / params.substep();
+        let closing = -dot(velocity_b - velocity_a, contact.normal) - comes * (0.5 * params.dt);
+        let slip = dot(velocity_b - velocity_a, tangent);
+        if closing <= 0.0 {
+            return Meeting { closing, slip, lead: 0.0 };
+        }
+        let pull = comes - dot(gravity_b - gravity_a, contact.normal);
+        let touching = max(closing * closing + 2.0 * pull * separation, 0.0).sqrt();
+        let later = max(params.dt - 2.0 * separation / (closing + touching), 0.0);
+        Meeting { closing: touching, slip, lead: 0.5 * gain - comes * later }
     }
+}
+
+/// How the surfaces at a point of a contact meet; speeds in m/s.
+struct Meeting {
+    /// At which they come nearer as they touch.
+    closing: f32,
+    /// At which they slide along each other.
+    slip: f32,
+    /// How much faster they part then than as seen from the last substep, until when a static gains so much.
+    lead: f32,
 }
