@@ -3,9 +3,12 @@
 use crate::scene::{FARTHEST, kind_of_command};
 use atoll_core::{Body, Command, GlobalId, KindId, Rot};
 use glam::{DVec2, Vec2};
-use serde::de::{DeserializeOwned, Error as _};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
+use std::fmt::{self, Formatter};
+use std::marker::PhantomData;
 
 /// A line: what, when, and where it was read.
 #[derive(Clone, PartialEq, Debug)]
@@ -113,13 +116,57 @@ struct Several<T> {
     is_list: bool,
 }
 
-impl<'de, T: DeserializeOwned> Deserialize<'de> for Several<T> {
+impl<T> Several<T> {
+    fn one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error>
+    where
+        T: Deserialize<'de>,
+    {
+        Ok(Self { all: vec![T::deserialize(deserializer)?], is_list: false })
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Several<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let read = |value| serde_json::from_value(value).map_err(D::Error::custom);
-        match Value::deserialize(deserializer)? {
-            Value::Array(all) => Ok(Self { all: all.into_iter().map(read).collect::<Result<_, _>>()?, is_list: true }),
-            one => Ok(Self { all: vec![read(one)?], is_list: false }),
-        }
+        deserializer.deserialize_any(OneOrList(PhantomData))
+    }
+}
+
+/// Reads what is there as it comes: by way of a [`Value`], a key that is given twice would not be noticed.
+struct OneOrList<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for OneOrList<T> {
+    type Value = Several<T>;
+
+    fn expecting(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        formatter.write_str("one or a list of some")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+        Ok(Several { all: Vec::deserialize(SeqAccessDeserializer::new(list))?, is_list: true })
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, object: A) -> Result<Self::Value, A::Error> {
+        Several::one(MapAccessDeserializer::new(object))
+    }
+
+    fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
+        Several::one(number.into_deserializer())
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+        Several::one(number.into_deserializer())
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
+        Several::one(number.into_deserializer())
+    }
+
+    fn visit_bool<E: Error>(self, is_so: bool) -> Result<Self::Value, E> {
+        Several::one(is_so.into_deserializer())
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<Self::Value, E> {
+        Several::one(text.into_deserializer())
     }
 }
 

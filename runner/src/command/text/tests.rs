@@ -83,6 +83,8 @@ fn what_cannot_be_read_is_told_in_one_line() {
         (r#"{"step": 1, "remove": [3, "x"]}"#, "string \"x\" stands where a whole number that is not negative must"),
         (r#"{"step": 1, "add": {"x": 1}}"#, "missing field `y`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "z": 3}}"#, "unknown field `z`"),
+        (r#"{"step": 1, "add": [{"x": 1, "y": 2, "x": 3}]}"#, "duplicate field `x`"),
+        (r#"{"step": 1, "velocity": {"id": 1, "id": 2}}"#, "duplicate field `id`"),
         (r#"{"step": 1, "add": {"x": 1, "y": 2, "cos": 1}}"#, "a body is turned by an angle, or by cos and sin"),
         (r#"{"step": 1, "add": [{"x": 1e9, "y": 0}, {"x": 0, "y": -1e12}]}"#, "add, y = -1e12: must be within -1e9 to"),
         (
