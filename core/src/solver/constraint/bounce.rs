@@ -28,7 +28,7 @@ pub(crate) struct Passing {
     pub(super) held: bool,
 }
 
-/// How a point that bounces came, and how it is to part; speeds in m/s.
+/// How a point that bounces came, and how it is to part; speeds in m/s, those along the normal as seen from a static as it is in the last substep.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Parting {
     /// At which its surfaces came nearer.
@@ -37,6 +37,8 @@ pub(crate) struct Parting {
     pub(super) slip: f32,
     /// At which they are to part.
     pub(super) speed: f32,
+    /// At which they slide in the last substep where they did not as they touched.
+    pub(super) slides: f32,
 }
 
 impl Sides {
@@ -151,7 +153,7 @@ impl Sides {
         velocity: &mut [Quad],
     ) -> bool {
         let rows = self.tangent_rows(point, lane, velocity);
-        let slip = self.speed(rows, lane, velocity);
+        let slip = self.speed(rows, lane, velocity) - parting.map_or(0.0, |parting| parting.slides);
         let most = self.friction[lane] * totals.normal[lane];
         let (rubbed, mass) = (&mut totals.tangent[lane], point.tangent_mass[lane]);
         let mut wanted = clamp(*rubbed - mass * slip, -most, most);

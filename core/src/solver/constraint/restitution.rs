@@ -5,6 +5,7 @@ use super::columns::Columns;
 use super::groups::{Bounce, Groups, Lane, Times};
 use super::rows::Source;
 use crate::islands::union_find::{join, root_of};
+use crate::model::contact::Contact;
 use crate::model::kind::KindRow;
 use crate::model::math::{dot, max, min, right_perp, turn};
 use crate::model::params::Exchange;
@@ -46,14 +47,15 @@ impl Groups {
                 let mut answers = [Answer::Hold; 2];
                 let mut fastest = f32::NEG_INFINITY;
                 for (point, answer) in answers.iter_mut().enumerate().take(contact.point_count()) {
-                    let Meeting { closing, slip, lead } = source.meeting(i, point);
+                    let Meeting { closing, slip, lead: [lead, slides], push } = source.meeting(i, point);
                     fastest = max(fastest, closing);
                     *answer = if closing > threshold {
-                        Answer::Part(Parting { closing, slip, speed: max(restitution * closing + lead, 0.0) })
+                        let speed = max(restitution * closing + lead, 0.0);
+                        Answer::Part(Parting { closing: closing + lead, slip, speed, slides })
                     } else if source.holds(i, point, closing) {
                         Answer::Hold
                     } else {
-                        let least = SURELY * max(closing, 0.0) + source.fall(i);
+                        let least = SURELY * max(closing, 0.0) + source.fall(i) + push;
                         Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
                     };
                 }
@@ -342,37 +344,75 @@ impl<'a> Source<'a> {
         self.tile.contacts.contacts[contact].points[point].normal_impulse > 0.0 && is_slow()
     }
 
-    /// How a point's surfaces meet. Each bounce would lose a step's fall without what gravity adds over the gap between them; and what a static
-    /// that oscillates does there, it would take or give.
+    /// How a point's surfaces meet, or are about to.
     fn meeting(self, contact: usize, point: usize) -> Meeting {
-        let (bodies, Setup { params, .. }, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
+        let (bodies, setup, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
         let separation = max(self.contacts.separation[contact][point], 0.0);
-        let gain = self.bodies.static_gain_in(contact as u32);
-        let contact = &self.tile.contacts.contacts[contact];
-        let anchor = contact.points[point].anchor;
-        let tangent = right_perp(contact.normal);
+        let Contact { normal, offset, points, .. } = &self.tile.contacts.contacts[contact];
+        let (anchor, tangent) = (points[point].anchor, right_perp(*normal));
         let motion = |body: u32, arm: Vec2, runs: f32| {
             let i = body as usize;
-            let kind = self.setup.kind(bodies.kind[i]);
+            let kind = setup.kind(bodies.kind[i]);
             let falls = kind.inv_mass > 0.0;
-            let gravity = if falls { params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
+            let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
             let belt = tangent * (runs * kind.material.surface_speed);
             (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity, falls)
         };
-        let ((velocity_a, gravity_a, a_falls), (velocity_b, gravity_b, _)) =
-            (motion(a, anchor, 1.0), motion(b, anchor - contact.offset, -1.0));
-        // The velocity of a static is its mean of the step.
-        let gain = dot(gain, contact.normal) * if a_falls { -1.0 } else { 1.0 };
-        let comes = gain / params.substep();
-        let closing = -dot(velocity_b - velocity_a, contact.normal) - comes * (0.5 * params.dt);
-        let slip = dot(velocity_b - velocity_a, tangent);
-        if closing <= 0.0 {
-            return Meeting { closing, slip, lead: 0.0 };
+        let ((velocity_a, gravity_a, a_falls), (velocity_b, gravity_b, b_falls)) =
+            (motion(a, anchor, 1.0), motion(b, anchor - offset, -1.0));
+        let (velocity, gravity) = (velocity_b - velocity_a, gravity_b - gravity_a);
+        let approach = Approach { separation, closing: -dot(velocity, *normal), pull: -dot(gravity, *normal) };
+        let slip = dot(velocity, tangent);
+        let gain = if a_falls && b_falls { Vec2::ZERO } else { self.bodies.static_gain_in(contact as u32) };
+        if gain == Vec2::ZERO {
+            let closing = if approach.closing > 0.0 { approach.touching() } else { approach.closing };
+            return Meeting { closing, slip, lead: [0.0; 2], push: 0.0 };
         }
-        let pull = comes - dot(gravity_b - gravity_a, contact.normal);
-        let touching = max(closing * closing + 2.0 * pull * separation, 0.0).sqrt();
-        let later = max(params.dt - 2.0 * separation / (closing + touching), 0.0);
-        Meeting { closing: touching, slip, lead: 0.5 * gain - comes * later }
+        let gain = if a_falls { -gain } else { gain };
+        approach.of_oscillating([*normal, tangent].map(|axis| dot(gain, axis)), slip, setup)
+    }
+}
+
+/// How two surfaces come nearer along the normal.
+struct Approach {
+    /// In m, at least 0.
+    separation: f32,
+    /// At which speed, in m/s, and what of it is gained, in m/s^2.
+    closing: f32,
+    pull: f32,
+}
+
+impl Approach {
+    /// The speed at which they touch, in m/s. Each bounce would lose a step's fall without what gravity adds over the gap.
+    fn touching(&self) -> f32 {
+        max(self.closing * self.closing + 2.0 * self.pull * self.separation, 0.0).sqrt()
+    }
+
+    /// When they touch, in s.
+    fn time(&self) -> f32 {
+        let Self { separation, closing, pull } = *self;
+        if closing > 0.0 {
+            2.0 * separation / (closing + self.touching())
+        } else if pull > 0.0 {
+            (self.touching() - closing) / pull
+        } else {
+            f32::INFINITY
+        }
+    }
+
+    /// How surfaces meet of which one belongs to a static that gains so much along normal and tangent in each substep, in m/s, towards the
+    /// other; its velocity here is the mean of the step.
+    fn of_oscillating(self, gain: [f32; 2], slip: f32, setup: &Setup) -> Meeting {
+        let (dt, h) = (setup.params.dt, setup.params.substep());
+        let [comes, slides] = gain.map(|gain| gain / h);
+        let begins =
+            Self { closing: self.closing - comes * (0.5 * dt), pull: self.pull + comes, separation: self.separation };
+        let time = begins.time();
+        let touches = begins.closing > 0.0 || time <= dt;
+        let (closing, time) = if touches { (begins.touching(), min(time, dt)) } else { (begins.closing, dt) };
+        // In the last substep it is on the average as fast as in the middle of that.
+        let lead = [comes, slides].map(|gains| gains * (0.5 * h - (dt - time)));
+        Meeting { closing, slip: slip - slides * (time - 0.5 * dt), lead, push: max(comes, 0.0) * dt }
     }
 }
 
@@ -382,6 +422,39 @@ struct Meeting {
     closing: f32,
     /// At which they slide along each other.
     slip: f32,
-    /// How much faster they part then than as seen from the last substep, until when a static gains so much.
-    lead: f32,
+    /// How much faster they part, and slide, as seen from the last substep than as they touch, by what a static gains until then.
+    lead: [f32; 2],
+    /// What a static that comes nearer and nearer gives the other in the step, though it is no blow.
+    push: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::params::Params;
+    use crate::tiling::blueprint::Blueprint;
+    use crate::tiling::partition::Partition;
+    use glam::DVec2;
+
+    /// What goes away from a static as the step begins may meet it within the step, if that comes nearer and nearer.
+    #[test]
+    fn an_oscillating_static_may_catch_up() {
+        let partition = Partition::uniform(DVec2::ZERO, DVec2::ONE, 1, 1).unwrap();
+        let blueprint = Blueprint { params: Params::default(), partition, kinds: Vec::new(), statics: Vec::new() };
+        let setup = Setup::new(&blueprint).unwrap();
+        let (dt, gains) = (setup.params.dt, 60.0);
+        for (closing, touches) in [(-0.2, false), (0.1, true), (0.9, true)] {
+            let separation = 0.001;
+            // The gap closes by the speed at the beginning of the step, and what is gained.
+            let gap = |time: f32| separation - (closing - 0.5 * gains * dt) * time - 0.5 * gains * time * time;
+            let hit = (0..1000).map(|i| 0.001 * i as f32 * dt).find(|&time| gap(time) <= 0.0);
+            assert_eq!(hit.is_some(), touches);
+            let approach = Approach { separation, closing, pull: 0.0 };
+            let Meeting { closing: found, lead, .. } = approach.of_oscillating([gains * setup.h, 0.0], 0.0, &setup);
+            let expected = closing + gains * (hit.unwrap_or(0.0) - 0.5 * dt);
+            assert!((found - expected).abs() < 2e-3, "{found} m/s and not {expected}");
+            let later = dt - hit.unwrap_or(dt);
+            assert!((lead[0] - gains * (0.5 * setup.h - later)).abs() < 2e-3, "{} m/s", lead[0]);
+        }
+    }
 }
