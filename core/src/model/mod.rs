@@ -4,6 +4,7 @@ pub(crate) mod body;
 pub(crate) mod contact;
 pub(crate) mod convex;
 pub(crate) mod error;
+mod flush;
 pub(crate) mod id;
 pub(crate) mod kind;
 pub(crate) mod math;

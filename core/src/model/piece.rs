@@ -1,6 +1,7 @@
 //! The convex pieces that contacts of all shapes but circles and boxes are found by.
 
 use crate::model::convex::Convex;
+use crate::model::flush::join_flush;
 use crate::model::math::dot;
 use crate::model::shape::{Polygon, Segment, Shape};
 use glam::Vec2;
@@ -36,7 +37,7 @@ pub(crate) enum Joint {
 }
 
 impl Piece {
-    fn new(corners: &[Vec2], radius: f32) -> Self {
+    pub(super) fn new(corners: &[Vec2], radius: f32) -> Self {
         Self::with_normals(corners, &outward(corners), radius)
     }
 
@@ -96,7 +97,7 @@ fn outward(corners: &[Vec2]) -> Vec<Vec2> {
     corners.iter().zip(next).map(normal).collect()
 }
 
-/// The convex pieces of a shape.
+/// The convex pieces of a shape: of several shapes fewer, where some are one together.
 pub(crate) fn pieces(shape: &Shape) -> Arc<[Piece]> {
     match shape {
         Shape::Circle { radius } => [Piece::new(&[Vec2::ZERO], *radius)].into(),
@@ -112,7 +113,9 @@ pub(crate) fn pieces(shape: &Shape) -> Arc<[Piece]> {
                 let own: Vec<Piece> = pieces(&part.shape).iter().map(|piece| piece.placed(place)).collect();
                 own
             });
-            placed.collect()
+            let mut all = placed.collect();
+            join_flush(&mut all);
+            all.into()
         }
     }
 }
