@@ -217,8 +217,13 @@ fn what_is_complete_is_not_made_once_more() {
     let (summary, json) = (whole.join("summary.json"), folder.path().join("summary.json"));
     let before = fs::metadata(&summary).unwrap().modified().unwrap();
     for way in Way::all() {
-        let ended = run(way.resume(1, &whole).arg("--json").arg(&json));
+        let [timings, log] = ["timings.csv", "log.csv"].map(|name| folder.path().join(name));
+        let mut command = way.resume(1, &whole);
+        command.arg("--json").arg(&json).arg("--timings").arg(&timings).arg("--log").arg(&log);
+        let ended = run(&mut command);
         assert!(ended.stderr.contains("all 120 steps of this run are made already"), "{way}: {ended}");
+        assert!(ended.stderr.contains("--log: not written, as no step is made") && !log.exists(), "{way}: {ended}");
+        assert_eq!(fs::read(whole.join("timings.csv")).unwrap(), fs::read(&timings).unwrap(), "{way}");
         assert_eq!(fs::metadata(&summary).unwrap().modified().unwrap(), before, "{way}");
         assert_eq!(fs::read(&summary).unwrap(), fs::read(&json).unwrap(), "{way}");
         fs::remove_file(&json).unwrap();

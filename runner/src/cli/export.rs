@@ -1,6 +1,7 @@
 //! `atoll export`: what a run has recorded, as files for other programs.
 
 use super::args::ExportArgs;
+use super::console::complain;
 use super::output::{self, Kept};
 use super::progress::{Progress, Show};
 use crate::error::{Exit, RunError};
@@ -15,6 +16,7 @@ use std::io::{self, IsTerminal};
 /// If there is no recording to read, or it cannot be written.
 pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     let recorded = Recorded::open(&args.run)?;
+    recorded.recording().damage().iter().for_each(|damage| complain(damage));
     let shown = records(&recorded, args.every)?;
     Kept { runs: vec![&args.run], ..Kept::default() }.check([("--vtk", Some(args.vtk.as_path()))])?;
     // On a terminal only: a log has no use for that.

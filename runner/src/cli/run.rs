@@ -53,14 +53,14 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
     let held = hold(args)?;
     let outputs = Outputs::check(args)?;
     let begun = held.is_some() && is_begun(args);
-    let first = checked(plan(args, &config, begun)).map_err(|error| outputs.copy_summary(error))?;
+    let first = checked(plan(args, &config, begun)).map_err(|error| outputs.of_complete(args, error))?;
     #[cfg(feature = "iceoryx2")]
     if first.transport == TransportKind::Iceoryx2 {
         launch::iceoryx2::check(&first, &configuration(args, false))?;
     }
     let held = hold_new(args, &first, held)?;
     let first = if !begun && is_begun(args) {
-        checked(plan(args, &config, true)).map_err(|error| outputs.copy_summary(error))?
+        checked(plan(args, &config, true)).map_err(|error| outputs.of_complete(args, error))?
     } else {
         first
     };
@@ -287,7 +287,7 @@ fn over_mpi(args: &RunArgs, config: Result<Config, RunError>) -> Result<Exit, Ru
     let prepare = |config: &Config, outputs: &Outputs, begun| {
         let plan = plan(args, config, begun);
         let plan = if speaks { checked(plan) } else { plan };
-        plan.map_err(|error| outputs.copy_summary(error))
+        plan.map_err(|error| outputs.of_complete(args, error))
     };
     let prepared = config.and_then(|config| {
         if args.restarts > 0 {
@@ -370,13 +370,21 @@ struct Outputs {
 }
 
 impl Outputs {
-    /// Where an error says that a run is complete, its summary goes where this one's was to go. What is left to say then.
-    fn copy_summary(&self, error: RunError) -> RunError {
-        if let (RunError::Complete { summary, .. }, Some(json)) = (&error, &self.json) {
-            let failed = |error: io::Error| RunError::Output { path: summary.clone(), reason: error.to_string() };
-            if let Err(error) = fs::read(summary).map_err(failed).and_then(|bytes| json.write(&bytes)) {
+    /// Where an error says that a run is complete, what that has left goes where this one's was to go. What is left to say then.
+    fn of_complete(&self, args: &RunArgs, error: RunError) -> RunError {
+        let (RunError::Complete { summary, .. }, Some(folder), Some(_)) = (&error, folder(args), &self.folder) else {
+            return error;
+        };
+        for (from, to) in [(summary.clone(), &self.json), (folder.timings(), &self.timings)] {
+            let Some(to) = to else { continue };
+            let failed = |error: io::Error| RunError::Output { path: from.clone(), reason: error.to_string() };
+            if let Err(error) = fs::read(&from).map_err(failed).and_then(|bytes| to.write(&bytes)) {
                 return error;
             }
+        }
+        let unwritten: Vec<&str> = files(args)[2..].iter().filter_map(|(option, path)| path.map(|_| *option)).collect();
+        if !unwritten.is_empty() {
+            complain(&format!("{}: not written, as no step is made", unwritten.join(", ")));
         }
         error
     }
