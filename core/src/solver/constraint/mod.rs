@@ -9,9 +9,11 @@
 //! | `kernels.rs` | what passes do to a group |
 //! | `groups.rs` | all of a tile's; how to find that of a contact |
 //! | `restitution.rs` | what bounces, and in which order |
+//! | `approach.rs` | how fast surfaces are as they meet |
 //! | `bounce.rs` | the bounce of one contact |
 //! | `energies.rs` | that bounces give no energy that nobody had |
 
+mod approach;
 mod bounce;
 #[allow(unsafe_code)]
 pub(crate) mod columns;
