@@ -175,7 +175,8 @@ if [[ -n ${python_job:-} ]]; then
 fi
 # As it is compiled for speed, everything, with every transport; of the runner what its program does, and of the core what worlds do,
 # as the next says: to compile its kernels once more, for its own tests, would take minutes.
-for_speed=(cargo test --release --workspace --exclude atoll --exclude atoll-core --lib --bins --tests ${features[@]+"${features[@]}"})
+optimized=(cargo test --release --workspace --exclude atoll --exclude atoll-core ${features[@]+"${features[@]}"})
+for_speed=("${optimized[@]}" --lib --bins --tests)
 step "${for_speed[@]}" --no-run
 begin_aarch64
 step "${for_speed[@]}"
@@ -200,9 +201,8 @@ if [[ ${features[*]} == *mpi* ]]; then
             cargo clean --quiet --release --package mpi-sys --target-dir "$mpich"
         fi
         # With the features of before, or more than what is upon MPI would be compiled anew.
-        over_mpich=(cargo test --release --workspace --exclude atoll --exclude atoll-core "${features[@]}")
         step env MPICC=mpicc.mpich CARGO_TARGET_DIR="$mpich" \
-            "${over_mpich[@]}" --test mpi_conformance --test transports --test loss
+            "${optimized[@]}" --test mpi_conformance --test transports --test loss
     else
         leave_out 'MPICH: no mpicc.mpich (libmpich-dev, mpich)'
     fi

@@ -1,10 +1,10 @@
 //! What a world is made of: names, bodies, shapes, materials, contacts, and every number that a step depends on.
 
+mod abutting;
 pub(crate) mod body;
 pub(crate) mod contact;
 pub(crate) mod convex;
 pub(crate) mod error;
-mod flush;
 pub(crate) mod id;
 pub(crate) mod kind;
 pub(crate) mod math;

@@ -1,7 +1,7 @@
 //! The convex pieces that contacts of all shapes but circles and boxes are found by.
 
+use crate::model::abutting::join_abutting;
 use crate::model::convex::Convex;
-use crate::model::flush::join_flush;
 use crate::model::math::dot;
 use crate::model::shape::{Polygon, Segment, Shape};
 use glam::Vec2;
@@ -114,7 +114,7 @@ pub(crate) fn pieces(shape: &Shape) -> Arc<[Piece]> {
                 own
             });
             let mut all = placed.collect();
-            join_flush(&mut all);
+            join_abutting(&mut all);
             all.into()
         }
     }

@@ -332,7 +332,7 @@ impl SolverBodies {
             self.start[i][k] = velocity - impulse;
         }
         self.pose[i] = refresh.pose;
-        let ghost = self.ghosts.binary_search_by_key(&place, |ghost| ghost.place).expect("only ghosts are refreshed");
+        let ghost = self.ghost_at(place).expect("only ghosts are refreshed");
         self.ghosts[ghost].given = self.given(place, &refresh.unseen, self.ghosts[ghost].gain);
     }
 
@@ -388,11 +388,13 @@ impl SolverBodies {
 
     /// How much faster the static of a contact gets from each substep to the next, in m/s.
     pub(crate) fn static_gain_in(&self, contact: u32) -> Vec2 {
-        let ghost = self.carrier_in(contact).and_then(|place| {
-            let found = self.ghosts.binary_search_by_key(&place, |ghost| ghost.place);
-            found.ok().map(|found| &self.ghosts[found])
-        });
-        ghost.map_or(Vec2::ZERO, |Ghost { gain: [x, y, _], .. }| Vec2::new(*x, *y) / CARRIER)
+        let Some(ghost) = self.carrier_in(contact).and_then(|place| self.ghost_at(place)) else { return Vec2::ZERO };
+        let [x, y, _] = self.ghosts[ghost].gain;
+        Vec2::new(x, y) / CARRIER
+    }
+
+    fn ghost_at(&self, place: SolverIndex) -> Option<usize> {
+        self.ghosts.binary_search_by_key(&place, |ghost| ghost.place).ok()
     }
 
     fn carrier_in(&self, contact: u32) -> Option<SolverIndex> {

@@ -372,6 +372,7 @@ struct Outputs {
 impl Outputs {
     /// Where an error says that a run is complete, what that has left goes where this one's was to go. What is left to say then.
     fn of_complete(&self, args: &RunArgs, error: RunError) -> RunError {
+        // Only the rank that speaks has a folder to write to.
         let (RunError::Complete { summary, .. }, Some(folder), Some(_)) = (&error, folder(args), &self.folder) else {
             return error;
         };

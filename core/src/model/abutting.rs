@@ -9,7 +9,7 @@ use glam::Vec2;
 const SAME: f64 = 1e-5;
 
 /// Joins two of the pieces as long as there are such.
-pub(super) fn join_flush(pieces: &mut Vec<Piece>) {
+pub(super) fn join_abutting(pieces: &mut Vec<Piece>) {
     let mut joined = true;
     while joined {
         joined = false;
@@ -36,14 +36,15 @@ fn together(one: &Piece, other: &Piece) -> Option<Piece> {
     if !(is_sharp(one) && is_sharp(other)) {
         return None;
     }
-    let [one, other] = [one, other].map(|piece| piece.outline.corners().collect::<Vec<Vec2>>());
-    let reach = one.iter().chain(&other).map(|corner| corner.abs().max_element()).fold(0.0, f32::max);
-    let near = SAME * f64::from(reach);
+    let near = SAME * f64::from(one.half_extents().max(other.half_extents()).max_element());
     let are_one = |a: Vec2, b: Vec2| a.as_dvec2().distance(b.as_dvec2()) <= near;
-    let faces = (0..one.len()).flat_map(|i| (0..other.len()).map(move |j| (i, j)));
-    let (i, j) = faces
-        .into_iter()
-        .find(|&(i, j)| are_one(one[i], other[(j + 1) % other.len()]) && are_one(one[(i + 1) % one.len()], other[j]))?;
+    let are_one_face = |&(i, j): &(usize, usize)| {
+        let ([from, to], [other_from, other_to]) = (one.outline.edge(i), other.outline.edge(j));
+        are_one(from, other_to) && are_one(to, other_from)
+    };
+    let mut faces = (0..one.outline.count()).flat_map(|i| (0..other.outline.count()).map(move |j| (i, j)));
+    let (i, j) = faces.find(are_one_face)?;
+    let [one, other] = [one, other].map(|piece| piece.outline.corners().collect::<Vec<Vec2>>());
     // Around the first from behind the face that they have in common to its beginning, and around the other, but for that face.
     let around = (1..=one.len()).map(|k| one[(i + k) % one.len()]);
     let around: Vec<Vec2> = around.chain((2..other.len()).map(|k| other[(j + k) % other.len()])).collect();
