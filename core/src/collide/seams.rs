@@ -1,16 +1,16 @@
-//! Statics side by side are one surface. Contacts are made where bodies come on their free way, each as if it were alone; but where one
-//! stops a body, that does not go on into the side of the next, behind the surface that it came to.
+//! Statics side by side are one surface, and so are the pieces of a body. Contacts are made where bodies come on their free way, each as if
+//! it were alone; but where one stops a body, that does not go on into the side of the next, behind the surface that it came to.
 //!
-//! So what of several statics is touched behind the plane of the first one is looked for again, on the way that this one leaves. Sources for
-//! what goes wrong where each is seen alone: G. van den Bergen, "Collision Detection in Interactive 3D Environments", 2003; E. Catto,
-//! "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
+//! So what of several statics or pieces is touched behind the plane of the first one is looked for again, on the way that this one leaves.
+//! Sources for what goes wrong where each is seen alone: G. van den Bergen, "Collision Detection in Interactive 3D Environments", 2003;
+//! E. Catto, "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::Stopped;
 use crate::model::contact::{Contact, PairKey, SlotKind};
 use crate::model::kind::Form;
-use crate::model::math::{dot, min};
+use crate::model::math::{Rot, dot, min};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
@@ -35,9 +35,15 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
             continue;
         }
         faces.clear();
-        faces.extend(run.clone().map(|i| Face::new(tile, (&tile.contacts.contacts[i], contacts.bodies[i]), setup)));
-        if faces.iter().any(|one| faces.iter().any(|two| two.is_behind(one))) {
-            mend_of_one(tile, contacts, (run, &faces), setup, &mut gone);
+        for &side in sides(tile, &run) {
+            let contact = |number| (&tile.contacts.contacts[number], contacts.bodies[number]);
+            faces.extend(run.clone().map(|number| Face::new(tile, contact(number), side, setup)));
+        }
+        let is_behind = |first: usize, other: usize| {
+            faces.chunks(run.len()).any(|faces| faces[other - run.start].is_behind(&faces[first - run.start]))
+        };
+        if run.clone().any(|first| run.clone().any(|other| is_behind(first, other))) {
+            mend_of_one(tile, contacts, &run, is_behind, setup, &mut gone);
         }
     }
     if !gone.is_empty() {
@@ -45,51 +51,90 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     }
 }
 
-/// The next contacts, from one on, that a body has with several statics, or pieces of them: these are its last.
+/// The next contacts, from one on, that a body has with several statics, or pieces of them, or two that move have with each other: the
+/// former are a body's last.
 fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
     let keys = &tile.contacts.keys[from..];
     let is_static = |key: &PairKey| matches!(key.high().kind(), SlotKind::Static(_));
-    let first = keys.windows(2).position(|two| two[0].low() == two[1].low() && is_static(&two[0]))?;
-    let count = keys[first..].iter().take_while(|key| key.low() == keys[first].low()).count();
+    let are_of_one = |one: &PairKey, two: &PairKey| one.low() == two.low() && (one == two || is_static(one));
+    let first = keys.windows(2).position(|two| are_of_one(&two[0], &two[1]))?;
+    let count = keys[first..].iter().take_while(|key| are_of_one(&keys[first], key)).count();
     Some(from + first..from + first + count)
 }
 
-/// Where a body touches a static.
+/// Whose surface it is that is touched.
+#[derive(Clone, Copy)]
+enum Side {
+    /// The one of the two that never moves but by its path.
+    Static,
+    A,
+    B,
+}
+
+/// On whose surfaces a run of contacts is looked at.
+fn sides(tile: &Tile, run: &Range<usize>) -> &'static [Side] {
+    match tile.contacts.keys[run.start].high().kind() {
+        SlotKind::Static(_) => &[Side::Static],
+        _ => &[Side::A, Side::B],
+    }
+}
+
+/// Where a body is touched.
 struct Face {
     of: DVec2,
-    /// Out of the static.
+    /// Which of its pieces is, if it moves.
+    piece: Option<usize>,
+    /// Out of it; in the frame of the body if it moves.
     normal: Vec2,
     /// On its surface, from its center.
     points: [Vec2; 2],
     count: usize,
     /// What stands out of a plane by less than this is not before it.
     level: f32,
-    /// Whether it pressed already, at a body that does not roll.
+    /// Whether what touches it pressed already, and does not roll.
     is_stood_on: bool,
 }
 
 impl Face {
-    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair), setup: &Setup) -> Self {
-        let is_first = a as usize >= tile.owned + tile.ghosts();
-        let (body, of, way, center) = if is_first { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
+    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair), side: Side, setup: &Setup) -> Self {
+        let is_of_a = match side {
+            Side::Static => a as usize >= tile.owned + tile.ghosts(),
+            Side::A => true,
+            Side::B => false,
+        };
+        let (body, of, way, center) = if is_of_a { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
         let normal = contact.normal * way;
         let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
         let kind = setup.kind(tile.bodies.kind[body as usize]);
         let presses = contact.points().iter().any(|point| point.normal_impulse > 0.0);
-        Self {
+        let face = Self {
             of: tile.bodies.position[of as usize],
+            piece: None,
             normal,
             points,
             count: contact.point_count(),
             level: min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius),
             is_stood_on: presses && kind.form != Form::Round,
+        };
+        let [piece_a, piece_b] = contact.piece_numbers();
+        match side {
+            Side::Static => face,
+            Side::A => face.on_piece(piece_a, contact.rotation_a),
+            Side::B => face.on_piece(piece_b, contact.rotation_b),
         }
+    }
+
+    /// In the frame of a body that has turned so.
+    fn on_piece(self, piece: usize, rotation: Rot) -> Self {
+        let points = self.points.map(|point| rotation.unrotate(point));
+        Self { piece: Some(piece), normal: rotation.unrotate(self.normal), points, ..self }
     }
 
     /// Whether it is of another direction than a first one, and not before the plane of that. Round bodies roll from one to the other;
     /// what else pressed already stands on both.
     fn is_behind(&self, first: &Self) -> bool {
-        if dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
+        let is_one_piece = self.piece.is_some() && self.piece == first.piece;
+        if is_one_piece || dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
             return false;
         }
         let between = (self.of - first.of).as_vec2() - first.points[0];
@@ -97,11 +142,12 @@ impl Face {
     }
 }
 
-/// Looks again for those contacts of a body that are behind others, each on the way that the first of these leaves.
+/// Looks again for those contacts of a run that are behind others, each on the way that the first of these leaves.
 fn mend_of_one(
     tile: &mut Tile,
     contacts: &mut Contacts,
-    (run, faces): (Range<usize>, &[Face]),
+    run: &Range<usize>,
+    is_behind: impl Fn(usize, usize) -> bool,
     setup: &Setup,
     gone: &mut Vec<usize>,
 ) {
@@ -109,7 +155,6 @@ fn mend_of_one(
     let all = run.clone().map(|number| Stopped::new(tile, contact(number), setup));
     let Some(all) = all.collect::<Option<Vec<_>>>() else { return };
     let stopped = |number: usize| &all[number - run.start];
-    let is_behind = |first: usize, other: usize| faces[other - run.start].is_behind(&faces[first - run.start]);
     let again = run.clone().filter_map(|other| {
         let before = |&first: &usize| stopped(first).order() < stopped(other).order() && is_behind(first, other);
         let sooner = |one, two| if stopped(two).order() < stopped(one).order() { two } else { one };

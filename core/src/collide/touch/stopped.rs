@@ -1,10 +1,9 @@
-//! A body that something stops on its way, and what it touches then.
+//! Two bodies that stop each other on their way, and what one of them touches then.
 
-use super::{Approach, Moment, NEAR, TOUCHING};
+use super::{Approach, Moment, NEAR, Side, TOUCHING};
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::ManifoldPoint;
 use crate::model::contact::Contact;
-use crate::model::math::{cross, dot, max, min};
+use crate::model::math::{cross, dot, max, min, turn};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -12,40 +11,43 @@ use glam::Vec2;
 /// A search for a touch is begun so often, at most.
 const SEARCHES: usize = 8;
 
-/// How a body goes on from the moment in which it touches a static: along that, as if both were smooth and nothing bounced.
+/// How two bodies go on from the moment in which they touch: along each other, as if both were smooth and nothing bounced.
 pub(in crate::collide) struct Stopped {
     /// That moment, from now, in s, as near as it was looked for; now, if they do not touch within the step.
     time: f32,
     /// The same exactly, and how far they are apart, in m, if they touch already or do not at all.
     order: [f32; 2],
-    /// What holds the body off the surface from then on, in m.
+    /// What holds the two off each other from then on, in m: the body that moves off the static, or B off A.
     lift: Vec2,
-    /// From then on.
-    velocity: Vec2,
-    angular_velocity: f32,
-    /// The contact that stops it, and the separation of its points now.
+    /// From then on, of A and of B; where one of them is a static, whichever moves goes on so.
+    ways: [Way; 2],
+    /// The contact that stops them, and the separation of its points now.
     by: Option<(Contact, [f32; 2])>,
 }
 
+/// How a body moves on.
+#[derive(Clone, Copy)]
+struct Way {
+    velocity: Vec2,
+    angular_velocity: f32,
+}
+
 impl Stopped {
-    /// The body of a pair that has such a contact, and of which the other is a static. None where nothing is known of them.
+    /// The bodies of a pair that has such a contact. None where nothing is known of them.
     pub(in crate::collide) fn new(tile: &Tile, (bodies, contact): (Pair, &Contact), setup: &Setup) -> Option<Self> {
         let (pair, dt) = (Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup), setup.params.dt);
         // Speeds that overflow tell of no other moment.
         if !pair.far(dt).is_finite() {
             return None;
         }
-        let body = if pair.a.moves() { &pair.a } else { &pair.b };
-        let (mut velocity, mut angular_velocity) = (body.velocity, body.angular_velocity);
-        let (at, order, separation, by);
+        let (at, ways, order, separation, by);
         if let Some(then) = pair.meets(dt, setup) {
-            let [speed, turn, closing] = pair.stop(&then)?;
+            let closing;
+            (ways, closing) = pair.stop(&then)?;
             separation = then.manifold.nearest()?.separation;
             let is_now = then.time == 0.0;
             let left = if is_now || closing == 0.0 { 0.0 } else { separation / closing };
             order = [then.time + left, if is_now { separation } else { 0.0 }];
-            velocity += pair.out(&then) * speed;
-            angular_velocity += turn;
             by = pair.contact(&then, Some(contact), setup);
             at = then;
         } else {
@@ -53,25 +55,26 @@ impl Stopped {
             let [now, then] =
                 [at, pair.at(dt, f32::INFINITY)].map(|at| at.manifold.nearest().map(|point| point.separation));
             separation = min(now?, then?);
+            ways = pair.ways();
             order = [f32::INFINITY, separation];
             by = None;
         }
-        let lift = pair.out(&at) * max(2.0 * NEAR - separation, 0.0);
-        Some(Self { time: at.time, order, lift, velocity, angular_velocity, by })
+        let lift = pair.out(at.manifold.normal) * max(2.0 * NEAR - separation, 0.0);
+        Some(Self { time: at.time, order, lift, ways, by })
     }
 
-    /// Ascending from who stops it first.
+    /// Ascending from who stop each other first.
     pub(in crate::collide) fn order(&self) -> [f32; 2] {
         self.order
     }
 
-    /// The contact that stops it, and the separation of its points now, if they touch within the step.
+    /// The contact that stops them, and the separation of its points now, if they touch within the step.
     pub(in crate::collide) fn by(&self) -> Option<(Contact, [f32; 2])> {
         self.by
     }
 
-    /// The contact, and the separation of its points now, that the body makes with another static on its way from there, if it touches that
-    /// within the step. The one given is that of its free way.
+    /// The contact, and the separation of its points now, that comes of their ways from there, if there is one within the step: of other
+    /// pieces of the two, or of the body and another static. The one given is that of their free ways.
     pub(in crate::collide) fn touch(
         &self,
         tile: &Tile,
@@ -84,9 +87,10 @@ impl Stopped {
         for (side, turned) in [&mut pair.a, &mut pair.b].into_iter().zip(turned) {
             side.rotation = turned.after(side.rotation);
         }
-        let (body, lift) = if pair.a.moves() { (&mut pair.a, -self.lift) } else { (&mut pair.b, self.lift) };
-        (body.velocity, body.angular_velocity) = (self.velocity, self.angular_velocity);
-        pair.offset += lift;
+        for (side, way) in [&mut pair.a, &mut pair.b].into_iter().zip(self.ways).filter(|(side, _)| side.moves()) {
+            (side.velocity, side.angular_velocity) = (way.velocity, way.angular_velocity);
+        }
+        pair.offset += pair.out(self.lift);
         pair.between = pair.b.velocity - pair.a.velocity;
         let at = pair.meets(max(setup.params.dt - self.time, 0.0), setup)?;
         let (found, mut separation) = pair.contact(&at, Some(contact), setup)?;
@@ -123,33 +127,57 @@ impl Approach<'_> {
         }
         None
     }
-    /// Away from the static, of which the other is.
-    fn out(&self, at: &Moment) -> Vec2 {
-        if self.a.moves() { -at.manifold.normal } else { at.manifold.normal }
+
+    /// What points from A to B as seen from the body that moves: from the static to that. Of two that move, as it is; and so back again.
+    fn out(&self, normal: Vec2) -> Vec2 {
+        if self.b.moves() { normal } else { -normal }
     }
 
-    /// What stops the body where it touches the static: how much speed it gets out of that, and how much spin; and how fast the two came
-    /// nearer.
-    fn stop(&self, at: &Moment) -> Option<[f32; 3]> {
-        let (points, out) = (at.manifold.points(), self.out(at));
-        let (body, center) = if self.a.moves() { (&self.a, Vec2::ZERO) } else { (&self.b, at.offset) };
-        let [inv_mass, inv_inertia] = [body.kind.root_inv_mass, body.kind.root_inv_inertia].map(|root| root * root);
-        let of_point =
-            |point: &ManifoldPoint| [max(self.closing(at, point.anchor), 0.0), cross(point.anchor - center, out)];
-        let nearest = at.manifold.nearest()?;
-        let [closing, arm] = of_point(nearest);
-        if let [one, two] = points
-            && max(one.separation, two.separation) < TOUCHING
-            && inv_inertia > 0.0
-        {
-            // It comes down flat.
-            let ([one, arm_of_one], [two, arm_of_two]) = (of_point(one), of_point(two));
-            let turn = (two - one) / (arm_of_two - arm_of_one);
-            if turn.is_finite() {
-                return Some([one - turn * arm_of_one, turn, closing]);
-            }
+    /// How they go on if nothing stops them.
+    fn ways(&self) -> [Way; 2] {
+        let way = |side: &Side<'_>| Way { velocity: side.velocity, angular_velocity: side.angular_velocity };
+        match [self.a.moves(), self.b.moves()] {
+            [true, false] => [way(&self.a); 2],
+            [false, _] => [way(&self.b); 2],
+            _ => [&self.a, &self.b].map(way),
         }
-        let impulse = closing / (inv_mass + inv_inertia * arm * arm);
-        Some([inv_mass * impulse, inv_inertia * arm * impulse, closing])
+    }
+
+    /// How they go on from where they touch, as if both were smooth, and how fast they came nearer.
+    fn stop(&self, at: &Moment) -> Option<([Way; 2], f32)> {
+        let nearest = at.manifold.nearest()?.anchor;
+        let closing = |anchor: Vec2| max(self.closing(at, anchor), 0.0);
+        if self.a.moves() && self.b.moves() {
+            // As either sees the other glide over its surface, which turns no more: what else the two do is for the next step.
+            let [on_a, on_b] = [nearest, nearest - at.offset];
+            let turning = turn(self.b.angular_velocity, on_b) - turn(self.a.angular_velocity, on_a);
+            let glide = self.between + turning + at.manifold.normal * closing(nearest);
+            let ways = [Vec2::ZERO, glide].map(|velocity| Way { velocity, angular_velocity: 0.0 });
+            return Some((ways, closing(nearest)));
+        }
+        let (points, out) = (at.manifold.points(), self.out(at.manifold.normal));
+        let (body, center) = if self.a.moves() { (&self.a, Vec2::ZERO) } else { (&self.b, at.offset) };
+        let on = |[speed, turn]: [f32; 2]| Way {
+            velocity: body.velocity + out * speed,
+            angular_velocity: body.angular_velocity + turn,
+        };
+        let [inv_mass, inv_inertia] = [body.kind.root_inv_mass, body.kind.root_inv_inertia].map(|root| root * root);
+        let arm = |anchor: Vec2| cross(anchor - center, out);
+        let flat = match points {
+            [one, two] if max(one.separation, two.separation) < TOUCHING && inv_inertia > 0.0 => {
+                // It comes down flat.
+                let [one, two] = [one.anchor, two.anchor];
+                let turn = (closing(two) - closing(one)) / (arm(two) - arm(one));
+                turn.is_finite().then(|| [closing(one) - turn * arm(one), turn])
+            }
+            _ => None,
+        };
+        let changes = flat.unwrap_or_else(|| {
+            let (closing, arm) = (closing(nearest), arm(nearest));
+            let impulse = closing / (inv_mass + inv_inertia * arm * arm);
+            [inv_mass * impulse, inv_inertia * arm * impulse]
+        });
+        let way = on(changes);
+        Some(([way, way], closing(nearest)))
     }
 }
