@@ -70,11 +70,10 @@ fn a_floor_of_boxes_is_as_smooth_as_one_box() {
     }
 }
 
-/// Defect: what struck an L of two boxes beside the seam on its back was thrown back by the side of the further box. However the same L is
-/// cut, it is one body.
+/// Defect: what struck an L of two boxes beside the seam on its back was thrown back by the side of the further box, and what slid there lost
+/// half of its speed. However the same L is cut, it is one body.
 #[test]
 fn an_l_is_one_body_however_it_is_cut() {
-    let material = Material { friction: 0.0, restitution: 1.0, ..Material::default() };
     let part = |[x, y, width, height]: [f32; 4]| Part {
         shape: Shape::rectangle(width, height),
         position: Vec2::new(x, y),
@@ -82,20 +81,19 @@ fn an_l_is_one_body_however_it_is_cut() {
     };
     let across = [[0.0, -0.5, 2.0, 1.0], [-0.5, 1.0, 1.0, 2.0]].map(part);
     let along = [[-0.5, 0.5, 1.0, 3.0], [0.5, -0.5, 1.0, 1.0]].map(part);
-    let end = |parts: &[Part], shape: &Shape, [speed, angle, before]: [f32; 3], (spin, swapped): (f32, bool)| {
+    let end = |parts: &[Part], shape: &Shape, [speed, angle, before]: [f32; 3], (spin, is_second): (f32, bool)| {
         let mut scene = Scene::new(MIDDLE, 0.0);
-        scene.half = DVec2::splat(12.0);
+        let material = Material { friction: 0.0, restitution: 1.0, ..Material::default() };
         let l = Shape::compound(parts.to_vec()).unwrap();
         let kinds = [l, shape.clone()].map(|shape| scene.kind(shape, material));
-        // The seam is where the two meet. From above and from below.
-        let direction = Rot::from_angle(angle).rotate(Vec2::X);
-        let at = Vec2::new(-1.0 - 0.25, -before * angle.signum()) - direction * (0.02 * speed);
-        let bodies = [(Vec2::new(-0.25, 0.25), Vec2::ZERO), (at, direction * speed)];
+        let velocity = Rot::from_angle(angle).rotate(Vec2::X) * speed;
+        let at = Vec2::new(-1.25, -before * angle.signum()) - velocity * 0.02;
+        let bodies = [(Vec2::new(-0.25, 0.25), Vec2::ZERO, spin), (at, velocity, 0.0)];
         let mut ids = [GlobalId(0); 2];
-        for k in if swapped { [1, 0] } else { [0, 1] } {
-            let (place, velocity) = bodies[k];
+        for k in if is_second { [1, 0] } else { [0, 1] } {
+            let (place, velocity, spin) = bodies[k];
             ids[k] = scene.body(kinds[k], MIDDLE + place.as_dvec2(), velocity);
-            scene.last().angular_velocity = if k == 0 { spin } else { 0.0 };
+            scene.last().angular_velocity = spin;
         }
         let mut sim = scene.start_on((1, 1), Exchange::Step);
         sim.run((60.0 * 0.5 / speed) as u32 + 3);
@@ -103,15 +101,17 @@ fn an_l_is_one_body_however_it_is_cut() {
     };
     // Boxes come down flat: of which corner bounces first, seams decide as much as backs do.
     for (shape, spins) in [(Shape::circle(0.25), [-2.0, 0.0, 2.0]), (Shape::rectangle(0.5, 0.5), [0.0; 3])] {
-        for speed in [3.0, 10.0, 40.0] {
+        for speed in [0.3, 3.0, 10.0, 40.0] {
             for angle in [-1.0, -0.5, -0.2, 0.2, 0.5, 1.0] {
                 for k in 0..10 {
                     let before = 0.05 * k as f32 + 0.003;
                     let how = ([speed, angle, before], (spins[k % 3], k % 2 == 0));
                     let [cut, whole] = [&across, &along].map(|parts| end(parts, &shape, how.0, how.1));
-                    let off = (0..2).map(|k| (cut[k].0 - whole[k].0).length() / speed).fold(0.0, f32::max);
+                    // Slow ones stay for so long that a little of spin counts: of these, how fast they glide along the back.
+                    let counts = Vec2::new(if speed > 1.0 { 1.0 } else { 0.0 }, 1.0);
+                    let off = (0..2).map(|k| ((cut[k].0 - whole[k].0) * counts).length()).fold(0.0, f32::max);
                     assert!(
-                        off < 0.02,
+                        off < 0.02 * speed.max(spins[k % 3].abs()),
                         "{shape:?} at {speed} m/s and {angle}, {before} m before a seam: {cut:?}, not {whole:?}"
                     );
                 }

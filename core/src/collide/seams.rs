@@ -7,10 +7,12 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
-use crate::collide::touch::Stopped;
+use crate::collide::touch::{self, Stopped};
+use crate::collide::wide_pairs::TOUCHING;
 use crate::model::contact::{Contact, PairKey, SlotKind};
-use crate::model::kind::Form;
-use crate::model::math::{Rot, dot, min};
+use crate::model::kind::{Form, KindRow};
+use crate::model::math::{dot, min};
+use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::{DVec2, Vec2};
@@ -29,21 +31,25 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let mut first = 0;
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
-        let normal = |number: usize| tile.contacts.contacts[number].normal;
-        // A long body may lie on many.
-        if run.clone().all(|number| normal(number) == normal(run.start)) {
+        let kinds = contacts.bodies[run.start].map(|body| setup.kind(tile.bodies.kind[body as usize]));
+        let sides = sides(tile, &run, kinds);
+        let may_glide = sides == [Side::Static] || touch::far(tile, contacts.bodies[run.start], setup) >= TOUCHING;
+        if !may_glide || !may_be_behind(&tile.contacts.contacts[run.clone()], kinds) {
             continue;
         }
         faces.clear();
-        for &side in sides(tile, &run) {
-            let contact = |number| (&tile.contacts.contacts[number], contacts.bodies[number]);
+        for &side in sides {
+            let contact =
+                |number| (&tile.contacts.contacts[number], contacts.separation[number], contacts.bodies[number]);
             faces.extend(run.clone().map(|number| Face::new(tile, contact(number), side, setup)));
         }
         let is_behind = |first: usize, other: usize| {
             faces.chunks(run.len()).any(|faces| faces[other - run.start].is_behind(&faces[first - run.start]))
         };
-        if run.clone().any(|first| run.clone().any(|other| is_behind(first, other))) {
-            mend_of_one(tile, contacts, &run, is_behind, setup, &mut gone);
+        let pairs = run.clone().flat_map(|other| run.clone().map(move |first| (first, other)));
+        let behind: Vec<(usize, usize)> = pairs.filter(|&(first, other)| is_behind(first, other)).collect();
+        if !behind.is_empty() {
+            mend_of_one(tile, contacts, &behind, setup, &mut gone);
         }
     }
     if !gone.is_empty() {
@@ -63,27 +69,43 @@ fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
 }
 
 /// Whose surface it is that is touched.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Side {
-    /// The one of the two that never moves but by its path.
+    /// That of the one which never moves but by its path.
     Static,
     A,
     B,
 }
 
-/// On whose surfaces a run of contacts is looked at.
-fn sides(tile: &Tile, run: &Range<usize>) -> &'static [Side] {
-    match tile.contacts.keys[run.start].high().kind() {
-        SlotKind::Static(_) => &[Side::Static],
-        _ => &[Side::A, Side::B],
+/// On whose surfaces a run of contacts is looked at, from the kinds of the first two.
+fn sides(tile: &Tile, run: &Range<usize>, kinds: [&KindRow; 2]) -> &'static [Side] {
+    let is_static = matches!(tile.contacts.keys[run.start].high().kind(), SlotKind::Static(_));
+    match (is_static, kinds.map(KindRow::is_compound)) {
+        (true, _) => &[Side::Static],
+        (_, [true, true]) => &[Side::A, Side::B],
+        (_, [true, false]) => &[Side::A],
+        (_, [false, true]) => &[Side::B],
+        (_, [false, false]) => &[],
     }
 }
 
+/// Whether one of the contacts of a run may be behind another, seen from the kinds of the first two: of several directions, and not all
+/// stood on. A long body may lie on many.
+fn may_be_behind(run: &[Contact], kinds: [&KindRow; 2]) -> bool {
+    let rolls = kinds.iter().any(|kind| kind.form == Form::Round);
+    run.iter().any(|contact| contact.normal != run[0].normal) && (rolls || !run.iter().all(presses))
+}
+
+/// Whether it pressed in the last step.
+fn presses(contact: &Contact) -> bool {
+    contact.points().iter().any(|point| point.normal_impulse > 0.0)
+}
+
 /// Where a body is touched.
-struct Face {
+struct Face<'a> {
     of: DVec2,
     /// Which of its pieces is, if it moves.
-    piece: Option<usize>,
+    piece: Option<&'a Piece>,
     /// Out of it; in the frame of the body if it moves.
     normal: Vec2,
     /// On its surface, from its center.
@@ -95,8 +117,9 @@ struct Face {
     is_stood_on: bool,
 }
 
-impl Face {
-    fn new(tile: &Tile, (contact, [a, b]): (&Contact, Pair), side: Side, setup: &Setup) -> Self {
+impl<'a> Face<'a> {
+    /// Of a contact, the separation of its points now, and its bodies.
+    fn new(tile: &Tile, (contact, now, [a, b]): (&Contact, [f32; 2], Pair), side: Side, setup: &'a Setup) -> Self {
         let is_of_a = match side {
             Side::Static => a as usize >= tile.owned + tile.ghosts(),
             Side::A => true,
@@ -106,7 +129,6 @@ impl Face {
         let normal = contact.normal * way;
         let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
         let kind = setup.kind(tile.bodies.kind[body as usize]);
-        let presses = contact.points().iter().any(|point| point.normal_impulse > 0.0);
         let face = Self {
             of: tile.bodies.position[of as usize],
             piece: None,
@@ -114,51 +136,61 @@ impl Face {
             points,
             count: contact.point_count(),
             level: min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius),
-            is_stood_on: presses && kind.form != Form::Round,
+            is_stood_on: presses(contact) && kind.form != Form::Round,
         };
-        let [piece_a, piece_b] = contact.piece_numbers();
-        match side {
-            Side::Static => face,
-            Side::A => face.on_piece(piece_a, contact.rotation_a),
-            Side::B => face.on_piece(piece_b, contact.rotation_b),
-        }
+        let (piece, rotation) = match side {
+            Side::Static => return face,
+            Side::A => (contact.piece_numbers()[0], contact.rotation_a),
+            Side::B => (contact.piece_numbers()[1], contact.rotation_b),
+        };
+        let piece = &setup.kind(tile.bodies.kind[of as usize]).pieces[piece];
+        let points = points.map(|point| rotation.unrotate(point));
+        // In a crowd who overlaps is not let go.
+        let overlaps = now[..face.count].iter().any(|&separation| separation < -TOUCHING);
+        let is_stood_on = face.is_stood_on || overlaps;
+        Self { piece: Some(piece), normal: rotation.unrotate(normal), points, is_stood_on, ..face }
     }
 
-    /// In the frame of a body that has turned so.
-    fn on_piece(self, piece: usize, rotation: Rot) -> Self {
-        let points = self.points.map(|point| rotation.unrotate(point));
-        Self { piece: Some(piece), normal: rotation.unrotate(self.normal), points, ..self }
-    }
-
-    /// Whether it is of another direction than a first one, and not before the plane of that. Round bodies roll from one to the other;
-    /// what else pressed already stands on both.
+    /// Whether it is of another direction than a first one, and not before the plane of that; and if they are of two pieces of a body, where
+    /// these meet. Round bodies roll from one to the other; what else pressed already stands on both.
     fn is_behind(&self, first: &Self) -> bool {
-        let is_one_piece = self.piece.is_some() && self.piece == first.piece;
-        if is_one_piece || dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
+        if dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
             return false;
         }
         let between = (self.of - first.of).as_vec2() - first.points[0];
-        self.points[..self.count].iter().all(|&point| dot(point + between, first.normal) < self.level)
+        let points = &self.points[..self.count];
+        points.iter().all(|&point| dot(point + between, first.normal) < self.level) && self.is_at_seam(first)
+    }
+
+    /// Whether they are of two pieces of a body that meet there, or of statics.
+    fn is_at_seam(&self, first: &Self) -> bool {
+        let (Some(piece), Some(first)) = (self.piece, first.piece) else { return true };
+        let is_there = |&point: &Vec2| first.outline.nearest(point).1 < first.radius + self.level;
+        !std::ptr::eq(piece, first) && self.points[..self.count].iter().all(is_there)
     }
 }
 
-/// Looks again for those contacts of a run that are behind others, each on the way that the first of these leaves.
+/// Looks again for those contacts of a run that are behind others, each on the way that the first of these leaves. Given are, one after
+/// another, those that are, each with all that it is behind: first these, then that one.
 fn mend_of_one(
     tile: &mut Tile,
     contacts: &mut Contacts,
-    run: &Range<usize>,
-    is_behind: impl Fn(usize, usize) -> bool,
+    behind: &[(usize, usize)],
     setup: &Setup,
     gone: &mut Vec<usize>,
 ) {
     let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
-    let all = run.clone().map(|number| Stopped::new(tile, contact(number), setup));
+    let mut numbers: Vec<usize> = behind.iter().flat_map(|&(first, other)| [first, other]).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let all = numbers.iter().map(|&number| Stopped::new(tile, contact(number), setup));
     let Some(all) = all.collect::<Option<Vec<_>>>() else { return };
-    let stopped = |number: usize| &all[number - run.start];
-    let again = run.clone().filter_map(|other| {
-        let before = |&first: &usize| stopped(first).order() < stopped(other).order() && is_behind(first, other);
-        let sooner = |one, two| if stopped(two).order() < stopped(one).order() { two } else { one };
-        let first = run.clone().filter(before).reduce(sooner)?;
+    let stopped = |number: usize| &all[numbers.partition_point(|&other| other < number)];
+    let again = behind.chunk_by(|one, two| one.1 == two.1).filter_map(|of_one| {
+        let other = of_one[0].1;
+        let before =
+            of_one.iter().map(|&(first, _)| first).filter(|&first| stopped(first).order() < stopped(other).order());
+        let first = before.reduce(|one, two| if stopped(two).order() < stopped(one).order() { two } else { one })?;
         Some((first, other, stopped(first).touch(tile, contact(other), setup)))
     });
     let again: Vec<_> = again.collect();

@@ -138,6 +138,11 @@ struct Moment {
     turning_b: Rot,
 }
 
+/// How far surfaces of two bodies can move against each other within the step, in m.
+pub(super) fn far(tile: &Tile, pair: Pair, setup: &Setup) -> f32 {
+    Approach::new(tile, pair, setup).far(setup.params.dt)
+}
+
 /// Whether surfaces move by less than the speculative distance within the step.
 #[inline(always)]
 pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {

@@ -146,38 +146,46 @@ impl Approach<'_> {
     /// How they go on from where they touch, as if both were smooth, and how fast they came nearer.
     fn stop(&self, at: &Moment) -> Option<([Way; 2], f32)> {
         let nearest = at.manifold.nearest()?.anchor;
-        let closing = |anchor: Vec2| max(self.closing(at, anchor), 0.0);
-        if self.a.moves() && self.b.moves() {
-            // As either sees the other glide over its surface, which turns no more: what else the two do is for the next step.
-            let [on_a, on_b] = [nearest, nearest - at.offset];
-            let turning = turn(self.b.angular_velocity, on_b) - turn(self.a.angular_velocity, on_a);
-            let glide = self.between + turning + at.manifold.normal * closing(nearest);
-            let ways = [Vec2::ZERO, glide].map(|velocity| Way { velocity, angular_velocity: 0.0 });
-            return Some((ways, closing(nearest)));
-        }
-        let (points, out) = (at.manifold.points(), self.out(at.manifold.normal));
+        let closing = max(self.closing(at, nearest), 0.0);
+        let ways = if self.a.moves() && self.b.moves() {
+            self.glide(at, (nearest, closing))
+        } else {
+            [self.stop_at_static(at, (nearest, closing)); 2]
+        };
+        Some((ways, closing))
+    }
+
+    /// How two that move go on from the point in which they touch, closing so fast: each sees the other glide over its surface. That turns no
+    /// more, or it would come into the way; what else they do is for the next step.
+    fn glide(&self, at: &Moment, (anchor, closing): (Vec2, f32)) -> [Way; 2] {
+        let turning = turn(self.b.angular_velocity, anchor - at.offset) - turn(self.a.angular_velocity, anchor);
+        let glide = self.between + turning + at.manifold.normal * closing;
+        [Vec2::ZERO, glide].map(|velocity| Way { velocity, angular_velocity: 0.0 })
+    }
+
+    /// How the one of the two that moves goes on from the point in which it touches the static, closing so fast.
+    fn stop_at_static(&self, at: &Moment, (anchor, closing): (Vec2, f32)) -> Way {
+        let out = self.out(at.manifold.normal);
         let (body, center) = if self.a.moves() { (&self.a, Vec2::ZERO) } else { (&self.b, at.offset) };
-        let on = |[speed, turn]: [f32; 2]| Way {
+        let [inv_mass, inv_inertia] = [body.kind.root_inv_mass, body.kind.root_inv_inertia].map(|root| root * root);
+        let arm = |anchor: Vec2| cross(anchor - center, out);
+        let changed = |speed: f32, turn: f32| Way {
             velocity: body.velocity + out * speed,
             angular_velocity: body.angular_velocity + turn,
         };
-        let [inv_mass, inv_inertia] = [body.kind.root_inv_mass, body.kind.root_inv_inertia].map(|root| root * root);
-        let arm = |anchor: Vec2| cross(anchor - center, out);
-        let flat = match points {
-            [one, two] if max(one.separation, two.separation) < TOUCHING && inv_inertia > 0.0 => {
-                // It comes down flat.
-                let [one, two] = [one.anchor, two.anchor];
-                let turn = (closing(two) - closing(one)) / (arm(two) - arm(one));
-                turn.is_finite().then(|| [closing(one) - turn * arm(one), turn])
+        if let [one, two] = at.manifold.points()
+            && max(one.separation, two.separation) < TOUCHING
+            && inv_inertia > 0.0
+        {
+            // It comes down flat.
+            let [closing_of_one, closing_of_two] = [one, two].map(|point| max(self.closing(at, point.anchor), 0.0));
+            let turn = (closing_of_two - closing_of_one) / (arm(two.anchor) - arm(one.anchor));
+            if turn.is_finite() {
+                return changed(closing_of_one - turn * arm(one.anchor), turn);
             }
-            _ => None,
-        };
-        let changes = flat.unwrap_or_else(|| {
-            let (closing, arm) = (closing(nearest), arm(nearest));
-            let impulse = closing / (inv_mass + inv_inertia * arm * arm);
-            [inv_mass * impulse, inv_inertia * arm * impulse]
-        });
-        let way = on(changes);
-        Some(([way, way], closing(nearest)))
+        }
+        let arm = arm(anchor);
+        let impulse = closing / (inv_mass + inv_inertia * arm * arm);
+        changed(inv_mass * impulse, inv_inertia * arm * impulse)
     }
 }
