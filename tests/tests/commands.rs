@@ -258,7 +258,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
     let crowd = format!("{}\n", json!({"step": 3, "add": crowd}));
     for (text, expected) in [
         ("{\"step\": 3, \"remove\": 40}\n", "line 2: step 3: there is no body 40; mend it, or leave out"),
-        ("{\"step\": 3, \"remove\": [50, 50]}\n", "line 2: step 3: there is no body 50"),
+        ("{\"step\": 3, \"remove\": [50, 50]}\n", "line 2: step 3: 50 is removed already, by the same line"),
         ("{\"step\": 3, \"remove\": 2}\n", "line 2: step 3: 2 is a static, and stays as it is; name a body; mend it"),
         ("{\"step\": 3, \"add\": {\"id\": 41, \"x\": 1, \"y\": 1}}\n", "line 2: step 3: there is a body 41 already"),
         (

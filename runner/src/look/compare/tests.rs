@@ -221,7 +221,7 @@ fn one_run_may_have_recorded_longer_or_more_often() {
     assert!(!comparison.same && !comparison.identical);
     assert_eq!((comparison.only_in_a.len(), comparison.only_in_b.as_slice()), (0, &[35, 40, 45, 50, 55, 60][..]));
     let text = told(&short, &long, &comparison);
-    let expected = "differ: 7 records of 20 bodies, steps 0 to 30\n\
+    let expected = "the same within 1 as far as both recorded: 7 records of 20 bodies, steps 0 to 30\n\
                     only B has 6 records of steps 35 to 60\n\
                     the ends differ: steps is 30 in A and 60 in B\n";
     assert_eq!(text, expected);

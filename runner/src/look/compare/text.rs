@@ -54,15 +54,16 @@ impl Display for Comparison {
 
 impl Comparison {
     fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // What keeps them from being the same is then what was not recorded: steps that were left out, or the ends.
-        let as_far = self.only_in_a.is_empty()
-            && self.only_in_b.is_empty()
-            && self.steps.iter().all(|step| step.is_same(self.tolerance));
+        // What keeps them from being the same is then what was not recorded by both, or by all ranks, or the ends.
+        let as_far = self.steps.iter().all(|step| step.is_same(self.tolerance));
+        let both = self.only_in_a.is_empty() && self.only_in_b.is_empty();
+        let who = if both { "all ranks" } else { "both" };
         let verdict = match (self.identical, self.same, self.tolerance) {
             (true, ..) => "identical".to_owned(),
             (_, true, Some(most)) => format!("the same within {most}"),
-            (_, false, Some(most)) if as_far => format!("the same within {most} as far as all ranks recorded"),
-            (_, false, None) if as_far => "the same as far as all ranks recorded".to_owned(),
+            _ if self.steps.is_empty() && !both => "differ".to_owned(),
+            (_, false, Some(most)) if as_far => format!("the same within {most} as far as {who} recorded"),
+            (_, false, None) if as_far => format!("the same as far as {who} recorded"),
             (_, _, Some(most)) if self.steps.iter().any(|step| step.greatest() > most) => {
                 format!("differ by more than {most}")
             }

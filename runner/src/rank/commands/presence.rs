@@ -100,13 +100,15 @@ fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(
             Ok(Some((id, after))) => before.push((id, present.insert(id, after))),
             Ok(None) => {}
             Err(reason) => {
+                let removed = subject(command).filter(|id| matches!(present.get(id), Some(None)));
+                let removed = removed.filter(|id| before.iter().any(|(other, _)| other == id));
                 for (id, was) in before.into_iter().rev() {
                     match was {
                         Some(was) => present.insert(id, was),
                         None => present.remove(&id),
                     };
                 }
-                return Err(reason);
+                return Err(removed.map_or(reason, |id| format!("{id} is removed already, by the same line")));
             }
         }
     }

@@ -67,8 +67,8 @@ impl<'a> CsvRows<'a> {
         let values = Values {
             id: self.value(Column::Id, self.row, |text| text.parse().ok())?,
             kind: self.value(Column::Kind, 0, |text| self.scenery.kind(text))?,
-            x: self.value(Column::X, 0.0, |text| text.parse().ok())?,
-            y: self.value(Column::Y, 0.0, |text| text.parse().ok())?,
+            x: self.value(Column::X, 0.0, |text| text.parse().ok().filter(|x: &f64| x.is_finite()))?,
+            y: self.value(Column::Y, 0.0, |text| text.parse().ok().filter(|y: &f64| y.is_finite()))?,
             angle: self.float(Column::Angle)?,
             cos: self.float(Column::Cos)?,
             sin: self.float(Column::Sin)?,

@@ -381,7 +381,7 @@ fn rows_that_cannot_be_are_refused_in_one_line() {
         ("1.5,0.1", "one,0.1", "row 1 (line 2), x = one: must be a finite number, in meters"),
         ("1.5,0.1", "NaN,0.1", "row 1 (line 2), x = NaN: must be a finite number, in meters"),
         ("1.5,0.1", "inf,0.1", "x = inf: must be a finite number"),
-        ("1.5,0.1", "1e400,0.1", "x = inf: must be a finite number"),
+        ("1.5,0.1", "1e400,0.1", "x = 1e400: must be a finite number"),
         ("1.5,0.1", "1.5,-2e9", "row 1 (line 2), y = -2000000000: must be within -1e9 to 1e9 m"),
         ("1.5,0.1", "\"1,5\",0.1", "x = 1,5: must be a finite number"),
         ("1.5,0.1", "1.5;0.1", "row 1 (line 2): 7 values where the first line names 8 columns"),
