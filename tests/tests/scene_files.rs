@@ -316,7 +316,7 @@ fn every_fault_is_told_in_a_line_of_its_own() {
         "domain = [...]: the high corner must lie above and right of the low one",
         "[[kinds]] 1, radius = -1",
         "[[statics]] 1, angel = 0.1: unknown key; did you mean angle?",
-        "row 4 (line 5), x = NaN: must be a finite number",
+        "row 4 (line 5), x = nan: must be a finite number",
         "row 6 (line 7): 3 values where the first line names 5 columns",
         "row 10 (line 11), kind = 3: there are kinds 0 to 1",
         "row 9, id = 59: the body of row 8 has this id as well; give each its own, or leave the column id out; there are 1 more",

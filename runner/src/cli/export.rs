@@ -2,6 +2,7 @@
 
 use super::args::ExportArgs;
 use super::console::complain;
+use super::interrupt::stop_on_signals;
 use super::output::{self, Kept};
 use super::progress::{Progress, Show};
 use crate::error::{Exit, RunError};
@@ -22,13 +23,18 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     // On a terminal only: a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;
+    let stop = stop_on_signals(false, || std::process::exit(Exit::Interrupted as i32));
     let exported = vtk::export(&recorded, &args.vtk, shown, |done, of| {
         progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
+        !stop.is_requested()
     });
     if let Some(progress) = progress {
         progress.finish();
     }
-    let vtk::Written { collection, steps, bodies: [fewest, most], bytes } = exported?;
+    let Some(vtk::Written { collection, steps, bodies: [fewest, most], bytes }) = exported? else {
+        complain(&format!("interrupted: {} is not written", args.vtk.display()));
+        return Ok(Exit::Interrupted);
+    };
     let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
     let records = if steps.len() == 1 { "record" } else { "records" };
     let bodies = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };

@@ -8,6 +8,8 @@ use std::thread;
 
 /// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
 const BOUNCY: f32 = 0.9;
+/// Longer steps, in s, are mentioned.
+const LONG_STEP: f32 = 1.0;
 /// Bodies whose masses are further apart are mentioned.
 const MASS_RATIO: f32 = 1e4;
 
@@ -62,6 +64,12 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
     let params = &blueprint.params;
     let kinds = || blueprint.kinds.iter().chain(blueprint.statics.iter().map(|fixed| &fixed.kind));
     let mut notes = Vec::new();
+    if params.dt > LONG_STEP {
+        notes.push(format!(
+            "a step is {} s: physics.hertz counts steps in a second, and who goes far in one may meet all others",
+            params.dt
+        ));
+    }
     let restitution = kinds().map(|kind| kind.material.restitution).fold(0.0, f32::max);
     if restitution > BOUNCY && blueprint.partition.tiles() > 1 && params.exchange == Exchange::Step {
         notes.push(format!(

@@ -53,16 +53,17 @@ pub(crate) struct Written {
 }
 
 /// Writes these records, all of which must be there, to a folder, which must be new or empty. Of records there is never more
-/// than one in memory. `written` is told how many are done, and of how many.
+/// than one in memory. `goes_on` is told how many are done, and of how many, and says whether to go on.
 ///
 /// # Errors
-/// If the folder cannot be had, a record cannot be read, or a file cannot be written. What was written is removed then.
+/// If the folder cannot be had, a record cannot be read, or a file cannot be written. What was written is removed then, and so it is where it
+/// does not go on, and nothing is returned.
 pub(crate) fn export(
     recorded: &Recorded,
     out: &Path,
     shown: Shown,
-    mut written: impl FnMut(usize, usize),
-) -> Result<Written, RunError> {
+    mut goes_on: impl FnMut(usize, usize) -> bool,
+) -> Result<Option<Written>, RunError> {
     let mut target = Target::new(out)?;
     let setting = recorded.setting();
     let steps: Vec<u64> = shown.steps().collect();
@@ -78,11 +79,14 @@ pub(crate) fn export(
             target.write(&name, |file| write_statics(setting, step, file))?;
             fixed = Some(name);
         }
-        written(done, steps.len());
+        if !goes_on(done, steps.len()) {
+            return Ok(None);
+        }
     }
     let text = collection(setting, &steps);
     target.write(COLLECTION, |file| file.write_all(text.as_bytes()))?;
-    Ok(Written { collection: out.join(COLLECTION), steps, bodies: [fewest.min(most), most], bytes: target.finish() })
+    let bodies = [fewest.min(most), most];
+    Ok(Some(Written { collection: out.join(COLLECTION), steps, bodies, bytes: target.finish() }))
 }
 
 /// The name of a step, without an ending.

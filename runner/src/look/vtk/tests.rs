@@ -54,8 +54,11 @@ fn each_rank_and_step_has_a_file_with_what_was_recorded() {
     let (folder, recorded) = recorded();
     let out = folder.path().join("new/out");
     let mut told = Vec::new();
-    let written =
-        export(&recorded, &out, records(&recorded, Some(10)).unwrap(), |done, of| told.push((done, of))).unwrap();
+    let tell = |done, of| {
+        told.push((done, of));
+        true
+    };
+    let written = export(&recorded, &out, records(&recorded, Some(10)).unwrap(), tell).unwrap().unwrap();
     assert_eq!((written.steps.as_slice(), written.bodies, told), (&[0, 10][..], [20, 20], vec![(1, 2), (2, 2)]));
     assert_eq!(written.collection, out.join("run.pvd"));
     let steps = ["bodies-0000000000", "bodies-0000000000.pvtu", "bodies-0000000010", "bodies-0000000010.pvtu"];
@@ -124,7 +127,7 @@ fn a_record_without_bodies_has_a_file_without_any() {
     let some = |step| if step == 5 { bodies(step) } else { Vec::new() };
     record(folder.path(), &facts(5), 2, (0..=10).step_by(5), some);
     let (recorded, out) = (Recorded::open(folder.path()).unwrap(), folder.path().join("out"));
-    let written = export(&recorded, &out, records(&recorded, None).unwrap(), |_, _| {}).unwrap();
+    let written = export(&recorded, &out, records(&recorded, None).unwrap(), |_, _| true).unwrap().unwrap();
     assert_eq!(written.bodies, [0, 20]);
     let nobody = Piece::read(&out.join("bodies-0000000010/rank-00000.vtu"));
     assert!(nobody.text.contains("NumberOfCells=\"0\"") && nobody.column("id").is_empty());
@@ -138,12 +141,15 @@ fn what_fails_leaves_nothing() {
     let full = folder.path().join("full");
     fs::create_dir(&full).unwrap();
     fs::write(full.join("thesis.tex"), "").unwrap();
-    let told = |out: &Path| export(&recorded, out, records(&recorded, None).unwrap(), |_, _| {}).unwrap_err();
+    let told = |out: &Path| export(&recorded, out, records(&recorded, None).unwrap(), |_, _| true).unwrap_err();
     let error = told(&full);
     assert!(error.to_string().ends_with("full: it is not empty; name a new folder"), "{error}");
     let error = told(&full.join("thesis.tex"));
     assert!(error.to_string().contains("thesis.tex: Not a directory"), "{error}");
     assert_eq!(names(&full), ["thesis.tex"]);
+    let stopped = folder.path().join("stopped");
+    assert_eq!(export(&recorded, &stopped, records(&recorded, None).unwrap(), |done, _| done < 2).unwrap(), None);
+    assert!(!stopped.exists());
 
     // Torn after it was opened, and in a later record.
     let torn = folder.path().join("rank-00001/steps-0000000000-0000000010.parquet");
