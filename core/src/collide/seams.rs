@@ -5,7 +5,6 @@
 //! Sources for what goes wrong where each is seen alone: G. van den Bergen, "Collision Detection in Interactive 3D Environments", 2003;
 //! E. Catto, "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
 
-use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::{self, Stopped};
 use crate::collide::wide_pairs::TOUCHING;
@@ -32,16 +31,17 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
         let kinds = contacts.bodies[run.start].map(|body| setup.kind(tile.bodies.kind[body as usize]));
-        let sides = sides(tile, &run, kinds);
-        let may_glide = sides == [Side::Static] || touch::far(tile, contacts.bodies[run.start], setup) >= TOUCHING;
-        if !may_glide || !may_be_behind(&tile.contacts.contacts[run.clone()], kinds) {
+        let surfaces = surfaces(tile, &run, kinds);
+        let key = tile.contacts.keys[run.start];
+        // Who goes no further passes over corners that lie no deeper in it.
+        let may_catch =
+            surfaces == [Surface::Static] || touch::far(tile, contacts.bodies[run.start], setup) >= TOUCHING;
+        if !may_catch || !may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) {
             continue;
         }
         faces.clear();
-        for &side in sides {
-            let contact =
-                |number| (&tile.contacts.contacts[number], contacts.separation[number], contacts.bodies[number]);
-            faces.extend(run.clone().map(|number| Face::new(tile, contact(number), side, setup)));
+        for &surface in surfaces {
+            faces.extend(run.clone().map(|number| Face::new(tile, contacts, number, surface, setup)));
         }
         let is_behind = |first: usize, other: usize| {
             faces.chunks(run.len()).any(|faces| faces[other - run.start].is_behind(&faces[first - run.start]))
@@ -70,7 +70,7 @@ fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
 
 /// Whose surface it is that is touched.
 #[derive(Clone, Copy, PartialEq)]
-enum Side {
+enum Surface {
     /// That of the one which never moves but by its path.
     Static,
     A,
@@ -78,27 +78,29 @@ enum Side {
 }
 
 /// On whose surfaces a run of contacts is looked at, from the kinds of the first two.
-fn sides(tile: &Tile, run: &Range<usize>, kinds: [&KindRow; 2]) -> &'static [Side] {
+fn surfaces(tile: &Tile, run: &Range<usize>, kinds: [&KindRow; 2]) -> &'static [Surface] {
     let is_static = matches!(tile.contacts.keys[run.start].high().kind(), SlotKind::Static(_));
     match (is_static, kinds.map(KindRow::is_compound)) {
-        (true, _) => &[Side::Static],
-        (_, [true, true]) => &[Side::A, Side::B],
-        (_, [true, false]) => &[Side::A],
-        (_, [false, true]) => &[Side::B],
+        (true, _) => &[Surface::Static],
+        (_, [true, true]) => &[Surface::A, Surface::B],
+        (_, [true, false]) => &[Surface::A],
+        (_, [false, true]) => &[Surface::B],
         (_, [false, false]) => &[],
     }
 }
 
 /// Whether one of the contacts of a run may be behind another, seen from the kinds of the first two: of several directions, and not all
 /// stood on. A long body may lie on many.
-fn may_be_behind(run: &[Contact], kinds: [&KindRow; 2]) -> bool {
+fn may_be_behind(run: &[Contact], key: PairKey, kinds: [&KindRow; 2]) -> bool {
     let rolls = kinds.iter().any(|kind| kind.form == Form::Round);
-    run.iter().any(|contact| contact.normal != run[0].normal) && (rolls || !run.iter().all(presses))
+    let are_stood_on = || run.iter().all(|contact| presses(contact, key));
+    run.iter().any(|contact| contact.normal != run[0].normal) && (rolls || !are_stood_on())
 }
 
-/// Whether it pressed in the last step.
-fn presses(contact: &Contact) -> bool {
-    contact.points().iter().any(|point| point.normal_impulse > 0.0)
+/// Whether it pressed in the last step. Of bodies of two tiles nothing is said: each of these knows its own impulses, and both are to find one
+/// geometry.
+fn presses(contact: &Contact, key: PairKey) -> bool {
+    !key.is_border() && contact.points().iter().any(|point| point.normal_impulse > 0.0)
 }
 
 /// Where a body is touched.
@@ -113,17 +115,19 @@ struct Face<'a> {
     count: usize,
     /// What stands out of a plane by less than this is not before it.
     level: f32,
-    /// Whether what touches it pressed already, and does not roll.
+    /// Whether it is not to be looked for again: what touches it pressed already, and does not roll; or is deep in it, where it moves.
     is_stood_on: bool,
 }
 
 impl<'a> Face<'a> {
-    /// Of a contact, the separation of its points now, and its bodies.
-    fn new(tile: &Tile, (contact, now, [a, b]): (&Contact, [f32; 2], Pair), side: Side, setup: &'a Setup) -> Self {
-        let is_of_a = match side {
-            Side::Static => a as usize >= tile.owned + tile.ghosts(),
-            Side::A => true,
-            Side::B => false,
+    /// Of the contact of that number.
+    fn new(tile: &Tile, contacts: &Contacts, number: usize, surface: Surface, setup: &'a Setup) -> Self {
+        let (contact, key) = (&tile.contacts.contacts[number], tile.contacts.keys[number]);
+        let [a, b] = contacts.bodies[number];
+        let is_of_a = match surface {
+            Surface::Static => a as usize >= tile.owned + tile.ghosts(),
+            Surface::A => true,
+            Surface::B => false,
         };
         let (body, of, way, center) = if is_of_a { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
         let normal = contact.normal * way;
@@ -136,23 +140,23 @@ impl<'a> Face<'a> {
             points,
             count: contact.point_count(),
             level: min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius),
-            is_stood_on: presses(contact) && kind.form != Form::Round,
+            is_stood_on: presses(contact, key) && kind.form != Form::Round,
         };
-        let (piece, rotation) = match side {
-            Side::Static => return face,
-            Side::A => (contact.piece_numbers()[0], contact.rotation_a),
-            Side::B => (contact.piece_numbers()[1], contact.rotation_b),
+        let (piece, rotation) = match surface {
+            Surface::Static => return face,
+            Surface::A => (contact.piece_numbers()[0], contact.rotation_a),
+            Surface::B => (contact.piece_numbers()[1], contact.rotation_b),
         };
         let piece = &setup.kind(tile.bodies.kind[of as usize]).pieces[piece];
         let points = points.map(|point| rotation.unrotate(point));
         // In a crowd who overlaps is not let go.
-        let overlaps = now[..face.count].iter().any(|&separation| separation < -TOUCHING);
+        let overlaps = contacts.separation[number][..face.count].iter().any(|&separation| separation < -TOUCHING);
         let is_stood_on = face.is_stood_on || overlaps;
         Self { piece: Some(piece), normal: rotation.unrotate(normal), points, is_stood_on, ..face }
     }
 
     /// Whether it is of another direction than a first one, and not before the plane of that; and if they are of two pieces of a body, where
-    /// these meet. Round bodies roll from one to the other; what else pressed already stands on both.
+    /// these meet. Round bodies roll from one to the other; what else pressed already, or is deep in a part, is held by both.
     fn is_behind(&self, first: &Self) -> bool {
         if dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
             return false;

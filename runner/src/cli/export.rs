@@ -23,7 +23,8 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     // On a terminal only: a log has no use for that.
     let show = if io::stderr().is_terminal() { Show::OnStderr } else { Show::Nothing };
     let mut progress = None;
-    let stop = stop_on_signals(false, || std::process::exit(Exit::Interrupted as i32));
+    // However often it is interrupted, the record that is being written is the last.
+    let stop = stop_on_signals(false, || {});
     let exported = vtk::export(&recorded, &args.vtk, shown, |done, of| {
         progress.get_or_insert_with(|| Progress::new(show, 0, of as u64)).made(done as u64);
         !stop.is_requested()

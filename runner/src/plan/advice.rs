@@ -55,6 +55,10 @@ impl Plan {
                 None => format!("{folder} holds no complete snapshot yet: beginning anew"),
             }
         }));
+        let lost = goes_on.map(|output| output.folder.log()).filter(|log| !log.exists());
+        notes.extend(lost.zip(self.found.snapshots.first()).map(|(log, snapshot)| {
+            format!("{} is not there: its rows begin at step {}", log.display(), snapshot.step())
+        }));
         notes
     }
 }
@@ -66,7 +70,7 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
     let mut notes = Vec::new();
     if params.dt > LONG_STEP {
         notes.push(format!(
-            "a step is {} s: physics.hertz counts steps in a second, and who goes far in one may meet all others",
+            "a step is {:.4} s, in which bodies may go far and meet many: physics.hertz is the number of steps in a second; set it higher",
             params.dt
         ));
     }
@@ -131,6 +135,8 @@ mod tests {
         heavy.blueprint.kinds[1].material.density *= 1e6;
         let notes = heavy.notes();
         assert!(notes.len() == 1 && notes[0].starts_with("the heaviest body has "), "{notes:?}");
+        let notes = plan(&[("hertz", "0.016")]).notes();
+        assert!(notes.len() == 1 && notes[0].starts_with("a step is 62.5000 s, in which"), "{notes:?}");
         let notes = plan(&[("speculative_distance", "0.5")]).notes();
         assert!(notes.len() == 1 && notes[0].starts_with("the narrowest body is 0.2 m wide"), "{notes:?}");
     }

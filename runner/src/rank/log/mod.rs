@@ -134,14 +134,7 @@ impl Log {
             let mut file = open().map_err(|error| not_written(&path, &error))?;
             let last = rows.and_then(|rows| rows.steps).map(|(_, last)| last);
             match last {
-                None => {
-                    file.add(start).map_err(|error| not_written(&path, &error))?;
-                    if let Some(from) = resumed.filter(|&from| from > 0 && !LogFile::is_special(&path)) {
-                        let path = path.display();
-                        observer
-                            .note(&format!("{path}: begins at step {from}, as there are no rows of the steps before"));
-                    }
-                }
+                None => file.add(start).map_err(|error| not_written(&path, &error))?,
                 // Of a step after which a refused command ended the run there is none.
                 Some(last) if resumed.is_some_and(|resumed| last < resumed - resumed % self.every) => {
                     let from = resumed.unwrap_or_default();
