@@ -30,17 +30,15 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let mut first = 0;
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
-        let kinds = contacts.bodies[run.start].map(|body| setup.kind(tile.bodies.kind[body as usize]));
-        let surfaces = surfaces(tile, &run, kinds);
-        let key = tile.contacts.keys[run.start];
+        let (key, bodies) = (tile.contacts.keys[run.start], contacts.bodies[run.start]);
+        let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
         // Who goes no further passes over corners that lie no deeper in it.
-        let may_catch =
-            surfaces == [Surface::Static] || touch::far(tile, contacts.bodies[run.start], setup) >= TOUCHING;
-        if !may_catch || !may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) {
+        let may_catch = || is_with_static(key) || touch::far(tile, bodies, setup) >= TOUCHING;
+        if !may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) || !may_catch() {
             continue;
         }
         faces.clear();
-        for &surface in surfaces {
+        for &surface in surfaces(key, kinds) {
             faces.extend(run.clone().map(|number| Face::new(tile, contacts, number, surface, setup)));
         }
         let is_behind = |first: usize, other: usize| {
@@ -61,15 +59,19 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
 /// former are a body's last.
 fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
     let keys = &tile.contacts.keys[from..];
-    let is_static = |key: &PairKey| matches!(key.high().kind(), SlotKind::Static(_));
-    let are_of_one = |one: &PairKey, two: &PairKey| one.low() == two.low() && (one == two || is_static(one));
+    let are_of_one = |one: &PairKey, two: &PairKey| one.low() == two.low() && (one == two || is_with_static(*one));
     let first = keys.windows(2).position(|two| are_of_one(&two[0], &two[1]))?;
     let count = keys[first..].iter().take_while(|key| are_of_one(&keys[first], key)).count();
     Some(from + first..from + first + count)
 }
 
+/// Whether one of the bodies is a static.
+fn is_with_static(key: PairKey) -> bool {
+    matches!(key.high().kind(), SlotKind::Static(_))
+}
+
 /// Whose surface it is that is touched.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 enum Surface {
     /// That of the one which never moves but by its path.
     Static,
@@ -77,10 +79,9 @@ enum Surface {
     B,
 }
 
-/// On whose surfaces a run of contacts is looked at, from the kinds of the first two.
-fn surfaces(tile: &Tile, run: &Range<usize>, kinds: [&KindRow; 2]) -> &'static [Surface] {
-    let is_static = matches!(tile.contacts.keys[run.start].high().kind(), SlotKind::Static(_));
-    match (is_static, kinds.map(KindRow::is_compound)) {
+/// On whose surfaces a run of contacts is looked at, from the names and the kinds of the first two.
+fn surfaces(key: PairKey, kinds: [&KindRow; 2]) -> &'static [Surface] {
+    match (is_with_static(key), kinds.map(KindRow::is_compound)) {
         (true, _) => &[Surface::Static],
         (_, [true, true]) => &[Surface::A, Surface::B],
         (_, [true, false]) => &[Surface::A],

@@ -139,6 +139,7 @@ struct Moment {
 }
 
 /// How far surfaces of two bodies can move against each other within the step, in m.
+#[inline(always)]
 pub(super) fn far(tile: &Tile, pair: Pair, setup: &Setup) -> f32 {
     Approach::new(tile, pair, setup).far(setup.params.dt)
 }
@@ -146,7 +147,7 @@ pub(super) fn far(tile: &Tile, pair: Pair, setup: &Setup) -> f32 {
 /// Whether surfaces move by less than the speculative distance within the step.
 #[inline(always)]
 pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
-    Approach::new(tile, pair, setup).far(setup.params.dt) < setup.params.speculative_distance
+    far(tile, pair, setup) < setup.params.speculative_distance
 }
 
 /// The contact of bodies A and B, of one piece each, if there is one, and the separation of its points. Not inlined: kernels ask for it seldom, and with

@@ -70,7 +70,8 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
     let mut notes = Vec::new();
     if params.dt > LONG_STEP {
         notes.push(format!(
-            "a step is {:.4} s, in which bodies may go far and meet many: physics.hertz is the number of steps in a second; set it higher",
+            "a step is {:.4} s, in which bodies may go far and meet many: physics.hertz is the number of steps in a \
+             second; set it higher",
             params.dt
         ));
     }

@@ -84,11 +84,11 @@ impl Stopped {
         let mut pair = Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup);
         let (offset, turned) = (pair.offset, [pair.a.turning(self.time), pair.b.turning(self.time)]);
         pair.offset += pair.between * self.time;
-        for (side, turned) in [&mut pair.a, &mut pair.b].into_iter().zip(turned) {
+        for ((side, turned), way) in [&mut pair.a, &mut pair.b].into_iter().zip(turned).zip(self.ways) {
             side.rotation = turned.after(side.rotation);
-        }
-        for (side, way) in [&mut pair.a, &mut pair.b].into_iter().zip(self.ways).filter(|(side, _)| side.moves()) {
-            (side.velocity, side.angular_velocity) = (way.velocity, way.angular_velocity);
+            if side.moves() {
+                (side.velocity, side.angular_velocity) = (way.velocity, way.angular_velocity);
+            }
         }
         pair.offset += pair.out(self.lift);
         pair.between = pair.b.velocity - pair.a.velocity;

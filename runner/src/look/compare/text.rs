@@ -55,13 +55,13 @@ impl Display for Comparison {
 impl Comparison {
     fn write_verdict(&self, f: &mut Formatter<'_>) -> fmt::Result {
         // What keeps them from being the same is then what was not recorded by both, or by all ranks, or the ends.
-        let as_far = self.steps.iter().all(|step| step.is_same(self.tolerance));
-        let both = self.only_in_a.is_empty() && self.only_in_b.is_empty();
-        let who = if both { "all ranks" } else { "both" };
+        let are_of_both = self.only_in_a.is_empty() && self.only_in_b.is_empty();
+        let is_known = are_of_both || !self.steps.is_empty();
+        let as_far = is_known && self.steps.iter().all(|step| step.is_same(self.tolerance));
+        let who = if are_of_both { "all ranks" } else { "both" };
         let verdict = match (self.identical, self.same, self.tolerance) {
             (true, ..) => "identical".to_owned(),
             (_, true, Some(most)) => format!("the same within {most}"),
-            _ if self.steps.is_empty() && !both => "differ".to_owned(),
             (_, false, Some(most)) if as_far => format!("the same within {most} as far as {who} recorded"),
             (_, false, None) if as_far => format!("the same as far as {who} recorded"),
             (_, _, Some(most)) if self.steps.iter().any(|step| step.greatest() > most) => {

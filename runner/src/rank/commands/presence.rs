@@ -100,8 +100,8 @@ fn check(commands: &[Command], present: &mut Present, world: &World) -> Result<(
             Ok(Some((id, after))) => before.push((id, present.insert(id, after))),
             Ok(None) => {}
             Err(reason) => {
-                let removed = subject(command).filter(|id| matches!(present.get(id), Some(None)));
-                let removed = removed.filter(|id| before.iter().any(|(other, _)| other == id));
+                let is_gone = |id: &GlobalId| matches!(present.get(id), Some(None));
+                let removed = subject(command).filter(|id| is_gone(id) && before.iter().any(|(of, _)| of == id));
                 for (id, was) in before.into_iter().rev() {
                     match was {
                         Some(was) => present.insert(id, was),

@@ -64,11 +64,12 @@ impl<'a> CsvRows<'a> {
 
     /// The body of the record that was read.
     fn body(&self) -> Result<Body, SceneError> {
+        let position = |text: &str| text.parse().ok().filter(|at: &f64| at.is_finite());
         let values = Values {
             id: self.value(Column::Id, self.row, |text| text.parse().ok())?,
             kind: self.value(Column::Kind, 0, |text| self.scenery.kind(text))?,
-            x: self.value(Column::X, 0.0, |text| text.parse().ok().filter(|x: &f64| x.is_finite()))?,
-            y: self.value(Column::Y, 0.0, |text| text.parse().ok().filter(|y: &f64| y.is_finite()))?,
+            x: self.value(Column::X, 0.0, position)?,
+            y: self.value(Column::Y, 0.0, position)?,
             angle: self.float(Column::Angle)?,
             cos: self.float(Column::Cos)?,
             sin: self.float(Column::Sin)?,
