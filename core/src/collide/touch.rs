@@ -15,11 +15,13 @@ pub(super) use stopped::Stopped;
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
+use crate::collide::straight::{self, Course};
 use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
 use crate::model::piece::Piece;
+use crate::parallel::vectors::Vectors;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -183,7 +185,8 @@ impl<'a> Approach<'a> {
         let reach = setup.params.speculative_distance + far;
         let now = self.at(0.0, reach);
         let nearest = now.manifold.nearest()?.separation;
-        let is_near = nearest < NEAR || nearest < TOUCHING && far < setup.params.speculative_distance;
+        let near = if self.is_straight(setup.params.dt) { 0.0 } else { NEAR };
+        let is_near = nearest < near || nearest < TOUCHING && far < setup.params.speculative_distance;
         let is_now = is_near && !now.manifold.is_distance();
         // Speeds that overflow tell of no other moment.
         if is_now || far.is_infinite() {
@@ -298,6 +301,15 @@ impl<'a> Approach<'a> {
         }
         let sweep = self.a.sweep() + self.b.sweep();
         let mut at = *now;
+        if self.is_straight(dt) {
+            // What is apart along a direction stays so for as long as nothing moves further along it.
+            let bound = sweep - dot(self.between, now.manifold.normal);
+            if now.manifold.nearest().is_none_or(|nearest| bound * dt < nearest.separation) {
+                return (at, false);
+            }
+            let (time, touches) = self.first_touch_straight(dt);
+            return (self.at(time, reach), touches);
+        }
         // Who goes beyond a segment is let through, and so must not come there by a step of the search.
         let is_let_through = self.pieces.is_some_and(|pieces| pieces.iter().any(|piece| piece.side.is_some()));
         for _ in 0..if is_let_through { MORE_ROUNDS } else { ROUNDS } {
@@ -342,6 +354,40 @@ impl<'a> Approach<'a> {
         }
         let time = at.time + soonest;
         if time <= dt { (self.at(max(time, 0.0), reach), true) } else { (at, false) }
+    }
+
+    /// Whether one of them is round, and the other hardly turns in so many seconds: then the moment in which they touch is known exactly.
+    #[inline(always)]
+    fn is_straight(&self, dt: f32) -> bool {
+        let is_one_round = match self.pieces {
+            None => self.a.is_round() || self.b.is_round(),
+            Some(pieces) => {
+                let is_solid = pieces.iter().all(|piece| piece.side.is_none());
+                is_solid && pieces.iter().any(|piece| piece.outline.count() == 1)
+            }
+        };
+        is_one_round && (self.a.sweep() + self.b.sweep()) * dt < NEAR
+    }
+
+    /// See [`straight`](super::straight).
+    fn first_touch_straight(&self, dt: f32) -> (f32, bool) {
+        let is_b_round = match self.pieces {
+            None => self.b.is_round(),
+            Some([_, b]) => b.outline.count() == 1,
+        };
+        let (core, way) = if is_b_round { (&self.a, 1.0) } else { (&self.b, -1.0) };
+        let seen = |v: Vec2| core.rotation.unrotate(v * way);
+        let velocity = seen(self.between);
+        let Some([a, b]) = self.pieces else {
+            let [center, velocity, half] =
+                [seen(self.offset), velocity, core.kind.extent].map(|v| Vectors::new(v.x, v.y));
+            let radius = self.a.kind.radius + self.b.kind.radius;
+            let (time, touches) = Course { center, velocity, half, radius }.first_touch(dt);
+            return (time, touches > 0.0);
+        };
+        let (outline, disc, round) = if is_b_round { (a, b, &self.b) } else { (b, a, &self.a) };
+        let center = seen(self.offset) + core.rotation.unrotate(round.rotation.rotate(disc.outline.corner(0)));
+        straight::first_touch_of(&outline.outline, center, velocity, a.radius + b.radius, dt)
     }
 
     /// The contact with the geometry of a moment, and the separations that its points have now.

@@ -4,6 +4,7 @@
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
 use super::cull::passes;
+use super::straight::Course;
 use super::touch::{DEEP, NEAR, ROUNDS};
 use super::wide_pairs::{Pairs, TOUCHING};
 use crate::parallel::lanes::Wide;
@@ -226,7 +227,8 @@ impl<V: Wide> Pairs<V> {
         let nearest = now.separation;
         let is_slow = less(far, speculative);
         let touching = less(nearest, V::splat(TOUCHING)).mul(is_slow);
-        let is_now = less(nearest, V::splat(NEAR)).max(touching);
+        let searched = less(self.sweep(0).add(self.sweep(1)).mul(dt), V::splat(NEAR)).if_positive(zero, V::splat(NEAR));
+        let is_now = less(nearest, searched).max(touching);
         // Who passes by, who may touch later, and who is near anyway.
         let passes = passes(self.offset, self.between, self.bound[0].add(self.bound[1]), setup);
         let later = is_now.max(passes).if_positive(zero, one);
@@ -258,6 +260,16 @@ impl<V: Wide> Pairs<V> {
         }
     }
 
+    /// The ways of the round ones, seen from the others.
+    #[inline(always)]
+    fn course(&self) -> Course<V> {
+        let (one, back) = (V::splat(1.0), self.core_of(self.rotation).back());
+        let way = self.half[0].x.if_positive(one, V::splat(0.0).sub(one));
+        let seen = |v: Vectors<V>| back.rotate(v.scaled(way));
+        let (center, velocity) = (seen(self.offset), seen(self.between));
+        Course { center, velocity, half: self.core_of(self.half), radius: self.radius[0].add(self.radius[1]) }
+    }
+
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the time that is looked
     /// [`ahead`](Self::ahead); for the others the last that was looked at, or of circles that are near that in which they are nearest.
     #[inline(always)]
@@ -280,7 +292,16 @@ impl<V: Wide> Pairs<V> {
         let mut exact = mixed.if_positive(zero, found.max(near.mul(asked)));
         if mixed.any_positive() {
             let sweep = self.sweep(0).add(self.sweep(1));
-            let (mut going, mut ending) = (mixed, zero);
+            let straight = less(sweep.mul(dt), V::splat(NEAR)).mul(mixed);
+            if straight.any_positive() {
+                let bound = sweep.sub(self.between.dot(now.normal));
+                let comes = less(bound.mul(dt), now.separation).if_positive(zero, straight);
+                let (time, touches) = self.course().first_touch(dt);
+                found = found.max(touches.mul(comes));
+                last = comes.if_positive(time, last);
+                exact = exact.max(comes);
+            }
+            let (mut going, mut ending) = (mixed.sub(straight), zero);
             for _ in 0..ROUNDS {
                 // What is apart along a direction stays so for as long as nothing moves further along it.
                 let bound = zero.sub(self.between.dot(at.normal)).add(sweep);

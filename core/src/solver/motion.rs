@@ -54,6 +54,12 @@ impl Motion {
         }
     }
 
+    /// Whether there is gravity.
+    #[inline(always)]
+    pub(crate) fn falls(&self) -> bool {
+        self.gravity != Vec2::ZERO
+    }
+
     /// What moves bodies that move as most do.
     #[inline(always)]
     pub(crate) fn outer<V: Lanes>(&self) -> Outer<V> {

@@ -20,6 +20,9 @@ use std::ops::Range;
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 2048;
 
+/// Who was pushed by less than this part of what gravity gave was not pushed.
+const SLIGHTLY: f32 = 1e-3;
+
 /// Writes the solved bodies' new state back, and moves those without contacts. Ghosts' results are scratch: their
 /// owners' stand. Who sleeps is left alone. Notes who may concern other tiles from now on.
 pub(crate) fn write_back(tile: &mut Tile, solved: &SolverBodies, setup: &Setup, team: Team) {
@@ -284,7 +287,11 @@ impl Mover<'_> {
         }
         if flying < (N * LANES) as u32 {
             for block in 0..N {
-                let solved = self.solved(&index[block]);
+                let mut solved = self.solved(&index[block]);
+                if self.motion.falls() {
+                    let [vx, vy] = V::load_pairs(&velocity[block]);
+                    self.fall(&mut solved, Vectors::new(vx, vy), &kind[block]);
+                }
                 motions[block] = Motions::pick(V::load(&flies[block]), motions[block], solved);
             }
         }
@@ -353,6 +360,7 @@ impl Mover<'_> {
     ) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
         let gains = if PUSHED { self.gains(first) } else { [[[0.0; LANES]; 4]; N] };
+        let before = blocks.map(|block| block.velocity);
         for block in &mut *blocks {
             (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
         }
@@ -375,6 +383,31 @@ impl Mover<'_> {
                 block.turned = self.motion.turn_on(block.turned, spin);
             }
         }
+        // Who flies goes in each substep by the mean of the velocities before and after: under gravity alone that is a parabola, and
+        // keeps its energy.
+        let half = V::splat(0.5 * self.motion.h);
+        for (block, before) in blocks.iter_mut().zip(before) {
+            block.moved = block.moved.plus(before.minus(block.velocity).scaled(half));
+        }
+    }
+
+    /// Lets those of eight solved bodies go as who flies whom nothing has pushed, as their velocities tell, which these were `before`.
+    #[inline(always)]
+    fn fall<V: Lanes>(&self, solved: &mut Motions<V>, before: Vectors<V>, kinds: &[KindId; LANES]) {
+        let outer = match &self.setup.factors[..] {
+            [] => self.motion.outer(),
+            factors => self.motion.outer_of(&kinds.map(|kind| factors[kind.0 as usize])),
+        };
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let mut falls = before;
+        for _ in 0..self.setup.params.integrations() {
+            let [vx, vy, _] = self.motion.accelerate(outer, [falls.x, falls.y, zero], one, one);
+            falls = Vectors::new(vx, vy);
+        }
+        let (pushed, gained) = (solved.velocity.minus(falls), falls.minus(before));
+        let unpushed = V::splat(SLIGHTLY * SLIGHTLY).mul(gained.dot(gained)).sub(pushed.dot(pushed));
+        let lag = before.minus(solved.velocity).scaled(V::splat(0.5 * self.motion.h));
+        solved.moved = solved.moved.plus(Vectors::pick(unpushed, lag, Vectors::new(zero, zero)));
     }
 
     /// What forces give bodies in a substep, and one for those that they push at.

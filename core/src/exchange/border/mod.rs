@@ -52,7 +52,7 @@ pub(crate) struct Border {
     /// See [`heard`](Self::heard).
     heard: Vec<(u32, f32)>,
     near: Near,
-    /// The contacts of ghosts, and of bodies that are near to other tiles.
+    /// The contacts of owned bodies that are of ghosts, or of bodies that are near to other tiles or sent; ascending.
     outer: Vec<u32>,
 }
 
@@ -123,6 +123,7 @@ impl Border {
         self.sent.extend(self.sends.chunk_by(|a, b| a.body == b.body).map(|sends| sends[0].body));
         self.ghosts.sort_unstable();
         self.ghosts.dedup();
+        self.find_outer_of_sent(contacts);
         self.contacts.sort_unstable();
         self.totals.clear();
         self.totals.resize(self.contacts.len(), [[0.0; 2]; 2]);
@@ -145,6 +146,18 @@ impl Border {
         &self.sent
     }
 
+    /// Counts the contacts of sent bodies among the outer ones: who touches a large ghost may be near to no other tile.
+    fn find_outer_of_sent(&mut self, contacts: &Contacts) {
+        let Self { near, sent, outer, scratch, .. } = self;
+        if sent.iter().all(|&body| near.knows(body)) {
+            return;
+        }
+        let is_outer = |&body: &u32| near.knows(body) || sent.binary_search(&body).is_ok();
+        let own = (0..scratch.start).zip(&contacts.bodies);
+        outer.clear();
+        outer.extend(own.filter(|(_, bodies)| bodies.iter().any(is_outer)).map(|(contact, _)| contact));
+    }
+
     fn find_feeds(&mut self, tile: &Tile, contacts: &Contacts) {
         if self.sends.is_empty() {
             return;
@@ -158,10 +171,7 @@ impl Border {
             }
             range.1 = i + 1;
         }
-        // Who touches a large ghost may be near to no other tile, so these are not the outer contacts alone.
-        let is_sent = |body: u32| self.sends_of.get(body as usize).is_some_and(|(first, end)| first < end);
-        let own = (0..self.scratch.start).zip(&contacts.bodies).filter(|(_, [a, b])| is_sent(*a) | is_sent(*b));
-        for (contact, _) in own {
+        for &contact in &self.outer {
             let key = tile.contacts.keys[contact as usize];
             for (body, partner) in [(key.low(), key.high()), (key.high(), key.low())] {
                 let SlotKind::Owned(body) = body.kind() else { continue };

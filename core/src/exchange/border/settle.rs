@@ -29,7 +29,7 @@ pub(super) struct Beside {
 impl Border {
     /// Finds them, once it is known who hears of whom.
     pub(super) fn find_beside(&mut self, tile: &Tile, contacts: &Contacts) {
-        let Self { beside: Beside { contacts: beside, .. }, contacts: border, sends_of, scratch, .. } = self;
+        let Self { beside: Beside { contacts: beside, .. }, contacts: border, sends_of, outer, .. } = self;
         beside.clear();
         if border.is_empty() {
             return;
@@ -41,9 +41,10 @@ impl Border {
         // Whoever is in a border contact is sent.
         let is_sent = |body: u32| sends_of.get(body as usize).is_some_and(|(first, end)| first < end);
         let is_moved = |body: &u32| is_sent(*body) && moved.binary_search(body).is_ok();
-        let all = (0..scratch.start).zip(&contacts.bodies).zip(&tile.contacts.keys);
-        let near = all.filter(|((_, bodies), key)| !key.high().is_ghost() && bodies.iter().any(is_moved));
-        beside.extend(near.map(|((contact, _), _)| contact));
+        beside.extend(outer.iter().copied().filter(|&contact| {
+            let (key, bodies) = (tile.contacts.keys[contact as usize], contacts.bodies[contact as usize]);
+            !key.high().is_ghost() && bodies.iter().any(is_moved)
+        }));
     }
 
     /// Moves both copies of every border contact to their mean (see [`average`](Self::average)), and has the contacts beside take up

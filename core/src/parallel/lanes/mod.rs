@@ -4,6 +4,7 @@
 //! AVX2 with vector registers, and for AVX-512 with twice as many of them. Every operation is the IEEE one, lane by lane, so
 //! all give the same bits; how many lanes a register has never decides how work is grouped.
 
+use crate::model::math;
 use crate::model::params::Instructions;
 use std::cell::Cell;
 use wide::Twice;
@@ -86,6 +87,46 @@ pub(crate) trait Lanes: Arithmetic {
     fn all_below(self, most: f32) -> bool;
 }
 
+/// A lane alone.
+impl Arithmetic for f32 {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self + other
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self - other
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self * other
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self / other
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        math::max(self, other)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        math::min(self, other)
+    }
+    #[inline(always)]
+    fn if_positive(self, yes: Self, no: Self) -> Self {
+        if self > 0.0 { yes } else { no }
+    }
+}
+
 /// Plain arrays: the reference, and what other processors run.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable(Row);
@@ -124,11 +165,11 @@ impl Arithmetic for Portable {
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.map2(other, crate::model::math::max)
+        self.map2(other, math::max)
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.map2(other, crate::model::math::min)
+        self.map2(other, math::min)
     }
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {
