@@ -35,9 +35,12 @@ pub(crate) fn unmarked(mut text: String) -> String {
 /// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
 const SIMILAR: f64 = 0.6;
 
-/// The word most like `text`, if any is like it.
+/// The word most like `text`, whose letters may be large or small, if any is like it.
 pub(crate) fn nearest<'a>(words: impl Iterator<Item = &'a str>, text: &str) -> Option<String> {
-    nearest_by(words, |word| strsim::normalized_damerau_levenshtein(word, text))
+    nearest_by(words, |word| match word.eq_ignore_ascii_case(text) {
+        true => 1.0,
+        false => strsim::normalized_damerau_levenshtein(word, text),
+    })
 }
 
 /// The word of the greatest likeness, if that is enough.

@@ -288,6 +288,13 @@ fn info_fails_on_a_damaged_snapshot_and_tells_all_the_same() {
         assert_refused(&info, 2, &format!("{snapshot}: this snapshot is damaged: "));
         assert!(info.stderr.contains("bring back a good copy of it"), "{info}");
         assert!(info.stdout.contains("7 records") && info.stdout.contains("after step 30: "), "{info}");
+        // Nor does one that is damaged hide another, or what is whole.
+        flip(&damaged.join("rank-00001/steps-0000000000-0000000010.parquet"), 200);
+        fs::write(damaged.join("commands.jsonl"), "{\"step\": 5}\n").unwrap();
+        let info = program::run(program::command().arg("info").arg(&damaged));
+        assert_refused(&info, 2, "bring back a good copy of it; the list tells of 2 more");
+        assert!(info.stdout.contains("commands.jsonl: line 1: "), "{info}");
+        assert!(info.stdout.contains("after step 30: ") && info.stdout.contains(" MB, state hash "), "{info}");
     }
 }
 

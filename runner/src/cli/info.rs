@@ -3,6 +3,7 @@
 use super::args::InfoArgs;
 use super::console::complain;
 use super::output;
+use crate::command::Script;
 use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
@@ -22,7 +23,7 @@ use std::{fs, iter};
 pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
     let path = &args.path;
     let folder = RunFolder::new("info", path);
-    let mut trouble = None;
+    let mut trouble = Vec::new();
     let text = match path.extension().and_then(OsStr::to_str) {
         _ if folder.holds_run() => of_run(&folder, &mut trouble)?,
         Some("atoll") => of_snapshot_file(path)?,
@@ -39,12 +40,17 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
         }
     };
     output::show(&text)?;
-    let refusal = |error: String| folder.refusal(format!("{error}; remove it, or bring back a good copy of it")).into();
-    trouble.map_or(Ok(Exit::Done), |error| Err(refusal(error)))
+    let Some(first) = trouble.first() else { return Ok(Exit::Done) };
+    let mend = if first.ends_with("a good copy of it") { "" } else { "; remove it, or bring back a good copy of it" };
+    let rest = match trouble.len() - 1 {
+        0 => String::new(),
+        more => format!("; the list tells of {more} more"),
+    };
+    Err(folder.refusal(format!("{first}{mend}{rest}")).into())
 }
 
-/// `trouble` is what is wrong with a file that is damaged, of which the text tells as well.
-fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, RunError> {
+/// `trouble` is what is wrong with files that are damaged, of which the text tells as well.
+fn of_run(folder: &RunFolder, trouble: &mut Vec<String>) -> Result<String, RunError> {
     let config = folder.begun()?;
     let tiles = config.run.tiles.unwrap_or_default();
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
@@ -53,29 +59,35 @@ fn of_run(folder: &RunFolder, trouble: &mut Option<String>) -> Result<String, Ru
     let mut text = format!("{kind}: {bodies} bodies{seed}, {tiling}\n");
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
-    row(&mut text, "recording", &recording(folder.path(), config.output.record_every)?);
-    let log = log(folder);
-    row(&mut text, "log", log.as_ref().unwrap_or_else(|damage| damage));
-    *trouble = log.err();
-    let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles)?;
+    let mut told = |what: Result<String, String>| {
+        what.unwrap_or_else(|damage| {
+            trouble.push(damage.clone());
+            damage
+        })
+    };
+    row(&mut text, "recording", &told(recording(folder.path(), config.output.record_every)));
+    row(&mut text, "log", &told(log(folder)));
+    if let Some(commands) = commands(folder) {
+        row(&mut text, "commands", &told(commands));
+    }
+    let found = match snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles) {
+        Ok(found) => found,
+        Err(error) => {
+            row(&mut text, "snapshots", &told(Err(error.to_string())));
+            return Ok(text);
+        }
+    };
     if found.snapshots.is_empty() {
         row(&mut text, "snapshots", "none");
     }
     for snapshot in &found.snapshots {
         let size = snapshot.files.iter().map(|file| file.path.as_path());
-        let told = match snapshot.check() {
-            Ok(()) => format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state),
-            Err(error) => {
-                let told = error.to_string();
-                trouble.get_or_insert_with(|| told.clone());
-                told
-            }
-        };
-        row(&mut text, "snapshot", &format!("after step {}: {told}", snapshot.step()));
+        let whole = || format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state);
+        let what = told(snapshot.check().map(|()| whole()).map_err(|error| error.to_string()));
+        row(&mut text, "snapshot", &format!("after step {}: {what}", snapshot.step()));
     }
     for error in found.unusable {
-        row(&mut text, "snapshot", &error.to_string());
-        trouble.get_or_insert_with(|| error.to_string());
+        row(&mut text, "snapshot", &told(Err(error.to_string())));
     }
     Ok(text)
 }
@@ -95,15 +107,16 @@ fn state(folder: &RunFolder, steps: u64) -> String {
     format!("{how} {} of {steps} steps: state hash {}", ended.steps, OneLine(&hash))
 }
 
-fn recording(folder: &Path, every: Option<u64>) -> Result<String, RunError> {
+/// What there is of a recording, or what is wrong with it.
+fn recording(folder: &Path, every: Option<u64>) -> Result<String, String> {
     let Some(every) = every else { return Ok("none".to_owned()) };
     let recording = match Recording::open(folder) {
         Err(RecordingError::Nothing { .. }) => return Ok(format!("every {every} steps, none complete")),
-        recording => recording?,
+        recording => recording.map_err(|error| error.to_string())?,
     };
     recording.damage().iter().for_each(|damage| complain(damage));
     let (steps, files) = (recording.steps(), recording.files());
-    recording.check()?;
+    recording.check().map_err(|error| error.to_string())?;
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
     let shapes = recording.stage().map_or("no shapes".to_owned(), shapes);
@@ -120,6 +133,16 @@ fn log(folder: &RunFolder) -> Result<String, String> {
     let rows = Rows::find(&folder.log(), None, None).map_err(|error: LogError| error.to_string())?;
     let steps = rows.and_then(|rows| Some((rows.count, rows.steps?)));
     Ok(steps.map_or("none".to_owned(), |(count, (first, last))| format!("{count} rows, steps {first} to {last}")))
+}
+
+/// How many commands there were and are to come, if any, or what is wrong with them.
+fn commands(folder: &RunFolder) -> Option<Result<String, String>> {
+    let path = folder.commands();
+    let told = |script: Script| match script.lines.len() {
+        1 => "1 line".to_owned(),
+        count => format!("{count} lines"),
+    };
+    path.exists().then(|| Script::load_recorded(&path).map(told).map_err(|error| error.to_string()))
 }
 
 fn of_snapshot(snapshot: &Snapshot) -> Result<String, SnapshotError> {

@@ -69,6 +69,17 @@ impl SceneError {
         Self::bad(file, Place::default(), reason)
     }
 
+    /// The same of a row that stands in the scene's own file, named as the other tables of that are.
+    pub(super) fn of_table(mut self) -> Self {
+        if let Self::Bad { place, .. } = &mut self
+            && let Some(row) = place.row.take()
+        {
+            let name = place.name.take().map(|name| format!(", {name}")).unwrap_or_default();
+            place.name = Some(format!("[[body]] {}{name}", row - 1));
+        }
+        self
+    }
+
     /// That so much more is wrong in the same way.
     pub(super) fn and_more(mut self, more: usize) -> Self {
         if let (Self::Bad { reason, .. }, 1..) = (&mut self, more) {

@@ -81,7 +81,7 @@ impl<'a> CsvRows<'a> {
     }
 
     fn float(&self, column: Column) -> Result<f32, SceneError> {
-        self.value(column, 0.0, |text| text.parse().ok())
+        self.value(column, 0.0, |text| text.parse().ok().filter(|number: &f32| number.is_finite()))
     }
 
     /// What stands in a column of this row; `usual` if there is no such column.

@@ -47,7 +47,7 @@ pub(super) fn read(file: &Path, tables: &[Table], scenery: &Scenery<'_>, faults:
             omega: float(Column::Omega)?,
         };
         entries.finish()?;
-        scenery.body(row, None, cos, &values)
+        scenery.body(row, None, cos, &values).map_err(SceneError::of_table)
     };
     (0..).zip(tables).filter_map(|one| keep(faults, body(one))).collect()
 }

@@ -312,9 +312,21 @@ impl SceneFile {
             (1_u64..).zip(self.iter()).filter_map(|(row, body)| body.is_ok_and(|body| body.id == id).then_some(row));
         let rows: Vec<u64> = rows.take(2).collect();
         let place = Place { row: rows.get(1).copied(), name: Some(format!("id = {id}")), ..Place::default() };
-        let first = rows.first().map_or("another body".to_owned(), |row| format!("the body of row {row}"));
-        let reason = format!("{first} has this id as well; give each its own, or leave the column id out");
-        SceneError::bad(self.bodies_path().unwrap_or(&self.path), place, reason)
+        let told = |first: Option<String>, all: &str| {
+            let first = first.unwrap_or("another body".to_owned());
+            format!("{first} has this id as well; give each its own, or leave {all} out")
+        };
+        let first = rows.first();
+        match self.bodies_path() {
+            Some(path) => {
+                let first = first.map(|row| format!("the body of row {row}"));
+                SceneError::bad(path, place, told(first, "the column id"))
+            }
+            None => {
+                let first = first.map(|row| format!("[[body]] {}", row - 1));
+                SceneError::bad(&self.path, place, told(first, "all ids")).of_table()
+            }
+        }
     }
 
     /// That far too many of some bodies are at one place, if they are. The places are sorted.

@@ -41,10 +41,10 @@ impl Column {
             Self::Id => "a whole number from 0 to 18446744073709551615",
             Self::Kind => "the number of a kind, from 0, or the name of one",
             Self::X | Self::Y => "a finite number, in meters",
-            Self::Angle => "a finite number, in radians",
+            Self::Angle => "a finite number, in radians, within the range of 32 bits",
             Self::Cos | Self::Sin => "the cosine or sine of an angle",
-            Self::Vx | Self::Vy => "a finite number, in m/s",
-            Self::Omega => "a finite number, in rad/s",
+            Self::Vx | Self::Vy => "a finite number, in m/s, within the range of 32 bits",
+            Self::Omega => "a finite number, in rad/s, within the range of 32 bits",
         }
     }
 }
@@ -169,8 +169,7 @@ impl Scenery<'_> {
         let floats = [(Column::Angle, angle), (Column::Vx, vx), (Column::Vy, vy), (Column::Omega, omega)];
         for (column, value) in floats.into_iter().chain([(Column::Cos, cos), (Column::Sin, sin)]) {
             if !value.is_finite() {
-                let reason = format!("must be {} within the range of 32 bits", column.must());
-                return Err(refuse(column, value.to_string(), &reason));
+                return Err(refuse(column, value.to_string(), &format!("must be {}", column.must())));
             }
         }
         if kind >= self.kinds.len() as u64 {
