@@ -1,12 +1,13 @@
 //! The library as somebody uses it who has all tiles in one process: `atoll_core` without a halo of one's own.
 
 use atoll_core::{
-    Adaptive, Blueprint, Body, BodyFault, Exchange, Facts, GlobalId, Hashes, KindId, Loopback, NotHere, Params,
-    Partition, SetupError, Solver, StepError, TileId, World, finish, halo_width, measure, step,
+    Adaptive, Blueprint, Body, BodyFault, Exchange, Facts, GlobalId, Halo, Hashes, Inbox, KindId, Loopback, NotHere,
+    Outbox, Params, Partition, Rot, SetupError, Shape, Solver, StepError, TileId, World, finish, halo_width, measure,
+    step,
 };
 use atoll_tests::program;
 use atoll_tests::scenes;
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 use std::time::{Duration, Instant};
 
 /// Looking at a world changes nothing of what comes, and shows what it would end with.
@@ -49,6 +50,77 @@ fn a_halo_that_delivers_on_the_spot_refuses_half_a_world() {
     let refused = step(&mut half, &mut Loopback).unwrap_err();
     assert_eq!(refused, StepError::Halo(NotHere { tile: TileId(1) }));
     assert!(refused.to_string().contains("tile 1"), "{refused}");
+}
+
+/// Of some sync points one fails, having delivered or not: then the world refuses to go on, and is what it was once it is restored.
+#[test]
+fn a_world_whose_halo_failed_goes_on_once_it_is_restored() {
+    struct Breaks {
+        left: u32,
+        delivers: bool,
+    }
+    impl Halo for Breaks {
+        type Error = &'static str;
+        fn exchange(&mut self, outbox: &mut Outbox, inbox: &mut Inbox) -> Result<(), &'static str> {
+            let breaks = self.left == 0;
+            if !breaks || self.delivers {
+                assert_eq!(outbox.deliver(inbox), None);
+            }
+            self.left = self.left.wrapping_sub(1);
+            if breaks { Err("the wire broke") } else { Ok(()) }
+        }
+    }
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let mut scene = scenes::pile(12, 8);
+        // Bodies change tiles all the time.
+        scene.bodies.iter_mut().for_each(|body| body.velocity = Vec2::new(6.0 - 2.0 * (body.id.0 % 7) as f32, 3.0));
+        let begun = || scene.start_on((4, 3), exchange).world;
+        let mut undisturbed = begun();
+        let mut ends = Vec::new();
+        (0..30).for_each(|_| {
+            step(&mut undisturbed, &mut Loopback).unwrap();
+            ends.push(undisturbed.hashes());
+        });
+        for (left, delivers) in [(0, false), (0, true), (3, true)] {
+            let mut world = begun();
+            for _ in 0..15 {
+                step(&mut world, &mut Loopback).unwrap();
+            }
+            let mut bytes = Vec::new();
+            let saved = world.save(&mut bytes);
+            let left = if exchange == Exchange::Step { 0 } else { left };
+            let broken = step(&mut world, &mut Breaks { left, delivers });
+            assert_eq!(broken, Err(StepError::Halo("the wire broke")));
+            assert_eq!(step(&mut world, &mut Loopback), Err(StepError::Halfway { step: 15 }));
+            assert_eq!(measure(&world, &mut Loopback), Err(StepError::Halfway { step: 15 }));
+            let mut rest = &bytes[..];
+            for tile in saved {
+                world.restore(tile.tile, rest.split_off(..tile.length).unwrap()).unwrap();
+            }
+            world.resume_at(15);
+            for expected in &ends[15..] {
+                step(&mut world, &mut Loopback).unwrap();
+                assert!(world.hashes() == *expected, "{exchange:?}, {left}, {delivers}");
+            }
+        }
+    }
+}
+
+#[test]
+fn statics_that_cannot_be_are_refused() {
+    let blueprint = two_tiles();
+    let mut wide = blueprint.statics[0].clone();
+    wide.kind.shape = Shape::polygon(&[Vec2::ZERO, Vec2::new(3e38, 0.0), Vec2::new(3e38, 3e38)], 0.0).unwrap();
+    let mut turned = blueprint.statics[0].clone();
+    turned.rotation = Rot { c: 0.5, s: 0.0 };
+    for fixed in [wide, turned] {
+        let (id, statics) = (fixed.id, vec![fixed]);
+        let refused = World::whole(&Blueprint { statics, ..blueprint.clone() }).unwrap_err();
+        assert_eq!(refused, SetupError::BadStatic { id });
+    }
+    for (length, radius) in [(-1.0, 0.5), (0.0, 0.5), (f32::NAN, 0.5), (1.0, 0.0)] {
+        assert!(Shape::capsule(length, radius).is_err(), "{length} {radius}");
+    }
 }
 
 #[test]

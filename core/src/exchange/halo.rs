@@ -10,6 +10,9 @@ use thiserror::Error;
 /// `exchange` is called by every rank of a run the same number of times. It must bring each message of each rank's
 /// outbox to the inbox of the rank that holds its destination tile, and every rank's [`Verdict`](crate::Verdict) to every
 /// rank, before it returns. Order of arrival does not matter. Within one rank [`Outbox::deliver`] does it all.
+///
+/// Each exactly once: a message that is lost, or comes twice, is not always noticed, and then the result is another. A halo that cannot
+/// see to that returns an error, upon which the step fails.
 pub trait Halo {
     /// What the outside can fail with.
     type Error;

@@ -26,8 +26,8 @@ pub enum SetupError {
     },
     /// A static body.
     #[error(
-        "static body {id}: its name must be its own, its position and rotation finite, its sizes and density positive, its speed \
-         at most 1e9 m/s"
+        "static body {id}: its name must be its own, its position finite, its rotation of length one, its sizes positive and finite, \
+         its speed at most 1e9 m/s"
     )]
     BadStatic {
         /// Its name.
@@ -211,13 +211,21 @@ pub enum StepError<E> {
         /// The step.
         step: u64,
     },
-    /// Two tiles disagree about what was sent: a bug, or memory gone bad.
+    /// Two tiles disagree about what was sent: a bug, memory gone bad, or a halo that lost something.
     #[error("step {step}: tile {tile} received state of a body it does not know")]
     Protocol {
         /// The step.
         step: u64,
         /// The receiving tile.
         tile: TileId,
+    },
+    /// An earlier step failed, and has left the world halfway.
+    #[error(
+        "step {step} failed and has left this world halfway: restore every tile of it, and tell it by resume_at which step is next"
+    )]
+    Halfway {
+        /// The step that failed.
+        step: u64,
     },
 }
 
@@ -229,6 +237,7 @@ impl<E> StepError<E> {
             Self::NonFinite { step, id } => StepError::NonFinite { step, id },
             Self::FloatMode { step } => StepError::FloatMode { step },
             Self::Protocol { step, tile } => StepError::Protocol { step, tile },
+            Self::Halfway { step } => StepError::Halfway { step },
         }
     }
 }

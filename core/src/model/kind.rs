@@ -240,7 +240,7 @@ impl KindRow {
     }
 
     pub(crate) fn fixed(kind: &Kind) -> Option<Self> {
-        Self::checked(kind)
+        Self::checked(kind).filter(|row| row.bounding_radius.is_finite() && kind.shape.area().is_finite())
     }
 
     fn checked(kind: &Kind) -> Option<Self> {

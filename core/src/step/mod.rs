@@ -56,9 +56,10 @@ pub struct StepReport {
 /// in, or of the global one.
 ///
 /// # Errors
-/// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite.
+/// What the halo failed with; or, on all ranks alike, that a body's state is no longer finite. A world whose step failed is left halfway,
+/// and refuses to go on until each of its tiles is [restored](World::restore) and [`World::resume_at`] says from where.
 pub fn step<H: Halo>(world: &mut World, halo: &mut H) -> Result<StepReport, StepError<H::Error>> {
-    through(halo, |carry| make_step(world, carry))
+    through(halo, |carry| world.unless_halfway(|world| make_step(world, carry)))
 }
 
 fn make_step(world: &mut World, halo: &mut Carry<'_>) -> Result<StepReport, StepError<NotCarried>> {
@@ -142,13 +143,13 @@ pub fn measure<H: Halo>(world: &World, halo: &mut H) -> Result<Vec<TileFacts>, S
 ///
 /// # Errors
 /// As [`step`]; a failure of the last step is reported here.
-pub fn finish<H: Halo>(world: World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
-    through(halo, |carry| close(world, carry))
+pub fn finish<H: Halo>(mut world: World, halo: &mut H) -> Result<Vec<TileFacts>, StepError<H::Error>> {
+    through(halo, |carry| world.unless_halfway(|world| close(world, carry)))
 }
 
-fn close(mut world: World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepError<NotCarried>> {
+fn close(world: &mut World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, StepError<NotCarried>> {
     world.begin_step();
-    migrate(&mut world, halo)?;
+    migrate(world, halo)?;
     Ok(world.each_tile(|bench| {
         // Manifolds as they are, not as they were kept.
         bench.tile.contacts.clear();

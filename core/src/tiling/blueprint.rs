@@ -5,7 +5,7 @@ use crate::model::body::{Body, StaticBody};
 use crate::model::error::{BodyFault, SetupError};
 use crate::model::id::{GlobalId, KindId, TileId};
 use crate::model::kind::{Dynamics, Filter, Kind, KindRow};
-use crate::model::math;
+use crate::model::math::{self, Rot};
 use crate::model::params::Params;
 use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
@@ -102,6 +102,11 @@ impl Slimness {
     }
 }
 
+/// Whether it is of length one.
+fn is_turn(rotation: Rot) -> bool {
+    (rotation.c * rotation.c + rotation.s * rotation.s - 1.0).abs() < 1e-3
+}
+
 /// Inner radius; a sensor is never too thin.
 fn breadth(kind: &KindRow) -> f32 {
     if kind.sensor { f32::INFINITY } else { kind.inner_radius }
@@ -178,7 +183,7 @@ impl Setup {
                 angular_velocity: 0.0,
                 kind: KindId(kinds.len() as u32),
             };
-            if !body.is_finite() || fixed.path.is_some_and(|path| !path.is_valid()) {
+            if !body.is_finite() || !is_turn(body.rotation) || fixed.path.is_some_and(|path| !path.is_valid()) {
                 return Err(refuse);
             }
             kinds.push(row);
@@ -275,10 +280,9 @@ impl Setup {
 
     /// Whether a dynamic body may be one of this world.
     pub(crate) fn check_body(&self, body: &Body) -> Result<(), SetupError> {
-        let turned = (body.rotation.c * body.rotation.c + body.rotation.s * body.rotation.s - 1.0).abs() < 1e-3;
         let fault = match body {
             _ if !body.is_finite() => BodyFault::NotFinite,
-            _ if !turned => BodyFault::NoRotation,
+            _ if !is_turn(body.rotation) => BodyFault::NoRotation,
             _ if !self.has_kind(body.kind) => BodyFault::NoKind(body.kind),
             _ if self.is_static(body.id) => BodyFault::NameOfStatic,
             _ => return Ok(()),

@@ -77,10 +77,11 @@ impl World {
         Some(self.tiles[tile as usize].at(at))
     }
 
-    /// Removes the body of that name, and says whether it was one of this world's. Tell every rank. Takes as long as
+    /// Removes the body of that name, with the forces upon it, and says whether it was one of this world's. Tell every rank. Takes as long as
     /// [`get`](Self::get).
     pub fn remove(&mut self, id: GlobalId) -> bool {
         self.removed.push(id);
+        self.stop_pushing(id);
         if self.setup.params.sleep {
             self.tiles.iter_mut().for_each(|tile| tile.wake_beside_ghost(id));
         }

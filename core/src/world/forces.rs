@@ -45,6 +45,11 @@ impl World {
         self.loads = loads;
     }
 
+    /// Forgets the forces upon a body that goes: another may come by its name.
+    pub(super) fn stop_pushing(&mut self, id: GlobalId) {
+        self.forces.retain(|force| force.id != id);
+    }
+
     /// Once bodies are with their tiles, and their ghosts: lets each tile know who of them is pushed.
     pub(crate) fn aim(&mut self) {
         if !self.loads.is_empty() {

@@ -10,8 +10,10 @@ impl World {
     /// [has failed](Self::has_failed) has none to give.
     ///
     /// # Panics
-    /// If a tile is not of this world.
+    /// If a tile is not of this world, or they do not ascend; the world is left as it was.
     pub fn give_up(&mut self, tiles: &[TileId]) -> Vec<Vec<u8>> {
+        let are_here = tiles.is_sorted_by(|a, b| a < b) && tiles.iter().all(|&tile| self.place_of(tile).is_some());
+        assert!(are_here, "only who holds a tile can give it up, each once, in ascending order");
         self.settle();
         let mut leaving = tiles.iter().peekable();
         let mut blocks = Vec::with_capacity(tiles.len());
@@ -24,7 +26,6 @@ impl World {
             !leaves
         };
         (self.tiles, self.works) = all.filter(stays).unzip();
-        assert!(leaving.next().is_none(), "only who holds a tile can give it up");
         self.find_places();
         blocks
     }

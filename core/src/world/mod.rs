@@ -93,6 +93,8 @@ pub struct World {
     next_partition: Option<Partition>,
     /// Whether it has changed with the step under way.
     borders_moved: bool,
+    /// The step that failed and left all of this halfway.
+    halfway: Option<u64>,
 }
 
 /// A clock to book the time of tiles by: how long the thread that asks has worked so far, or how late it is.
@@ -162,6 +164,7 @@ impl World {
             first: 0,
             next_partition: None,
             borders_moved: false,
+            halfway: None,
             setup,
         }
     }
@@ -170,7 +173,7 @@ impl World {
     pub(crate) fn copy_bodies(&self) -> Self {
         let tiles = self.tiles.iter().map(|tile| tile.settled(&self.setup).copy_bodies(&self.setup)).collect();
         let verdict = Verdict { stop: false, meet: false, far: false, ..self.verdict };
-        Self { step: self.step, verdict, ..Self::of(Arc::clone(&self.setup), tiles) }
+        Self { step: self.step, verdict, halfway: self.halfway, ..Self::of(Arc::clone(&self.setup), tiles) }
     }
 
     /// What there is to see of each of the [`tiles`](Self::tiles), in their order, as the last step left it, or
@@ -200,7 +203,7 @@ impl World {
         self.tiles.par_iter().map(hashes).reduce(Hashes::default, Hashes::merge)
     }
 
-    /// Asks all ranks to stop: every rank's next step reports `stopped`.
+    /// Asks all ranks to stop: every rank's next step reports `stopped`, and so does each after it.
     pub fn request_stop(&mut self) {
         self.verdict.stop = true;
     }

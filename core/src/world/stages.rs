@@ -69,6 +69,30 @@ impl World {
         self.follow_bodies();
     }
 
+    /// Does what belongs to a step or an exchange, unless an earlier one has failed; keeps in mind if this one does.
+    pub(crate) fn unless_halfway<R, E>(
+        &mut self,
+        act: impl FnOnce(&mut Self) -> Result<R, StepError<E>>,
+    ) -> Result<R, StepError<E>> {
+        if let Some(step) = self.halfway {
+            return Err(StepError::Halfway { step });
+        }
+        let step = self.step;
+        let done = act(self);
+        // What is no longer finite is told by every step that follows.
+        let is_halfway = done.as_ref().is_err_and(|error| !matches!(error, StepError::NonFinite { .. }));
+        self.halfway = is_halfway.then_some(step);
+        done
+    }
+
+    /// Forgets that a step has failed, what it had to say, and what pushes at bodies.
+    pub(crate) fn begin_anew(&mut self) {
+        (self.halfway, self.verdict) = (None, Verdict::default());
+        self.forces.clear();
+        self.outbox.bags.clear();
+        self.hands.iter_mut().for_each(|hand| hand.get_mut().expect("no stage panicked").outgoing.clear());
+    }
+
     /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.
     pub fn has_failed(&self) -> bool {
         self.verdict.failure.is_some()

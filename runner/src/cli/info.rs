@@ -86,6 +86,9 @@ fn of_run(folder: &RunFolder, trouble: &mut Vec<String>) -> Result<String, RunEr
         let what = told(snapshot.check().map(|()| whole()).map_err(|error| error.to_string()));
         row(&mut text, "snapshot", &format!("after step {}: {what}", snapshot.step()));
     }
+    for step in found.incomplete {
+        row(&mut text, "snapshot", &format!("after step {step}: not complete, and passed over"));
+    }
     for error in found.unusable {
         row(&mut text, "snapshot", &told(Err(error.to_string())));
     }

@@ -22,6 +22,9 @@ pub(crate) struct State {
     /// How many lines of the step that is made next are done: more than none where a line after them was refused.
     #[serde(default, skip_serializing_if = "is_none")]
     pub(crate) done: u64,
+    /// How many lines are done in all.
+    #[serde(default)]
+    pub(crate) lines: u64,
     /// Forces that push still.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     forces: Vec<Push>,
@@ -68,6 +71,12 @@ impl State {
         }
     }
 
+    /// Counts a line that is done.
+    pub(crate) fn count_line(&mut self) {
+        self.done += 1;
+        self.lines += 1;
+    }
+
     /// Notes a command that was done after `step` steps.
     pub(crate) fn note(&mut self, command: &Command, step: u64) {
         match *command {
@@ -75,7 +84,10 @@ impl State {
                 self.added += 1;
                 self.next = self.next.max(body.id.0.saturating_add(1));
             }
-            Command::Remove(_) => self.added -= 1,
+            Command::Remove(id) => {
+                self.added -= 1;
+                self.forces.retain(|push| push.id != id.0);
+            }
             Command::SetGravity(gravity) => self.gravity = Some(gravity.to_array()),
             Command::AddKind(ref kind) => self.kinds.push(KindText::new(kind)),
             Command::Force { id, force, torque, steps } => {

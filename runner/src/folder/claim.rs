@@ -33,6 +33,7 @@ impl RunFolder {
         if !self.path().is_dir() || self.check_free(false).is_err() && !self.holds_run() {
             return Ok(None);
         }
+        self.check_links()?;
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
         let deadline = Instant::now() + if waiting.is_some() { LINGERING } else { Duration::ZERO };
         let mut told = false;
@@ -161,6 +162,20 @@ impl RunFolder {
             sleep(POLL);
         };
         Err(self.refusal(reason))
+    }
+
+    /// Refuses a folder in which something that a run writes to, or removes, is a link to what is elsewhere.
+    fn check_links(&self) -> Result<(), FolderError> {
+        let entries = fs::read_dir(self.path()).map_err(|error| self.not_writable(&error))?;
+        let is_link = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_symlink());
+        let link = entries.flatten().find(|entry| self.owns(&entry.file_name()) && is_link(entry));
+        link.map_or(Ok(()), |link| {
+            let name = link.file_name();
+            Err(self.refusal(format!(
+                "its {} is a link: a run writes to its own folder alone; put there what the link leads to",
+                name.display()
+            )))
+        })
     }
 
     fn open_lock(&self) -> io::Result<File> {

@@ -89,6 +89,7 @@ pub(super) fn told(error: RankError, complete: u64, steps: u64) -> RunError {
         RankError::Step(StepError::NonFinite { step, id }) => RunError::NonFinite { step, id },
         RankError::Step(StepError::Protocol { step, tile }) => RunError::Protocol { step, tile },
         RankError::Step(StepError::FloatMode { step }) => RunError::FloatMode { step },
+        RankError::Step(StepError::Halfway { .. }) => unreachable!("a run ends with the step that failed"),
         RankError::Step(StepError::Halo(ExchangeError::Transport(error))) => transport(error),
         RankError::Step(StepError::Halo(
             error @ (ExchangeError::Frame { from, .. } | ExchangeError::Tile { from, .. }),

@@ -119,6 +119,7 @@ impl Course {
                 StepError::NonFinite { step, id } => RunError::NonFinite { step, id },
                 StepError::Protocol { step, tile } => RunError::Protocol { step, tile },
                 StepError::FloatMode { step } => RunError::FloatMode { step },
+                StepError::Halfway { .. } => unreachable!("it ends with the step that failed"),
                 StepError::Halo(NotHere { tile }) => RunError::Protocol { step, tile },
             })?;
             course.add((step, stride), thread_time().saturating_sub(before), &mut world);

@@ -56,7 +56,7 @@ impl Summary {
         let [half_v2, spin2] = [self.mean_half_v2, self.mean_spin2].map(Figure);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;
-        row(f, "energy", format_args!("{:.6e} J, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
+        row(f, "energy", format_args!("{:.6e} J of motion, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
         // Of those before no snapshot tells.
         let since = if self.resumed_at > 0 { format!("since step {}", self.resumed_at) } else { "in all".to_owned() };
         let (ghosts, migrations) = (self.ghosts, self.migrations);

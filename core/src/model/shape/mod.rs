@@ -98,6 +98,9 @@ impl Shape {
     /// # Errors
     /// If a size is not positive and finite.
     pub fn capsule(length: f32, radius: f32) -> Result<Self, ShapeError> {
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(ShapeError::NotFinite);
+        }
         let end = Vec2::new(0.5 * length, 0.0);
         Self::polygon(&[-end, end], radius)
     }

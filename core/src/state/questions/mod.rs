@@ -65,12 +65,16 @@ impl Questions {
 }
 
 impl World {
-    /// The first body or static on the straight way from one point to another, in m. One around the first point is met at once.
+    /// The first body or static on the straight way from one point to another, in m; none if one of these is not finite. One around the
+    /// first point is met at once.
     ///
     /// The first questions after a step, or after something changed, look at each body. Where there are more, these are sorted by
     /// place; each one after that takes time that grows with the logarithm of their number, and with how much lies near the way.
     pub fn cast_ray(&self, from: DVec2, to: DVec2) -> Option<RayHit> {
         let mut best = None;
+        if !(from.is_finite() && (to - from).is_finite()) {
+            return best;
+        }
         self.fixed().cast_ray(from, to, &mut best);
         match self.sorted() {
             Some(tree) => tree.cast_ray(from, to, &mut best),

@@ -169,7 +169,8 @@ impl World {
     }
 
     /// Makes a tile what it was when `block` was saved; what it held before is forgotten. On an error it is left as it
-    /// was. The blueprint must be the one of the world that was saved.
+    /// was. The blueprint must be the one of the world that was saved, and all tiles are to be restored to one moment: a body that has gone
+    /// from one to another meanwhile would be in both, or in none.
     ///
     /// # Errors
     /// If this world does not hold the tile, or the block is not one that this version saved of it, whole and
@@ -186,9 +187,11 @@ impl World {
     }
 
     /// Counts steps on from `step`, the [`step_count`](Self::step_count) of the world that was saved: some of what a step
-    /// does depends on its number. Every rank must be told the same.
+    /// does depends on its number. Every rank must be told the same, once all of its tiles are restored. A step that failed, whatever was
+    /// asked of the next one, and forces, which are no part of tiles, are forgotten.
     pub fn resume_at(&mut self, step: u64) {
         self.step = step;
+        self.begin_anew();
     }
 }
 

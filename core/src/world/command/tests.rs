@@ -86,12 +86,12 @@ fn saved_and_restored(world: &World, exchange: Exchange, columns: u32) -> World 
         again.add_kind(kind).unwrap();
     }
     again.command(&Command::SetGravity(world.gravity())).unwrap();
-    again.forces = world.forces.clone();
     let mut rest = &bytes[..];
     for saved in saved {
         again.restore(saved.tile, rest.split_off(..saved.length).unwrap()).unwrap();
     }
     again.resume_at(world.step_count());
+    again.forces = world.forces.clone();
     again
 }
 

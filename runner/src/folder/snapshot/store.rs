@@ -66,6 +66,8 @@ pub struct Found {
     pub snapshots: Vec<Snapshot>,
     /// What is wrong with others.
     pub unusable: Vec<SnapshotError>,
+    /// The steps of those of which a part is missing, the newest first: of a run that was killed while it wrote them.
+    pub incomplete: Vec<u64>,
 }
 
 /// Finds the snapshots of a run with this identity and these tiles. Those that were not complete when the run ended are passed
@@ -89,7 +91,7 @@ pub(crate) fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<
         });
         match opened {
             Ok(Some(snapshot)) => found.snapshots.push(snapshot),
-            Ok(None) => {}
+            Ok(None) => found.incomplete.push(step),
             // Where there is a newer one, nobody may ever want this.
             Err(error) if error.is_damage() || !found.snapshots.is_empty() => found.unusable.push(error),
             Err(error) => return Err(error),

@@ -3,9 +3,23 @@
 use super::not_written;
 use crate::error::RunError;
 use crate::folder::RunFolder;
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
+
+/// What is to be said where the folder of a run that goes on has `known` lines for steps that are made, and others were `done` then.
+pub(super) fn disagreement(folder: &RunFolder, known: u64, done: u64) -> Option<String> {
+    let what = match known.cmp(&done) {
+        Ordering::Equal => return None,
+        Ordering::Less => {
+            "what it said of later steps is lost with the others, unless you bring back a good copy of it"
+        }
+        Ordering::Greater => "what was added for steps that are made is not done",
+    };
+    let path = folder.commands();
+    Some(format!("{}: it has {known} of the {done} lines that were done; {what}", path.display()))
+}
 
 /// See the head of this file.
 pub(super) struct Kept {

@@ -187,6 +187,11 @@ impl Commander {
             let lines = lines_are(late);
             observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", self.source));
         }
+        if let (Rank(0), true, Some(output)) = (self.rank, self.is_used, &plan.output) {
+            let known = plan.commands.parted(from, self.done_before)[0].map_or(0, |(_, lines)| lines.len());
+            let disagreement = kept::disagreement(&output.folder, known as u64, self.state.lines);
+            disagreement.iter().for_each(|text| observer.note(text));
+        }
         Ok(())
     }
 
@@ -380,7 +385,7 @@ impl Commander {
         for (place, line) in lines.iter().enumerate() {
             if let Action::Ask(question) = &line.action {
                 asked.push((line, question));
-                self.state.done += 1;
+                self.state.count_line();
                 continue;
             }
             self.answer(&std::mem::take(&mut asked), world, transport)?;
@@ -402,7 +407,7 @@ impl Commander {
                     continue;
                 }
             };
-            self.state.done += 1;
+            self.state.count_line();
             for command in &commands {
                 world.command(command).map_err(RankError::Setup)?;
                 self.state.note(command, step);
