@@ -141,6 +141,9 @@ impl WholeFile {
     }
 
     fn probe(&self) -> io::Result<()> {
+        if self.path == Path::new("-") {
+            return Err(io::Error::other("for standard output name /dev/stdout, and ./- for a file of that name"));
+        }
         if self.path.is_dir() {
             return Err(io::Error::other("it is a directory"));
         }

@@ -200,6 +200,7 @@ fn options_for_a_folder_need_one() {
 fn a_path_that_cannot_be_written_is_refused_before_anything_heavy() {
     refused("--json no/such/folder/summary.json", "--json no/such/folder/summary.json: ");
     refused("--json .", "--json .: it is a directory");
+    refused("--json -", "--json -: for standard output name /dev/stdout");
     refused("--json world.toml/summary.json", "--json world.toml/summary.json: ");
     refused("--timings no/such/folder/times.csv", "--timings no/such/folder/times.csv: ");
     refused("--timings .", "--timings .: it is a directory");
