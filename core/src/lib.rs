@@ -58,7 +58,7 @@
 //! tile and has the same [`Blueprint`]; [`World::resume_at`] sets the number of the next step. What follows is the same,
 //! bit for bit, as if the run had never stopped, whichever rank holds which tile. Where the bytes are kept is for the
 //! caller to see to; and so is what a [`Command`] did to the world beside its bodies: kinds that were added (add them before tiles are
-//! restored), gravity, forces that push yet, and that [`World::insert`] gives no name again.
+//! restored), gravity, forces that push yet (begin them after `resume_at`), and that [`World::insert`] gives no name again.
 //!
 //! # What determinism promises
 //!

@@ -40,6 +40,28 @@ fn each(angles: &[f32], mut test: impl FnMut(&str, DVec2, (u32, u32), Exchange, 
     }
 }
 
+/// Alone, and beside somebody else: who begins a step faster than it may goes no further than the limit, and who is damped no further than
+/// without damping.
+#[test]
+fn nobody_goes_further_than_the_limit_of_speed_has_it() {
+    for (limit, damping) in [(10.0, 0.0), (f32::INFINITY, 1000.0)] {
+        let mut scene = Scene::new(DVec2::ZERO, -10.0);
+        scene.half = DVec2::splat(50.0);
+        (scene.params.max_linear_speed, scene.params.linear_damping) = (limit, damping);
+        let kind = scene.kind(Shape::circle(0.1), Material::default());
+        let speed = if damping > 0.0 { 20.0 } else { 1000.0 };
+        let ids = [-5.0, 5.0].map(|x| scene.body(kind, DVec2::new(x, 0.0), Vec2::new(0.0, speed)));
+        scene.body(kind, DVec2::new(5.205, 0.0), Vec2::new(0.0, speed));
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        sim.run(1);
+        // Damped so, it is left with a fifth of its speed in each of four substeps.
+        let most = if damping > 0.0 { 0.3 * speed / 240.0 } else { limit / 60.0 };
+        for way in ids.map(|id| sim.body(id).position.y) {
+            assert!((0.0..=f64::from(most)).contains(&way), "{way} m with a limit of {limit} m/s and {damping}/s");
+        }
+    }
+}
+
 #[test]
 fn a_disc_never_passes_a_thin_wall() {
     each(&[0.0, 0.4], |what, place, grid, exchange, velocity, from| {

@@ -251,6 +251,47 @@ fn all_that_resume_wait_for_the_one_that_runs() {
     assert!(waited > 0, "nobody ever waited");
 }
 
+/// A run that goes on says where its folder tells of other commands than were done, and once.
+#[test]
+fn commands_that_were_lost_or_added_are_told_of() {
+    let folder = tempdir().unwrap();
+    let (run, script) = (folder.path().join("run"), folder.path().join("c.jsonl"));
+    let lines = "{\"step\": 5, \"wake\": 20}\n{\"step\": 8, \"body\": 20}\n{\"step\": 50, \"gravity\": [0, -5]}\n";
+    fs::write(&script, lines).unwrap();
+    let ended = program::run(begin("--out", &run).arg("--commands").arg(&script));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let [lost, added] = ["lost", "added"].map(|name| copy(&run, name));
+    fs::remove_file(lost.join("commands.jsonl")).unwrap();
+    fs::write(added.join("commands.jsonl"), format!("{{\"step\": 3, \"wake\": 21}}\n{lines}")).unwrap();
+    let told = ["has 0 of the 2 lines that were done", "has 3 lines for steps that are made, of which 2 were done"];
+    for (run, expected) in [(&run, None), (&lost, Some(told[0])), (&added, Some(told[1]))] {
+        for steps in ["40", "45"] {
+            let ended = program::run(resume(run).args(["--steps", steps]));
+            let is_told = told.map(|text| ended.stderr.contains(text));
+            let expected = told.map(|text| expected == Some(text) && steps == "40");
+            assert!(ended.code == Some(0) && is_told == expected, "to {steps}: {ended}");
+        }
+    }
+}
+
+/// What a run writes, or removes, lies in its own folder.
+#[cfg(unix)]
+#[test]
+fn links_out_of_the_folder_are_refused() {
+    let (folder, run) = recorded("run");
+    for name in ["lock", "rank-00001", "snapshots", "log.csv"] {
+        let linked = copy(&run, &format!("linked-{name}"));
+        let (link, outside) = (linked.join(name), folder.path().join(format!("outside-{name}")));
+        fs::rename(&link, &outside).unwrap();
+        std::os::unix::fs::symlink(&outside, &link).unwrap();
+        let before = contents(folder.path());
+        for command in [&mut resume(&linked), begin("--out", &linked).arg("--overwrite")] {
+            assert_refused(&program::run(command), 2, &format!("its {name} is a link"));
+        }
+        assert_eq!(contents(folder.path()), before);
+    }
+}
+
 #[test]
 fn a_summary_that_cannot_be_read_counts_as_missing() {
     let (_folder, run) = recorded("run");

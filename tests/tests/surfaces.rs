@@ -100,6 +100,32 @@ fn a_disc_that_glides_past_a_corner_is_not_kicked() {
     }
 }
 
+/// Defect: the ends of a capsule were met as if they were faces, by who came beside them as well.
+#[test]
+fn a_disc_meets_the_end_of_a_capsule_or_passes_by() {
+    let smooth = Material { friction: 0.0, restitution: 1.0, ..Material::default() };
+    for speed in [5.0, 40.0] {
+        for beside in [0.0, 0.05, 0.1, 0.15, 0.19, 0.21, 0.25] {
+            for phase in 0..5 {
+                let mut scene = Scene::new(MIDDLE, 0.0);
+                let capsule = scene.kind(Shape::capsule(2.0, 0.1).unwrap(), Material { density: 1e5, ..smooth });
+                let disc = scene.kind(Shape::circle(0.1), smooth);
+                scene.body(capsule, MIDDLE, Vec2::ZERO);
+                let start = DVec2::new(1.5 + f64::from(speed) / 60.0 * f64::from(phase) / 5.0, beside);
+                let id = scene.body(disc, MIDDLE + start, Vec2::new(-speed, 0.0));
+                let mut sim = scene.start_on((1, 1), Exchange::Step);
+                sim.run((60.0 * 0.6 / speed) as u32 + 2);
+                // The normal of the touch, if there is one.
+                let y = beside as f32 / 0.2;
+                let normal = Vec2::new((1.0 - y * y).max(0.0).sqrt(), y);
+                let closing = if y < 1.0 { speed * normal.x } else { 0.0 };
+                let off = (sim.body(id).velocity - (normal * (2.0 * closing) - Vec2::X * speed)).length() / speed;
+                assert!(off < 0.01, "{beside} m beside at {speed} m/s, {phase}: {:?}", sim.body(id).velocity);
+            }
+        }
+    }
+}
+
 /// Defect: what struck an L of two boxes beside the seam on its back was thrown back by the side of the further box, and what slid there lost
 /// half of its speed. However the same L is cut, it is one body.
 #[test]

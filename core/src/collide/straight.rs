@@ -62,27 +62,35 @@ fn point<V: Arithmetic>(away: Vectors<V>, velocity: Vectors<V>, radius: V, dt: V
 
 /// As [`Course::first_touch`], of a center and its way seen from any outline.
 pub(super) fn first_touch_of(outline: &Convex, center: Vec2, velocity: Vec2, radius: f32, dt: f32) -> (f32, bool) {
+    let of_corner = |corner: Vec2| {
+        let ([x, y], [vx, vy]) = ((center - corner).to_array(), velocity.to_array());
+        point(Vectors::new(x, y), Vectors::new(vx, vy), radius, dt)
+    };
     let mut first = f32::INFINITY;
-    let gap = |time: f32| outline.nearest(center + velocity * time).1;
-    let mut least = if gap(0.0) < gap(dt) { (gap(0.0), 0.0) } else { (gap(dt), dt) };
     for (face, normal) in outline.normals().enumerate() {
         let [from, to] = outline.edge(face);
-        let (away, [x, y]) = (center - from, velocity.to_array());
-        let (time, meets, nearest) = point(Vectors::new(away.x, away.y), Vectors::new(x, y), radius, dt);
+        let (time, meets, _) = of_corner(from);
         if meets > 0.0 {
             first = min(time, first);
         }
-        if gap(nearest) < least.0 {
-            least = (gap(nearest), nearest);
-        }
+        let (away, edge) = (center - from, to - from);
         let (height, speed) = (dot(away, normal), dot(velocity, normal));
         let time = max((height - radius) / -speed, 0.0);
-        let (along, length) = (dot(away + velocity * time, to - from), dot(to - from, to - from));
-        if height > 0.0 && speed < 0.0 && time <= dt && along == clamp(along, 0.0, length) {
+        let (along, length) = (dot(away + velocity * time, edge), dot(edge, edge));
+        // The ends of a line are faces without length: there its corners alone are met.
+        let is_over = length > 0.0 && along == clamp(along, 0.0, length);
+        if height > 0.0 && speed < 0.0 && time <= dt && is_over {
             first = min(time, first);
         }
     }
-    if first <= dt { (first, true) } else { (least.1, false) }
+    if first <= dt {
+        return (first, true);
+    }
+    let gap = |time: f32| outline.nearest(center + velocity * time).1;
+    let moments = outline.corners().map(|corner| of_corner(corner).2).chain([dt]);
+    let nearest =
+        moments.fold((gap(0.0), 0.0), |least, time| if gap(time) < least.0 { (gap(time), time) } else { least });
+    (nearest.1, false)
 }
 
 /// When what goes along an axis comes within so far of the middle, and when it leaves.
@@ -102,54 +110,46 @@ fn signed<V: Arithmetic>(number: V, sign: V) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::cases;
+    use crate::model::piece::pieces;
+    use crate::model::shape::Shape;
+    use crate::testing::{any_convex, cases};
     use proptest::prelude::*;
-
-    /// How far a place is from a box.
-    fn distance(place: [f32; 2], half: [f32; 2]) -> f32 {
-        let [x, y] = [0, 1].map(|axis| (place[axis].abs() - half[axis]).max(0.0));
-        (x * x + y * y).sqrt()
-    }
 
     proptest! {
         #![proptest_config(cases(2048))]
 
-        /// As seen in many moments, one after the other.
+        /// As seen in many moments, one after the other: of a box both ways, of other shapes by their outlines.
         #[test]
         fn nobody_touches_before_the_moment_that_is_told(
+            kind in any_convex(0.1, 2.0),
             center in [-3.0..3.0_f32, -3.0..3.0_f32],
             velocity in [-300.0..300.0_f32, -300.0..300.0_f32],
             upright in 0..4_u8,
-            half in [0.1..2.0_f32, 0.1..2.0_f32],
             radius in 0.05..1.0_f32,
         ) {
-            let velocity = match upright {
-                0 => [0.0, velocity[1]],
-                1 => [velocity[0], 0.0],
-                _ => velocity,
-            };
-            prop_assume!(distance(center, half) > radius + 1e-3);
-            let dt = 1.0 / 60.0;
-            let [center_at, going, extents] = [center, velocity, half].map(|[x, y]| Vectors::new(x, y));
-            let course = Course { center: center_at, velocity: going, half: extents, radius };
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            let outline = Convex::new(
-                &corners.map(|(x, y)| Vec2::from(half) * Vec2::new(x, y)),
-                &[Vec2::NEG_Y, Vec2::X, Vec2::Y, Vec2::NEG_X],
-            );
-            let of_outline = first_touch_of(&outline, center.into(), velocity.into(), radius, dt);
-            for (time, touches) in [course.first_touch(dt), (of_outline.0, f32::from(u8::from(of_outline.1)))] {
-            prop_assert!((0.0..=dt).contains(&time));
-            let gap = |time: f32| {
-                let place = [0, 1].map(|axis| center[axis] + velocity[axis] * time);
-                distance(place, half) - radius
-            };
-            if touches > 0.0 {
-                prop_assert!(gap(time).abs() < 2e-5, "{} at {time}", gap(time));
+            let (center, velocity) = (Vec2::from(center), match upright {
+                0 => Vec2::new(0.0, velocity[1]),
+                1 => Vec2::new(velocity[0], 0.0),
+                _ => Vec2::from(velocity),
+            });
+            let piece = pieces(&kind.shape)[0];
+            let (reach, dt) = (radius + piece.radius, 1.0 / 60.0);
+            let gap = |time: f32| piece.outline.nearest(center + velocity * time).1 - reach;
+            prop_assume!(gap(0.0) > 1e-3);
+            let mut told = vec![first_touch_of(&piece.outline, center, velocity, reach, dt)];
+            if let Shape::Box { half } = kind.shape {
+                let [center, velocity, half] = [center, velocity, half].map(|v| Vectors::new(v.x, v.y));
+                let (time, touches) = Course { center, velocity, half, radius: reach }.first_touch(dt);
+                told.push((time, touches > 0.0));
             }
-            let until = if touches > 0.0 { time } else { dt };
-            let least = (0..=400).map(|k| gap(until * k as f32 / 400.0)).fold(f32::INFINITY, f32::min);
-            prop_assert!(least > -2e-5, "{least} before {until}");
+            for (time, touches) in told {
+                prop_assert!((0.0..=dt).contains(&time));
+                if touches {
+                    prop_assert!(gap(time).abs() < 4e-5, "{} at {time}", gap(time));
+                }
+                let until = if touches { time } else { dt };
+                let least = (0..=400).map(|k| gap(until * k as f32 / 400.0)).fold(f32::INFINITY, f32::min);
+                prop_assert!(least > -4e-5, "{least} before {until}");
             }
         }
     }

@@ -3,8 +3,8 @@
 //! A contact of bodies that meet fast must act as they touch and not before: its normal is that of the touch, and friction
 //! pulls where surfaces are then (E. Routh, "Dynamics of a System of Rigid Bodies", 1860, for what one collision of rough
 //! bodies leaves). So both are moved along their free path, turning included, until they touch, by conservative advancement
-//! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013),
-//! and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
+//! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013), or
+//! where one is round and the other hardly turns in closed form (`straight.rs`), and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
 mod meeting;
 mod stopped;
@@ -285,7 +285,7 @@ impl<'a> Approach<'a> {
     }
 
     /// The moment in which the two, apart now, touch, and whether that is within so many seconds; if not, the last one in which it was seen
-    /// that they do not yet, or of circles that in which they are nearest.
+    /// that they do not yet, or of round ones and what hardly turns about that in which they are nearest.
     #[inline(never)]
     fn first_touch(&self, now: &Moment, reach: f32, dt: f32) -> (Moment, bool) {
         if self.a.is_round() && self.b.is_round() {

@@ -271,7 +271,8 @@ impl<V: Wide> Pairs<V> {
     }
 
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the time that is looked
-    /// [`ahead`](Self::ahead); for the others the last that was looked at, or of circles that are near that in which they are nearest.
+    /// [`ahead`](Self::ahead); for the others the last that was looked at, or of circles, and of those that hardly turn, about that in
+    /// which they are nearest.
     #[inline(always)]
     fn first_touch(&self, now: &Moments<V>, asked: V, near: V, setup: &Setup) -> (Moments<V>, V) {
         let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.ahead(near, setup));

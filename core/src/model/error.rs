@@ -26,8 +26,8 @@ pub enum SetupError {
     },
     /// A static body.
     #[error(
-        "static body {id}: its name must be its own, its position finite, its rotation of length one, its sizes positive and finite, \
-         its speed at most 1e9 m/s"
+        "static body {id}: its name must be its own, its position finite, its rotation of length one, its sizes and \
+         density positive and finite, friction at least 0, restitution within 0 to 1, its speed at most 1e9 m/s"
     )]
     BadStatic {
         /// Its name.

@@ -38,6 +38,20 @@ pub(crate) struct Outer<V> {
     angular_damping: V,
 }
 
+impl<V: Lanes> Outer<V> {
+    /// Velocity that gravity gives.
+    #[inline(always)]
+    pub(crate) fn gained(&self) -> Vectors<V> {
+        Vectors::new(self.gravity[0], self.gravity[1])
+    }
+
+    /// Positive where damping takes less than half of the speed.
+    #[inline(always)]
+    pub(crate) fn is_slight(&self) -> V {
+        self.linear_damping.sub(V::splat(0.5))
+    }
+}
+
 impl Motion {
     pub(crate) fn new(setup: &Setup) -> Self {
         let (h, params) = (setup.h, &setup.params);

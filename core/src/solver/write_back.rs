@@ -360,7 +360,10 @@ impl Mover<'_> {
     ) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
         let gains = if PUSHED { self.gains(first) } else { [[[0.0; LANES]; 4]; N] };
-        let before = blocks.map(|block| block.velocity);
+        let before = blocks.map(|block| {
+            let [vx, vy, _] = self.motion.limit([block.velocity.x, block.velocity.y, zero], one, one);
+            Vectors::new(vx, vy)
+        });
         for block in &mut *blocks {
             (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
         }
@@ -384,14 +387,16 @@ impl Mover<'_> {
             }
         }
         // Who flies goes in each substep by the mean of the velocities before and after: under gravity alone that is a parabola, and
-        // keeps its energy.
+        // keeps its energy. Where damping takes half of the speed in a substep that would be further than it goes.
         let half = V::splat(0.5 * self.motion.h);
-        for (block, before) in blocks.iter_mut().zip(before) {
-            block.moved = block.moved.plus(before.minus(block.velocity).scaled(half));
+        for (i, (block, before)) in blocks.iter_mut().zip(before).enumerate() {
+            let outer = if EACH { outer[i] } else { self.motion.outer() };
+            let lag = before.minus(block.velocity).scaled(half);
+            block.moved = Vectors::pick(outer.is_slight(), block.moved.plus(lag), block.moved);
         }
     }
 
-    /// Lets those of eight solved bodies go as who flies whom nothing has pushed, as their velocities tell, which these were `before`.
+    /// Lets those of eight solved bodies fall as who flies whom nothing has pushed, as their velocities tell, which these were `before`.
     #[inline(always)]
     fn fall<V: Lanes>(&self, solved: &mut Motions<V>, before: Vectors<V>, kinds: &[KindId; LANES]) {
         let outer = match &self.setup.factors[..] {
@@ -404,9 +409,10 @@ impl Mover<'_> {
             let [vx, vy, _] = self.motion.accelerate(outer, [falls.x, falls.y, zero], one, one);
             falls = Vectors::new(vx, vy);
         }
-        let (pushed, gained) = (solved.velocity.minus(falls), falls.minus(before));
+        let gained = outer.gained().scaled(V::splat(self.setup.params.integrations() as f32));
+        let pushed = solved.velocity.minus(falls);
         let unpushed = V::splat(SLIGHTLY * SLIGHTLY).mul(gained.dot(gained)).sub(pushed.dot(pushed));
-        let lag = before.minus(solved.velocity).scaled(V::splat(0.5 * self.motion.h));
+        let lag = gained.scaled(V::splat(-0.5 * self.motion.h));
         solved.moved = solved.moved.plus(Vectors::pick(unpushed, lag, Vectors::new(zero, zero)));
     }
 

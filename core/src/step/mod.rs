@@ -169,6 +169,7 @@ fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError
     }
     let verdict = world.exchange(halo)?;
     if let Some((step, id)) = verdict.failure {
+        world.hear_of(&verdict);
         return Err(StepError::NonFinite { step, id });
     }
     world.welcome_heirs();

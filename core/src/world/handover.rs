@@ -136,6 +136,18 @@ mod tests {
     }
 
     #[test]
+    fn tiles_in_no_order_are_not_given_up() {
+        let mut world = world();
+        let before = world.hashes();
+        for tiles in [&[2, 1][..], &[1, 1], &[1, 7]] {
+            let tiles: Vec<TileId> = tiles.iter().copied().map(TileId).collect();
+            let attempt = std::panic::AssertUnwindSafe(|| world.give_up(&tiles));
+            assert!(std::panic::catch_unwind(attempt).is_err(), "{tiles:?}");
+            assert_eq!(world.hashes(), before);
+        }
+    }
+
+    #[test]
     fn the_time_of_each_tile_is_booked() {
         use std::sync::atomic::{AtomicU64, Ordering};
         use std::time::Duration;

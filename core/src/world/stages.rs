@@ -8,6 +8,7 @@ use crate::model::error::StepError;
 use crate::model::id::GlobalId;
 use crate::model::math::float_mode_is_default;
 use crate::parallel::team::Team;
+use crate::state::figures::Figures;
 use crate::step::phase::{Phase, Stopwatch};
 use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::tile::{Fault, Tile, TileCounts};
@@ -85,17 +86,28 @@ impl World {
         done
     }
 
-    /// Forgets that a step has failed, what it had to say, and what pushes at bodies.
+    /// Keeps in mind what another rank has said of a failure: what was sent to it is lost here as well.
+    pub(crate) fn hear_of(&mut self, verdict: &Verdict) {
+        self.verdict = self.verdict.merge(Verdict { failure: verdict.failure, ..Verdict::default() });
+    }
+
+    /// Forgets that a step has failed, what it had to say, what the next one is asked for, and what pushes at bodies.
     pub(crate) fn begin_anew(&mut self) {
-        (self.halfway, self.verdict) = (None, Verdict::default());
+        (self.halfway, self.verdict, self.next_partition) = (None, Verdict::default(), None);
+        (self.measures, self.takes_figures) = (false, false);
         self.forces.clear();
         self.outbox.bags.clear();
-        self.hands.iter_mut().for_each(|hand| hand.get_mut().expect("no stage panicked").outgoing.clear());
+        for hand in &mut self.hands {
+            let hand = hand.get_mut().expect("no stage panicked");
+            hand.outgoing.clear();
+            hand.figures = Figures::default();
+        }
+        self.forget_works();
     }
 
     /// Whether this rank already knows that the run has failed; its state is then not fit to be sent.
     pub fn has_failed(&self) -> bool {
-        self.verdict.failure.is_some()
+        self.verdict.failure.is_some() || self.halfway.is_some()
     }
 
     /// Lets all ranks hear with the next sync point whether a body of a tile that had something to do goes far.

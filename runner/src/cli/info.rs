@@ -3,7 +3,7 @@
 use super::args::InfoArgs;
 use super::console::complain;
 use super::output;
-use crate::command::Script;
+use crate::command::{Script, ScriptError};
 use crate::error::{Exit, RunError};
 use crate::folder::recording::{Recording, RecordingError, Segment, Stage};
 use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
@@ -12,7 +12,7 @@ use crate::plan::tiles;
 use crate::scene::SceneKind;
 use crate::wording::OneLine;
 use std::ffi::OsStr;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::path::Path;
 use std::{fs, iter};
 
@@ -41,12 +41,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
     };
     output::show(&text)?;
     let Some(first) = trouble.first() else { return Ok(Exit::Done) };
-    let mend = if first.ends_with("a good copy of it") { "" } else { "; remove it, or bring back a good copy of it" };
     let rest = match trouble.len() - 1 {
         0 => String::new(),
         more => format!("; the list tells of {more} more"),
     };
-    Err(folder.refusal(format!("{first}{mend}{rest}")).into())
+    Err(folder.refusal(format!("{first}{rest}")).into())
 }
 
 /// `trouble` is what is wrong with files that are damaged, of which the text tells as well.
@@ -70,29 +69,38 @@ fn of_run(folder: &RunFolder, trouble: &mut Vec<String>) -> Result<String, RunEr
     if let Some(commands) = commands(folder) {
         row(&mut text, "commands", &told(commands));
     }
-    let found = match snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles) {
+    let found = match snapshot::find_all(&folder.snapshots(), &config.identity(tiles), tiles) {
         Ok(found) => found,
         Err(error) => {
-            row(&mut text, "snapshots", &told(Err(error.to_string())));
+            row(&mut text, "snapshots", &told(Err(of_snapshot_error(&error))));
             return Ok(text);
         }
     };
-    if found.snapshots.is_empty() {
+    if found.snapshots.is_empty() && found.unusable.is_empty() {
         row(&mut text, "snapshots", "none");
     }
     for snapshot in &found.snapshots {
         let size = snapshot.files.iter().map(|file| file.path.as_path());
         let whole = || format!("{}, state hash {:032x}", megabytes(size), snapshot.hashes().state);
-        let what = told(snapshot.check().map(|()| whole()).map_err(|error| error.to_string()));
+        let what = told(snapshot.check().map(|()| whole()).map_err(|error| of_snapshot_error(&error)));
         row(&mut text, "snapshot", &format!("after step {}: {what}", snapshot.step()));
     }
     for step in found.incomplete {
         row(&mut text, "snapshot", &format!("after step {step}: not complete, and passed over"));
     }
     for error in found.unusable {
-        row(&mut text, "snapshot", &told(Err(error.to_string())));
+        row(&mut text, "snapshot", &told(Err(of_snapshot_error(&error))));
     }
     Ok(text)
+}
+
+/// What is wrong with a file, and how to mend it, where it does not say so itself.
+fn mended(damage: &dyn Display) -> String {
+    format!("{damage}; remove it, or bring back a good copy of it")
+}
+
+fn of_snapshot_error(error: &SnapshotError) -> String {
+    if error.is_damage() { mended(error) } else { error.to_string() }
 }
 
 /// How far a run came.
@@ -133,7 +141,10 @@ fn shapes(stage: &Stage) -> String {
 
 /// What there is of figures over time, or what is wrong with them.
 fn log(folder: &RunFolder) -> Result<String, String> {
-    let rows = Rows::find(&folder.log(), None, None).map_err(|error: LogError| error.to_string())?;
+    let rows = Rows::find(&folder.log(), None, None).map_err(|error: LogError| match error {
+        LogError::Read { .. } => error.to_string(),
+        LogError::Header { .. } | LogError::Row { .. } => mended(&error),
+    })?;
     let steps = rows.and_then(|rows| Some((rows.count, rows.steps?)));
     Ok(steps.map_or("none".to_owned(), |(count, (first, last))| format!("{count} rows, steps {first} to {last}")))
 }
@@ -141,11 +152,15 @@ fn log(folder: &RunFolder) -> Result<String, String> {
 /// How many commands there were and are to come, if any, or what is wrong with them.
 fn commands(folder: &RunFolder) -> Option<Result<String, String>> {
     let path = folder.commands();
+    let damage = |error: ScriptError| match error {
+        ScriptError::Read { .. } => error.to_string(),
+        ScriptError::Line { .. } => mended(&error),
+    };
     let told = |script: Script| match script.lines.len() {
         1 => "1 line".to_owned(),
         count => format!("{count} lines"),
     };
-    path.exists().then(|| Script::load_recorded(&path).map(told).map_err(|error| error.to_string()))
+    path.exists().then(|| Script::load_recorded(&path).map(told).map_err(damage))
 }
 
 fn of_snapshot(snapshot: &Snapshot) -> Result<String, SnapshotError> {

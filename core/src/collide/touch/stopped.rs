@@ -112,7 +112,8 @@ impl Approach<'_> {
     fn meets(&self, dt: f32, setup: &Setup) -> Option<Moment> {
         let reach = setup.params.speculative_distance + self.far(dt);
         let mut at = self.at(0.0, reach);
-        let mut near = if self.is_straight(dt) { 0.0 } else { NEAR };
+        let is_straight = self.is_straight(dt);
+        let near = if is_straight { 0.0 } else { NEAR };
         // Who glides along must not seem to touch what the search did not come to the end of.
         for _ in 0..SEARCHES {
             let nearest = at.manifold.nearest()?.separation;
@@ -120,11 +121,13 @@ impl Approach<'_> {
             if nearest < near && !is_distance {
                 return Some(at);
             }
-            near = NEAR;
             let touches;
             (at, touches) = self.first_touch(&at, reach, dt);
             if !touches {
                 return None;
+            }
+            if is_straight {
+                return Some(at);
             }
         }
         None

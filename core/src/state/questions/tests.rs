@@ -142,6 +142,7 @@ fn a_ray_that_begins_inside_hits_at_once_and_one_that_ends_before_does_not() {
     let inside = world.cast_ray(DVec2::new(10.5, 5.0), DVec2::new(10.5, 5.0)).unwrap();
     assert_eq!((inside.id, inside.fraction, inside.normal), (GlobalId(7), 0.0, DVec2::ZERO));
     assert_eq!(world.cast_ray(DVec2::new(12.5, 5.0), DVec2::new(12.5, 5.0)), None);
+    assert_eq!(world.cast_ray(DVec2::new(10.0, 9.0), DVec2::new(10.0, f64::NEG_INFINITY)), None);
     assert!(World::whole(&blueprint(1, 1, DVec2::ZERO)).unwrap().in_rectangle(DVec2::ZERO, DVec2::ONE).len() < 3);
 }
 

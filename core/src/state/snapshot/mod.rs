@@ -187,8 +187,9 @@ impl World {
     }
 
     /// Counts steps on from `step`, the [`step_count`](Self::step_count) of the world that was saved: some of what a step
-    /// does depends on its number. Every rank must be told the same, once all of its tiles are restored. A step that failed, whatever was
-    /// asked of the next one, and forces, which are no part of tiles, are forgotten.
+    /// does depends on its number. Every rank must be told the same, once all of its tiles are restored, to blocks of its partition; what is
+    /// not restored stays as a step that failed has left it. That failure, whatever was asked of the next step, and forces, which are no part of
+    /// tiles, are forgotten: begin them again after this.
     pub fn resume_at(&mut self, step: u64) {
         self.step = step;
         self.begin_anew();

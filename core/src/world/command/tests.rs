@@ -215,6 +215,22 @@ fn a_force_is_its_time_over_the_mass() {
 
 /// What is held by its weight hangs still; what is pushed by less than friction holds does not creep; and two that are pressed together,
 /// each by a tile of its own, stay, though nothing bears on either but what the other tile tells of it.
+/// A body that comes under the name of one that went is another.
+#[test]
+fn a_force_goes_with_its_body() {
+    let mut world = World::whole(&blueprint(Exchange::Step, 2, false)).unwrap();
+    let body = Body::at_rest(GlobalId(3), KindId(0), DVec2::new(0.0, 6.0));
+    world.add(body).unwrap();
+    let push = Command::Force { id: body.id, force: Vec2::new(4.0, 0.0), torque: 0.0, steps: 100 };
+    world.command(&push).unwrap();
+    step(&mut world, &mut Loopback).unwrap();
+    assert!(world.get(body.id).unwrap().velocity.x > 0.1);
+    world.command(&Command::Remove(body.id)).unwrap();
+    world.command(&Command::Add(body)).unwrap();
+    step(&mut world, &mut Loopback).unwrap();
+    assert_eq!(world.get(body.id).unwrap().velocity.x, 0.0);
+}
+
 #[test]
 fn forces_that_are_in_balance_move_nobody() {
     for (exchange, columns) in

@@ -77,30 +77,57 @@ pub struct Found {
 /// If there are some and all are damaged, or the newest that is not cannot be read, or is of another version or run.
 pub(crate) fn find(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, SnapshotError> {
     let mut found = Found::default();
-    let folders = folders(snapshots).map_err(|error| SnapshotError::read(snapshots, &error))?;
-    for (&step, folder) in folders.iter().rev() {
-        let opened = Snapshot::open(folder).and_then(|snapshot| {
-            let Some(snapshot) = snapshot else { return Ok(None) };
-            snapshot.check_identity(identity)?;
-            let reason = match (snapshot.step(), snapshot.tiles()) {
-                (found, _) if found != step => format!("it is of step {found}"),
-                (_, found) if found != tiles => format!("it is of {} x {} tiles", found[0], found[1]),
-                _ => return Ok(Some(snapshot)),
-            };
-            Err(SnapshotError::damaged(folder, reason))
-        });
+    for (step, opened) in all(snapshots, identity, tiles)? {
         match opened {
-            Ok(Some(snapshot)) => found.snapshots.push(snapshot),
-            Ok(None) => found.incomplete.push(step),
             // Where there is a newer one, nobody may ever want this.
-            Err(error) if error.is_damage() || !found.snapshots.is_empty() => found.unusable.push(error),
-            Err(error) => return Err(error),
+            Err(error) if !error.is_damage() && found.snapshots.is_empty() => return Err(error),
+            opened => found.add(step, opened),
         }
     }
     if found.snapshots.is_empty() && !found.unusable.is_empty() {
         return Err(SnapshotError::NoneWhole { why: Box::new(found.unusable.swap_remove(0)) });
     }
     Ok(found)
+}
+
+/// As [`find`], for who only tells of them, whatever is wrong with any.
+///
+/// # Errors
+/// If it cannot be known which there are.
+pub(crate) fn find_all(snapshots: &Path, identity: &str, tiles: [u32; 2]) -> Result<Found, SnapshotError> {
+    let mut found = Found::default();
+    all(snapshots, identity, tiles)?.for_each(|(step, opened)| found.add(step, opened));
+    Ok(found)
+}
+
+/// All snapshots, the newest first; nothing for one that is not complete.
+fn all(
+    snapshots: &Path,
+    identity: &str,
+    tiles: [u32; 2],
+) -> Result<impl Iterator<Item = (u64, Result<Option<Snapshot>, SnapshotError>)>, SnapshotError> {
+    let folders = folders(snapshots).map_err(|error| SnapshotError::read(snapshots, &error))?;
+    let open = move |step: u64, folder: &Path| {
+        let Some(snapshot) = Snapshot::open(folder)? else { return Ok(None) };
+        snapshot.check_identity(identity)?;
+        let reason = match (snapshot.step(), snapshot.tiles()) {
+            (found, _) if found != step => format!("it is of step {found}"),
+            (_, found) if found != tiles => format!("it is of {} x {} tiles", found[0], found[1]),
+            _ => return Ok(Some(snapshot)),
+        };
+        Err(SnapshotError::damaged(folder, reason))
+    };
+    Ok(folders.into_iter().rev().map(move |(step, folder)| (step, open(step, &folder))))
+}
+
+impl Found {
+    fn add(&mut self, step: u64, opened: Result<Option<Snapshot>, SnapshotError>) {
+        match opened {
+            Ok(Some(snapshot)) => self.snapshots.push(snapshot),
+            Ok(None) => self.incomplete.push(step),
+            Err(error) => self.unusable.push(error),
+        }
+    }
 }
 
 /// Removes snapshots from before `step`.

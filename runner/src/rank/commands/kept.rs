@@ -12,13 +12,15 @@ use std::io::Write;
 pub(super) fn disagreement(folder: &RunFolder, known: u64, done: u64) -> Option<String> {
     let what = match known.cmp(&done) {
         Ordering::Equal => return None,
-        Ordering::Less => {
-            "what it said of later steps is lost with the others, unless you bring back a good copy of it"
+        Ordering::Less => format!(
+            "has {known} of the {done} lines that were done; what it said of later steps is lost with the others, unless you \
+             bring back a good copy of it"
+        ),
+        Ordering::Greater => {
+            format!("has {known} lines for steps that are made, of which {done} were done; the others never are")
         }
-        Ordering::Greater => "what was added for steps that are made is not done",
     };
-    let path = folder.commands();
-    Some(format!("{}: it has {known} of the {done} lines that were done; {what}", path.display()))
+    Some(format!("{} {what}", folder.commands().display()))
 }
 
 /// See the head of this file.

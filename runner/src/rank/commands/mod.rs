@@ -45,6 +45,8 @@ pub(super) struct Commander {
     answers: Option<AnswersFile>,
     /// Of one rank of a run that has a folder.
     kept: Option<Kept>,
+    /// What the folder tells of what was done before, where it is not so.
+    disagreement: Option<String>,
     /// Of the lines of a turn, the places of those that were refused.
     refused: BTreeSet<usize>,
     /// How to go on with a run that ends too early, if it can be.
@@ -106,13 +108,17 @@ impl Commander {
         let commands = &plan.commands;
         let from = resumed.unwrap_or(0);
         let is_used = state.is_some();
-        let state = match state {
+        let mut state = match state {
             Some(state) => state,
             None => State::new(next_name(plan, world, transport)?),
         };
         let done_before = state.done;
         let [before, to_come] = commands.parted(from, done_before);
         let folder = plan.output.as_ref().map(|output| &output.folder);
+        let known = before.map_or(0, |(_, lines)| lines.len());
+        // From here on the folder has those that it knows of.
+        let done = std::mem::replace(&mut state.lines, known as u64);
+        let disagreement = folder.zip(resumed).and_then(|(folder, _)| kept::disagreement(folder, known as u64, done));
         let mut commander = Self {
             rank,
             next: 0,
@@ -124,9 +130,8 @@ impl Commander {
             state,
             is_used,
             answers: None,
-            kept: folder
-                .filter(|_| rank == Rank(0))
-                .map(|folder| Kept::new(folder.clone(), before.map_or(0, |(_, lines)| lines.len()))),
+            kept: folder.filter(|_| rank == Rank(0)).map(|folder| Kept::new(folder.clone(), known)),
+            disagreement,
             refused: BTreeSet::new(),
             remedy: folder.map_or(String::new(), |folder| {
                 let path = folder.path().display();
@@ -187,10 +192,8 @@ impl Commander {
             let lines = lines_are(late);
             observer.note(&format!("{}: {lines} for steps before {from}, which are made; left out", self.source));
         }
-        if let (Rank(0), true, Some(output)) = (self.rank, self.is_used, &plan.output) {
-            let known = plan.commands.parted(from, self.done_before)[0].map_or(0, |(_, lines)| lines.len());
-            let disagreement = kept::disagreement(&output.folder, known as u64, self.state.lines);
-            disagreement.iter().for_each(|text| observer.note(text));
+        if let (Rank(0), Some(text)) = (self.rank, &self.disagreement) {
+            observer.note(text);
         }
         Ok(())
     }
@@ -207,7 +210,7 @@ impl Commander {
 
     /// What a snapshot is to tell of it, if there is anything.
     pub(super) fn state(&self) -> Option<&State> {
-        (self.is_used || self.state.done > 0).then_some(&self.state)
+        (self.is_used || self.state.lines > 0).then_some(&self.state)
     }
 
     /// Whether something was refused that ends the run.
