@@ -8,7 +8,6 @@ pub(crate) mod passage;
 mod piece_boxes;
 pub(crate) mod proxies;
 pub(crate) mod seams;
-mod straight;
 mod touch;
 mod wide_boxes;
 mod wide_moments;

@@ -4,24 +4,24 @@
 //! pulls where surfaces are then (E. Routh, "Dynamics of a System of Rigid Bodies", 1860, for what one collision of rough
 //! bodies leaves). So both are moved along their free path, turning included, until they touch, by conservative advancement
 //! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013), or
-//! where one is round and the other hardly turns in closed form (`straight.rs`), and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
+//! where one is round and the other hardly turns in closed form (`touch/straight.rs`), and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
 
 mod meeting;
 mod stopped;
+mod straight;
 
 pub(super) use meeting::{Meeting, Met, meet};
 pub(super) use stopped::Stopped;
+pub(super) use straight::Course;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
-use crate::collide::straight::{self, Course};
 use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
 use crate::model::piece::Piece;
-use crate::parallel::vectors::Vectors;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -354,40 +354,6 @@ impl<'a> Approach<'a> {
         }
         let time = at.time + soonest;
         if time <= dt { (self.at(max(time, 0.0), reach), true) } else { (at, false) }
-    }
-
-    /// Whether one of them is round, and the other hardly turns in so many seconds: then the moment in which they touch is known exactly.
-    #[inline(always)]
-    fn is_straight(&self, dt: f32) -> bool {
-        let is_one_round = match self.pieces {
-            None => self.a.is_round() || self.b.is_round(),
-            Some(pieces) => {
-                let is_solid = pieces.iter().all(|piece| piece.side.is_none());
-                is_solid && pieces.iter().any(|piece| piece.outline.count() == 1)
-            }
-        };
-        is_one_round && (self.a.sweep() + self.b.sweep()) * dt < NEAR
-    }
-
-    /// See [`straight`](super::straight).
-    fn first_touch_straight(&self, dt: f32) -> (f32, bool) {
-        let is_b_round = match self.pieces {
-            None => self.b.is_round(),
-            Some([_, b]) => b.outline.count() == 1,
-        };
-        let (core, way) = if is_b_round { (&self.a, 1.0) } else { (&self.b, -1.0) };
-        let seen = |v: Vec2| core.rotation.unrotate(v * way);
-        let velocity = seen(self.between);
-        let Some([a, b]) = self.pieces else {
-            let [center, velocity, half] =
-                [seen(self.offset), velocity, core.kind.extent].map(|v| Vectors::new(v.x, v.y));
-            let radius = self.a.kind.radius + self.b.kind.radius;
-            let (time, touches) = Course { center, velocity, half, radius }.first_touch(dt);
-            return (time, touches > 0.0);
-        };
-        let (outline, disc, round) = if is_b_round { (a, b, &self.b) } else { (b, a, &self.a) };
-        let center = seen(self.offset) + core.rotation.unrotate(round.rotation.rotate(disc.outline.corner(0)));
-        straight::first_touch_of(&outline.outline, center, velocity, a.radius + b.radius, dt)
     }
 
     /// The contact with the geometry of a moment, and the separations that its points have now.

@@ -4,8 +4,7 @@
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
 use super::cull::passes;
-use super::straight::Course;
-use super::touch::{DEEP, NEAR, ROUNDS};
+use super::touch::{Course, DEEP, NEAR, ROUNDS};
 use super::wide_pairs::{Pairs, TOUCHING};
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, less, tangent};

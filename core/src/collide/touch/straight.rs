@@ -4,6 +4,7 @@
 //! A search step by step ends a little before the touch. At a corner the normal is not yet that of the touch there, and who glides fast
 //! would be thrown up by a corner that it hardly comes to.
 
+use super::{Approach, NEAR};
 use crate::model::convex::Convex;
 use crate::model::math::{clamp, dot, max, min};
 use crate::parallel::lanes::Arithmetic;
@@ -12,20 +13,20 @@ use glam::Vec2;
 
 /// The way of a center, seen from a box.
 #[derive(Clone, Copy)]
-pub(super) struct Course<V> {
-    pub(super) center: Vectors<V>,
-    pub(super) velocity: Vectors<V>,
+pub(in crate::collide) struct Course<V> {
+    pub(in crate::collide) center: Vectors<V>,
+    pub(in crate::collide) velocity: Vectors<V>,
     /// Half extents of the box.
-    pub(super) half: Vectors<V>,
+    pub(in crate::collide) half: Vectors<V>,
     /// So near to the box the center is when they touch.
-    pub(super) radius: V,
+    pub(in crate::collide) radius: V,
 }
 
 impl<V: Arithmetic> Course<V> {
     /// The moment in which the two, apart now, touch, and one, if that is within so many seconds; or else about that in which they are
     /// nearest, and zero.
     #[inline(always)]
-    pub(super) fn first_touch(&self, dt: V) -> (V, V) {
+    pub(in crate::collide) fn first_touch(&self, dt: V) -> (V, V) {
         let Self { center, velocity, half, radius } = *self;
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         // First it must come into the box that has grown by the radius,
@@ -46,6 +47,43 @@ impl<V: Arithmetic> Course<V> {
     }
 }
 
+impl Approach<'_> {
+    /// Whether one of them is round, and the other hardly turns in so many seconds: then the moment in which they touch is known exactly.
+    #[inline(always)]
+    pub(super) fn is_straight(&self, dt: f32) -> bool {
+        let is_one_round = match self.pieces {
+            None => self.a.is_round() || self.b.is_round(),
+            Some(pieces) => {
+                let is_solid = pieces.iter().all(|piece| piece.side.is_none());
+                is_solid && pieces.iter().any(|piece| piece.outline.count() == 1)
+            }
+        };
+        is_one_round && (self.a.sweep() + self.b.sweep()) * dt < NEAR
+    }
+
+    /// The moment in which these two, apart now, touch, and whether that is within so many seconds; if not, about that in which they are
+    /// nearest.
+    pub(super) fn first_touch_straight(&self, dt: f32) -> (f32, bool) {
+        let is_b_round = match self.pieces {
+            None => self.b.is_round(),
+            Some([_, b]) => b.outline.count() == 1,
+        };
+        let (core, way) = if is_b_round { (&self.a, 1.0) } else { (&self.b, -1.0) };
+        let seen = |v: Vec2| core.rotation.unrotate(v * way);
+        let velocity = seen(self.between);
+        let Some([a, b]) = self.pieces else {
+            let [center, velocity, half] =
+                [seen(self.offset), velocity, core.kind.extent].map(|v| Vectors::new(v.x, v.y));
+            let radius = self.a.kind.radius + self.b.kind.radius;
+            let (time, touches) = Course { center, velocity, half, radius }.first_touch(dt);
+            return (time, touches > 0.0);
+        };
+        let (outline, disc, round) = if is_b_round { (a, b, &self.b) } else { (b, a, &self.a) };
+        let center = seen(self.offset) + core.rotation.unrotate(round.rotation.rotate(disc.outline.corner(0)));
+        first_touch_of(&outline.outline, center, velocity, a.radius + b.radius, dt)
+    }
+}
+
 /// When a center on such a way from a point comes so near to it, one if that is within so many seconds, else zero; and when it is nearest.
 #[inline(always)]
 fn point<V: Arithmetic>(away: Vectors<V>, velocity: Vectors<V>, radius: V, dt: V) -> (V, V, V) {
@@ -61,7 +99,7 @@ fn point<V: Arithmetic>(away: Vectors<V>, velocity: Vectors<V>, radius: V, dt: V
 }
 
 /// As [`Course::first_touch`], of a center and its way seen from any outline.
-pub(super) fn first_touch_of(outline: &Convex, center: Vec2, velocity: Vec2, radius: f32, dt: f32) -> (f32, bool) {
+fn first_touch_of(outline: &Convex, center: Vec2, velocity: Vec2, radius: f32, dt: f32) -> (f32, bool) {
     let of_corner = |corner: Vec2| {
         let ([x, y], [vx, vy]) = ((center - corner).to_array(), velocity.to_array());
         point(Vectors::new(x, y), Vectors::new(vx, vy), radius, dt)
