@@ -45,6 +45,12 @@ impl<V: Lanes> Outer<V> {
         Vectors::new(self.gravity[0], self.gravity[1])
     }
 
+    /// Positive where damping takes nothing.
+    #[inline(always)]
+    pub(crate) fn is_undamped(&self) -> V {
+        self.linear_damping.sub(V::splat(1.0 - f32::EPSILON))
+    }
+
     /// Positive where damping takes less than half of the speed.
     #[inline(always)]
     pub(crate) fn is_slight(&self) -> V {

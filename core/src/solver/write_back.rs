@@ -404,7 +404,9 @@ impl Mover<'_> {
             factors => self.motion.outer_of(&kinds.map(|kind| factors[kind.0 as usize])),
         };
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let mut falls = before;
+        let [vx, vy, _] = self.motion.limit([before.x, before.y, zero], one, one);
+        let start = Vectors::new(vx, vy);
+        let mut falls = start;
         for _ in 0..self.setup.params.integrations() {
             let [vx, vy, _] = self.motion.accelerate(outer, [falls.x, falls.y, zero], one, one);
             falls = Vectors::new(vx, vy);
@@ -412,7 +414,9 @@ impl Mover<'_> {
         let gained = outer.gained().scaled(V::splat(self.setup.params.integrations() as f32));
         let pushed = solved.velocity.minus(falls);
         let unpushed = V::splat(SLIGHTLY * SLIGHTLY).mul(gained.dot(gained)).sub(pushed.dot(pushed));
-        let lag = gained.scaled(V::splat(-0.5 * self.motion.h));
+        // Damped, it would go further than the solver saw.
+        let change = Vectors::pick(outer.is_undamped(), start.minus(solved.velocity), gained.scaled(V::splat(-1.0)));
+        let lag = change.scaled(V::splat(0.5 * self.motion.h));
         solved.moved = solved.moved.plus(Vectors::pick(unpushed, lag, Vectors::new(zero, zero)));
     }
 
