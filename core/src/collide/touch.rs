@@ -4,7 +4,8 @@
 //! pulls where surfaces are then (E. Routh, "Dynamics of a System of Rigid Bodies", 1860, for what one collision of rough
 //! bodies leaves). So both are moved along their free path, turning included, until they touch, by conservative advancement
 //! (B. Mirtich, "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996; E. Catto, "Continuous Collision", GDC 2013), or
-//! where one is round and the other hardly turns in closed form (`touch/straight.rs`), and the contact is made there, with the separation that leads to it from where they are now. Who would pass by makes none.
+//! where one is round and the other hardly turns in closed form (`touch/straight.rs`), and the contact is made there, with the
+//! separation that leads to it from where they are now. Who would pass by makes none.
 
 mod meeting;
 mod stopped;
@@ -204,14 +205,13 @@ impl<'a> Approach<'a> {
     /// what lets one pass over the other. What lies on a floor of boxes lies a little in each, and must not catch on the next.
     fn over_corner(&self, at: Moment) -> Moment {
         let &[one, two] = at.manifold.points() else { return at };
-        let is_solid = self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()));
         let touches = one.separation < TOUCHING || two.separation < TOUCHING;
         let along = right_perp(at.manifold.normal);
         let overlap = dot(two.anchor - one.anchor, along).abs();
         let [a, b] = [&self.a, &self.b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
         let is_little = overlap < min(TOUCHING, PASSABLE * min(a, b));
         let closing = self.closing(&at, one.anchor);
-        if !is_solid || !touches || !is_little || closing <= CREEPING {
+        if !self.is_solid() || !touches || !is_little || closing <= CREEPING {
             return at;
         }
         // From the piece of A to that of B.
@@ -228,6 +228,12 @@ impl<'a> Approach<'a> {
         over.push(ManifoldPoint { separation: -overlap, ..one });
         let over = Moment { manifold: over, ..at };
         if self.closing(&over, one.anchor) < 0.25 * closing { over } else { at }
+    }
+
+    /// Whether none of the pieces is a segment, which is solid from one side alone.
+    #[inline(always)]
+    fn is_solid(&self) -> bool {
+        self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()))
     }
 
     /// Whether one of the pieces is a segment, and the other had a contact with it along the normal of its face.
@@ -301,17 +307,8 @@ impl<'a> Approach<'a> {
         }
         let sweep = self.a.sweep() + self.b.sweep();
         let mut at = *now;
-        if self.is_straight(dt) {
-            // What is apart along a direction stays so for as long as nothing moves further along it.
-            let bound = sweep - dot(self.between, now.manifold.normal);
-            if now.manifold.nearest().is_none_or(|nearest| bound * dt < nearest.separation) {
-                return (at, false);
-            }
-            let (time, touches) = self.first_touch_straight(dt);
-            return (self.at(time, reach), touches);
-        }
         // Who goes beyond a segment is let through, and so must not come there by a step of the search.
-        let is_let_through = self.pieces.is_some_and(|pieces| pieces.iter().any(|piece| piece.side.is_some()));
+        let (is_straight, is_let_through) = (self.is_straight(dt), !self.is_solid());
         for _ in 0..if is_let_through { MORE_ROUNDS } else { ROUNDS } {
             let Some(nearest) = at.manifold.nearest() else { return (at, false) };
             // What is apart along a direction stays so for as long as nothing moves further along it.
@@ -319,6 +316,10 @@ impl<'a> Approach<'a> {
             let left = dt - at.time;
             if bound * left < nearest.separation {
                 return (at, false);
+            }
+            if is_straight {
+                let (time, touches) = self.first_touch_straight(dt);
+                return (self.at(time, reach), touches);
             }
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };

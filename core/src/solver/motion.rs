@@ -80,6 +80,12 @@ impl Motion {
         self.gravity != Vec2::ZERO
     }
 
+    /// Whether the velocity of who flies changes, but for bodies that move in ways of their own.
+    #[inline(always)]
+    pub(crate) fn accelerates(&self) -> bool {
+        self.falls() || self.linear_damping < 1.0 || self.max_linear_speed < f32::INFINITY
+    }
+
     /// What moves bodies that move as most do.
     #[inline(always)]
     pub(crate) fn outer<V: Lanes>(&self) -> Outer<V> {
@@ -124,6 +130,14 @@ impl Motion {
         }
         let limit = V::splat(self.max_angular_speed).mul(root_inertia);
         [vx, vy, w.min(limit).max(V::splat(0.0).sub(limit))]
+    }
+
+    /// Velocities of centers within the limit of speed.
+    #[inline(always)]
+    pub(crate) fn limited<V: Lanes>(&self, velocity: Vectors<V>) -> Vectors<V> {
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let [vx, vy, _] = self.limit([velocity.x, velocity.y, zero], one, one);
+        Vectors::new(vx, vy)
     }
 
     /// A rotation turned on for a substep, at length one again.

@@ -340,7 +340,7 @@ impl Mover<'_> {
         let mut outer = [alike; N];
         if !self.setup.factors.is_empty() {
             for (outer, kinds) in outer.iter_mut().zip(kinds) {
-                *outer = self.motion.outer_of(&kinds.map(|kind| self.setup.factors[kind.0 as usize]));
+                *outer = self.outer_of(kinds);
             }
         }
         if self.pushes.is_empty() {
@@ -360,10 +360,7 @@ impl Mover<'_> {
     ) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
         let gains = if PUSHED { self.gains(first) } else { [[[0.0; LANES]; 4]; N] };
-        let before = blocks.map(|block| {
-            let [vx, vy, _] = self.motion.limit([block.velocity.x, block.velocity.y, zero], one, one);
-            Vectors::new(vx, vy)
-        });
+        let before = blocks.map(|block| self.motion.limited(block.velocity));
         for block in &mut *blocks {
             (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
         }
@@ -386,6 +383,9 @@ impl Mover<'_> {
                 block.turned = self.motion.turn_on(block.turned, spin);
             }
         }
+        if !(EACH || PUSHED || self.motion.accelerates()) {
+            return;
+        }
         // Who flies goes in each substep by the mean of the velocities before and after: under gravity alone that is a parabola, and
         // keeps its energy. Where damping takes half of the speed in a substep that would be further than it goes.
         let half = V::splat(0.5 * self.motion.h);
@@ -396,16 +396,19 @@ impl Mover<'_> {
         }
     }
 
-    /// Lets those of eight solved bodies fall as who flies whom nothing has pushed, as their velocities tell, which these were `before`.
+    /// What moves bodies of kinds that move in ways of their own.
+    #[inline(always)]
+    fn outer_of<V: Lanes>(&self, kinds: &[KindId; LANES]) -> Outer<V> {
+        self.motion.outer_of(&kinds.map(|kind| self.setup.factors[kind.0 as usize]))
+    }
+
+    /// Of eight solved bodies, which had these velocities `before`, lets those fall as who flies whom nothing has pushed: their velocities
+    /// tell.
     #[inline(always)]
     fn fall<V: Lanes>(&self, solved: &mut Motions<V>, before: Vectors<V>, kinds: &[KindId; LANES]) {
-        let outer = match &self.setup.factors[..] {
-            [] => self.motion.outer(),
-            factors => self.motion.outer_of(&kinds.map(|kind| factors[kind.0 as usize])),
-        };
+        let outer = if self.setup.factors.is_empty() { self.motion.outer() } else { self.outer_of(kinds) };
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let [vx, vy, _] = self.motion.limit([before.x, before.y, zero], one, one);
-        let start = Vectors::new(vx, vy);
+        let start = self.motion.limited(before);
         let mut falls = start;
         for _ in 0..self.setup.params.integrations() {
             let [vx, vy, _] = self.motion.accelerate(outer, [falls.x, falls.y, zero], one, one);

@@ -10,7 +10,7 @@ use crate::folder::snapshot::{self, Snapshot, SnapshotError, SnapshotFile};
 use crate::folder::{Ended, LogError, Rows, RunFolder};
 use crate::plan::tiles;
 use crate::scene::SceneKind;
-use crate::wording::OneLine;
+use crate::wording::{OneLine, plural};
 use std::ffi::OsStr;
 use std::fmt::{Display, Write as _};
 use std::path::Path;
@@ -135,8 +135,7 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, String> {
 }
 
 fn shapes(stage: &Stage) -> String {
-    let plural = |count: usize, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
-    format!("{}, {}", plural(stage.kinds.len(), "kind"), plural(stage.statics.len(), "static"))
+    format!("{}, {}", plural(stage.kinds.len() as u64, "kind"), plural(stage.statics.len() as u64, "static"))
 }
 
 /// What there is of figures over time, or what is wrong with them.
@@ -156,10 +155,7 @@ fn commands(folder: &RunFolder) -> Option<Result<String, String>> {
         ScriptError::Read { .. } => error.to_string(),
         ScriptError::Line { .. } => mended(&error),
     };
-    let told = |script: Script| match script.lines.len() {
-        1 => "1 line".to_owned(),
-        count => format!("{count} lines"),
-    };
+    let told = |script: Script| plural(script.lines.len() as u64, "line");
     path.exists().then(|| Script::load_recorded(&path).map(told).map_err(damage))
 }
 

@@ -53,10 +53,7 @@ impl Approach<'_> {
     pub(super) fn is_straight(&self, dt: f32) -> bool {
         let is_one_round = match self.pieces {
             None => self.a.is_round() || self.b.is_round(),
-            Some(pieces) => {
-                let is_solid = pieces.iter().all(|piece| piece.side.is_none());
-                is_solid && pieces.iter().any(|piece| piece.outline.count() == 1)
-            }
+            Some(pieces) => self.is_solid() && pieces.iter().any(|piece| piece.outline.count() == 1),
         };
         is_one_round && (self.a.sweep() + self.b.sweep()) * dt < NEAR
     }
