@@ -264,9 +264,12 @@ impl<V: Wide> Pairs<V> {
     fn course(&self) -> Course<V> {
         let (one, back) = (V::splat(1.0), self.core_of(self.rotation).back());
         let way = self.half[0].x.if_positive(one, V::splat(0.0).sub(one));
-        let seen = |v: Vectors<V>| back.rotate(v.scaled(way));
-        let (center, velocity) = (seen(self.offset), seen(self.between));
-        Course { center, velocity, half: self.core_of(self.half), radius: self.radius[0].add(self.radius[1]) }
+        Course {
+            center: back.rotate(self.offset.scaled(way)),
+            velocity: back.rotate(self.between.scaled(way)),
+            half: self.core_of(self.half),
+            radius: self.radius[0].add(self.radius[1]),
+        }
     }
 
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within the time that is looked

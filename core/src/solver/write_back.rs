@@ -360,9 +360,13 @@ impl Mover<'_> {
     ) {
         let (h, one, zero) = (V::splat(self.motion.h), V::splat(1.0), V::splat(0.0));
         let gains = if PUSHED { self.gains(first) } else { [[[0.0; LANES]; 4]; N] };
-        let before = blocks.map(|block| self.motion.limited(block.velocity));
-        for block in &mut *blocks {
-            (block.moved, block.turned) = (Vectors::new(zero, zero), Vectors::new(one, zero));
+        let nothing = Vectors::new(zero, zero);
+        let (changes, mut before) = (EACH || PUSHED || self.motion.accelerates(), [nothing; N]);
+        for (block, before) in blocks.iter_mut().zip(&mut before) {
+            (block.moved, block.turned) = (nothing, Vectors::new(one, zero));
+            if changes {
+                *before = self.motion.limited(block.velocity);
+            }
         }
         for _ in 0..self.setup.params.integrations() {
             for (i, block) in blocks.iter_mut().enumerate() {
@@ -383,7 +387,7 @@ impl Mover<'_> {
                 block.turned = self.motion.turn_on(block.turned, spin);
             }
         }
-        if !(EACH || PUSHED || self.motion.accelerates()) {
+        if !changes {
             return;
         }
         // Who flies goes in each substep by the mean of the velocities before and after: under gravity alone that is a parabola, and
