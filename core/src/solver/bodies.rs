@@ -6,7 +6,7 @@ use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::record::{GhostRefresh, Unseen};
 use crate::model::kind::KindRow;
-use crate::model::math::{max, right_perp};
+use crate::model::math::{Rot, max, right_perp};
 use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad};
 use crate::parallel::team::Team;
@@ -358,6 +358,17 @@ impl SolverBodies {
             (Vec2::new(x, y) * root_inv_mass, (lost * lost + s * s).sqrt() * root_inv_inertia)
         };
         (place != SolverIndex::NOT_SOLVED).then(|| moved(place))
+    }
+
+    /// Moves one of these on for so many seconds, by what its velocity has become since it was that.
+    pub(crate) fn go_on(&mut self, place: usize, before: Quad, time: f32) {
+        let ([vx, vy, w, _], [_, root_inertia, root_inv_inertia, _]) = (self.velocity[place], self.weight[place]);
+        let [x, y, lost, s] = &mut self.pose[place];
+        *x += (vx - before[0]) * time;
+        *y += (vy - before[1]) * time;
+        let turned = Rot { c: 1.0 - *lost * root_inv_inertia, s: *s * root_inv_inertia };
+        let turned = Rot::from_angle((w - before[2]) * root_inv_inertia * time).after(turned);
+        (*lost, *s) = ((1.0 - turned.c) * root_inertia, turned.s * root_inertia);
     }
 
     /// How far any has gone in the step, in m, or what is so many meters from its center has, at most.

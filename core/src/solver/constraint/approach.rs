@@ -19,7 +19,7 @@ impl Approach {
     }
 
     /// When they touch, in s.
-    fn time(&self) -> f32 {
+    pub(super) fn time(&self) -> f32 {
         let Self { separation, closing, pull } = *self;
         if closing > 0.0 {
             2.0 * separation / (closing + self.touching())

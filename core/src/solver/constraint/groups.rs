@@ -4,6 +4,7 @@ use super::bounce::Answer;
 use super::columns::{Color, Columns, Each, Members, Slices, lengths};
 use super::energies::Energies;
 use super::group::{PointRows, Sides, Totals};
+use super::late::Late;
 use crate::model::contact::Contact;
 use crate::model::math::{clamp, max};
 use crate::parallel::lanes::Quad;
@@ -35,6 +36,8 @@ pub(crate) struct Groups {
     pub(super) bounces_at_once: Vec<Bounce>,
     /// What bounces may have.
     pub(super) energies: Energies,
+    /// What they lose of the step.
+    pub(super) late: Late,
     /// While contacts bounce.
     pub(super) times: Times,
     /// For each body whether something held it as the step began, where that was asked.
@@ -65,6 +68,8 @@ pub(crate) struct Bounce {
     pub(super) closing: f32,
     /// Speed of the fastest blow that it gives back or passes on, in m/s; zero if it only holds.
     pub(super) blow: f32,
+    /// How long its bodies go on from there in this step, in s, where that is known: see [`Late`].
+    pub(super) left: f32,
     /// Whether one of the two never moves.
     pub(super) off_static: bool,
     /// Of each point.

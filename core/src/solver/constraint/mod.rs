@@ -12,6 +12,7 @@
 //! | `approach.rs` | how fast surfaces are as they meet |
 //! | `bounce.rs` | the bounce of one contact |
 //! | `energies.rs` | that bounces give no energy that nobody had |
+//! | `late.rs` | what bounces lose of the step, made good |
 
 mod approach;
 mod bounce;
@@ -21,6 +22,7 @@ mod energies;
 pub(crate) mod group;
 pub(crate) mod groups;
 pub(crate) mod kernels;
+mod late;
 pub(crate) mod layout;
 mod restitution;
 pub(crate) mod rows;

@@ -80,7 +80,8 @@ impl Groups {
         }
         // Who comes in faster first: that may be all it takes, where several throw the same body back.
         let first = |bounce: &Bounce, other: &Bounce| other.closing.total_cmp(&bounce.closing);
-        let Self { bounces, bounces_at_once, lanes, energies, on, .. } = self;
+        let Self { bounces, bounces_at_once, lanes, energies, late, on, .. } = self;
+        late.find([bounces, bounces_at_once], source);
         let batch = |bounce: &Bounce| lanes[bounce.contact as usize].base;
         bounces.sort_by(first);
         bounces_at_once.sort_by(|one, other| batch(one).cmp(&batch(other)).then_with(|| first(one, other)));
@@ -101,7 +102,7 @@ impl Groups {
         let off_static = moving[1].is_none();
         let at_once = batches.of_body(self.lanes[contact].base as usize).at_once;
         let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-        bounces.push(Bounce { contact: contact as u32, moving, closing, blow: 0.0, off_static, answers });
+        bounces.push(Bounce { contact: contact as u32, moving, closing, blow: 0.0, left: 0.0, off_static, answers });
     }
 
     /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would
@@ -228,20 +229,24 @@ impl Groups {
 
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
-        let Self { bounces, lanes, kept, energies, times, .. } = self;
+        let Self { bounces, lanes, kept, energies, late, times, .. } = self;
+        late.begin(bounces, bodies);
         energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity, times));
+        late.make_good(bodies);
     }
 
     /// Bounces of a batch that is solved at once.
     pub(crate) fn apply_restitution_at_once(&mut self, batch: &Batch, bodies: &mut SolverBodies) {
-        let Self { bounces_at_once: bounces, lanes, at_once, energies, times, .. } = self;
+        let Self { bounces_at_once: bounces, lanes, at_once, energies, late, times, .. } = self;
         let before =
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
         let bounces = &bounces[own];
+        late.begin(bounces, bodies);
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
             bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], times);
         });
+        late.make_good(bodies);
     }
 }
 
@@ -262,7 +267,7 @@ impl Bounce {
         self.moving.into_iter().flatten()
     }
 
-    fn parts(&self) -> bool {
+    pub(super) fn parts(&self) -> bool {
         self.answers.iter().any(|answer| matches!(answer, Answer::Part(_)))
     }
 
@@ -322,7 +327,7 @@ impl<'a> Source<'a> {
     }
 
     /// Those of its bodies that are no statics.
-    fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
+    pub(super) fn moving(self, contact: usize) -> impl Iterator<Item = u32> {
         let sides = self.contacts.bodies[contact].into_iter().zip(self.kinds_of(contact));
         sides.filter(|(_, kind)| kind.inv_mass > 0.0).map(|(body, _)| body)
     }
@@ -346,6 +351,19 @@ impl<'a> Source<'a> {
 
     /// How a point's surfaces meet, or are about to.
     fn meeting(self, contact: usize, point: usize) -> Meeting {
+        let (approach, slip, axes) = self.approach(contact, point);
+        let [a_falls, b_falls] = self.kinds_of(contact).map(|kind| kind.inv_mass > 0.0);
+        let gain = if a_falls && b_falls { Vec2::ZERO } else { self.bodies.static_gain_in(contact as u32) };
+        if gain == Vec2::ZERO {
+            let closing = if approach.closing > 0.0 { approach.touching() } else { approach.closing };
+            return Meeting { closing, slip, lead: [0.0; 2], push: 0.0 };
+        }
+        let gain = if a_falls { -gain } else { gain };
+        approach.of_oscillating(axes.map(|axis| dot(gain, axis)), slip, self.setup)
+    }
+
+    /// How a point's surfaces come nearer, how fast they slide along each other, and normal and tangent.
+    pub(super) fn approach(self, contact: usize, point: usize) -> (Approach, f32, [Vec2; 2]) {
         let (bodies, setup, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
         let separation = max(self.contacts.separation[contact][point], 0.0);
         let Contact { normal, offset, points, .. } = &self.tile.contacts.contacts[contact];
@@ -356,19 +374,12 @@ impl<'a> Source<'a> {
             let falls = kind.inv_mass > 0.0;
             let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
             let belt = tangent * (runs * kind.material.surface_speed);
-            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity, falls)
+            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
         };
-        let ((velocity_a, gravity_a, a_falls), (velocity_b, gravity_b, b_falls)) =
+        let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
             (motion(a, anchor, 1.0), motion(b, anchor - offset, -1.0));
         let (velocity, gravity) = (velocity_b - velocity_a, gravity_b - gravity_a);
         let approach = Approach { separation, closing: -dot(velocity, *normal), pull: -dot(gravity, *normal) };
-        let slip = dot(velocity, tangent);
-        let gain = if a_falls && b_falls { Vec2::ZERO } else { self.bodies.static_gain_in(contact as u32) };
-        if gain == Vec2::ZERO {
-            let closing = if approach.closing > 0.0 { approach.touching() } else { approach.closing };
-            return Meeting { closing, slip, lead: [0.0; 2], push: 0.0 };
-        }
-        let gain = if a_falls { -gain } else { gain };
-        approach.of_oscillating([*normal, tangent].map(|axis| dot(gain, axis)), slip, setup)
+        (approach, dot(velocity, tangent), [*normal, tangent])
     }
 }
