@@ -23,6 +23,7 @@ use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
 use crate::model::piece::Piece;
+use crate::parallel::lanes::Arithmetic;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -38,9 +39,20 @@ const RECYCLE_COSINE_OF_STATICS: f32 = 0.999_987_5;
 const KEPT_BY_SIZE: f32 = 0.2;
 const KEPT_BY_PATCH: f32 = 0.025;
 
-/// The search for a touch ends with surfaces this near, in m; from deeper than the second it takes a step back.
+/// The search for a touch ends with surfaces this near, in m; from deeper than the second it takes a step back. Of small bodies both are
+/// less: see [`scale_of`].
 pub(super) const NEAR: f32 = 0.0002;
 pub(super) const DEEP: f32 = -0.01;
+
+/// One by this bounding radius, in m.
+const PER_ROOMY: f32 = 8.0;
+
+/// What is near, or touches, is so as seen from the smaller of two bodies, if that is small: which part of [`NEAR`], [`DEEP`], [`TOUCHING`] and
+/// [`ROLLING`] counts, by their bounding radii.
+#[inline(always)]
+pub(super) fn scale_of<V: Arithmetic>([a, b]: [V; 2]) -> V {
+    a.min(b).mul(V::splat(PER_ROOMY)).min(V::splat(1.0))
+}
 
 /// Steps of the search, at most. A last one mends what they leave.
 pub(super) const ROUNDS: usize = 3;
@@ -186,9 +198,11 @@ impl<'a> Approach<'a> {
         let reach = setup.params.speculative_distance + far;
         let now = self.at(0.0, reach);
         let nearest = now.manifold.nearest()?.separation;
-        let near = if self.is_straight(setup.params.dt) { 0.0 } else { NEAR };
-        let is_near = nearest < near || nearest < TOUCHING && far < setup.params.speculative_distance;
-        let is_now = is_near && !now.manifold.is_distance();
+        let (scale, is_slow) = (self.scale(), far < setup.params.speculative_distance);
+        let near = if self.is_straight(setup.params.dt) { 0.0 } else { scale * NEAR };
+        // Who rests is held as he is; who comes only now, as he will touch.
+        let rests = is_slow && nearest < scale * TOUCHING && known.is_some_and(Contact::presses);
+        let is_now = (nearest < near || rests) && !now.manifold.is_distance();
         // Speeds that overflow tell of no other moment.
         if is_now || far.is_infinite() {
             return self.contact(&self.over_corner(now), known, setup);
@@ -256,6 +270,12 @@ impl<'a> Approach<'a> {
         dot(gap, gap) > near * near
     }
 
+    /// See [`scale_of`].
+    #[inline(always)]
+    fn scale(&self) -> f32 {
+        scale_of([self.a.kind.bounding_radius, self.b.kind.bounding_radius])
+    }
+
     /// How far surfaces can move against each other within the step, in m.
     #[inline(always)]
     fn far(&self, dt: f32) -> f32 {
@@ -305,7 +325,7 @@ impl<'a> Approach<'a> {
             let nearest = min(max(half / max(square, f32::MIN_POSITIVE), 0.0), dt);
             return (self.at(if touches { max(time, 0.0) } else { nearest }, reach), touches);
         }
-        let sweep = self.a.sweep() + self.b.sweep();
+        let (sweep, scale) = (self.a.sweep() + self.b.sweep(), self.scale());
         let mut at = *now;
         // Who goes beyond a segment is let through, and so must not come there by a step of the search.
         let (is_straight, is_let_through) = (self.is_straight(dt), !self.is_solid());
@@ -330,10 +350,10 @@ impl<'a> Approach<'a> {
                 continue;
             }
             let Some(nearest) = at.manifold.nearest() else { return (at, false) };
-            if nearest.separation < DEEP {
+            if nearest.separation < scale * DEEP {
                 break;
             }
-            if nearest.separation < NEAR {
+            if nearest.separation < scale * NEAR {
                 return (at, true);
             }
         }
@@ -409,16 +429,17 @@ impl<'a> Approach<'a> {
         Some((contact, separation))
     }
 
-    /// The separations of a contact whose manifold still serves: they touch, and have hardly moved against each other.
+    /// The separations of a contact whose manifold still serves: they touch, press, and have hardly moved against each other.
     ///
     /// Source: contact recycling in Box2D v3.2 (E. Catto). Without it manifolds jump between features and piles jitter for ever. Bodies
     /// rock and roll on one point: an arm that lags behind them would drive them on.
     #[inline(always)]
     fn recycle(&self, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
         let Approach { a, b, offset, .. } = self;
-        if a.is_round() || b.is_round() {
+        if a.is_round() || b.is_round() || !known.presses() {
             return None;
         }
+        let touching = self.scale() * TOUCHING;
         let (turned_a, turned_b) = (known.rotation_a.to(a.rotation), known.rotation_b.to(b.rotation));
         let least = |side: &Side<'_>| if side.kind.inv_mass > 0.0 { RECYCLE_COSINE } else { RECYCLE_COSINE_OF_STATICS };
         if !(turned_a.c > least(a) && turned_b.c > least(b)) {
@@ -433,7 +454,7 @@ impl<'a> Approach<'a> {
             let most = min(setup.params.recycle_distance, KEPT_BY_SIZE * min(a, b));
             [KEPT_BY_PATCH * (two.anchor - one.anchor).length(), most]
         } else {
-            [f32::INFINITY, min(setup.params.recycle_distance, TOUCHING)]
+            [f32::INFINITY, min(setup.params.recycle_distance, touching)]
         };
         if twist >= twist_most || dot(moved, moved).sqrt() + twist >= most {
             return None;
@@ -444,21 +465,24 @@ impl<'a> Approach<'a> {
             let swing = (turned_b.rotate(arm_b) - arm_b) - (turned_a.rotate(arm_a) - arm_a);
             point.separation + dot(shift + swing, known.normal)
         });
-        let touches = |(point, now): (&ContactPoint, f32)| point.separation < TOUCHING && now < TOUCHING;
+        let touches = |(point, now): (&ContactPoint, f32)| point.separation < touching && now < touching;
         known.points().iter().zip(separation).any(touches).then_some(separation)
     }
 
     /// The contact of a round body with what it has touched and still touches, slowly: that of the middle of the step, as in
     /// `wide_pairs.rs`, which tells why.
     fn roll(&self, known: &Contact, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-        let mut then = self.at(0.5 * setup.params.dt, f32::INFINITY);
+        if !known.presses() {
+            return None;
+        }
+        let (mut then, scale) = (self.at(0.5 * setup.params.dt, f32::INFINITY), self.scale());
         let point = *then.manifold.nearest()?;
         let normal = then.manifold.normal;
         let on_a = self.a.swing(then.turning_a, point.anchor, normal);
         let on_b = self.b.swing(then.turning_b, point.anchor - then.offset, normal);
         let nearer = dot(self.between, normal) * then.time + (on_b - on_a);
         let now = point.separation - nearer;
-        if nearer.abs() >= ROLLING || now >= TOUCHING || then.manifold.is_distance() {
+        if nearer.abs() >= scale * ROLLING || now >= scale * TOUCHING || then.manifold.is_distance() {
             return None;
         }
         // As if they had come so near at once, along the normal.

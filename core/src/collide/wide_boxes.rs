@@ -15,8 +15,8 @@ pub(super) struct WideBoxes(WidePairs);
 
 impl Shaped for WideBoxes {
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup) {
-        self.0.set(lane, tile, bodies, false, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
+        self.0.set(lane, tile, bodies, pressed, setup);
     }
 
     #[inline(always)]

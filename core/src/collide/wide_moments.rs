@@ -63,8 +63,8 @@ pub(super) trait Shaped: Default {
     /// As [`Outlook::NEEDS_REGISTERS`].
     const NEED_REGISTERS: bool = false;
 
-    /// Puts a pair into a lane.
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup);
+    /// As [`Outlook::set`].
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup);
 
     /// Looks at all lanes.
     fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
@@ -81,8 +81,8 @@ impl<S: Shaped> Outlook for PointOutlook<S> {
     const NEEDS_REGISTERS: bool = S::NEED_REGISTERS;
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, _: bool, setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, pressed, setup);
     }
 
     #[inline(always)]
@@ -188,7 +188,9 @@ impl Points {
         let now = shapes.manifolds(pairs, zero, pairs.offset, [identity; 2], reach);
         let (_, separation) = now.nearest();
         let is_slow = less(far, speculative);
-        let is_now = less(separation, V::splat(NEAR)).max(less(separation, V::splat(TOUCHING)).mul(is_slow));
+        let scale = pairs.scale();
+        let rests = less(separation, scale.mul(V::splat(TOUCHING))).mul(is_slow).mul(pairs.pressed);
+        let is_now = less(separation, scale.mul(V::splat(NEAR))).max(rests);
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
         let later = is_now.if_positive(zero, asked);
@@ -309,6 +311,7 @@ impl<V: Wide> Pairs<V> {
     fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V, dt: V) -> (Moments<V>, V) {
         let zero = V::splat(0.0);
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
+        let scale = self.scale();
         for _ in 0..ROUNDS {
             let (anchor, separation) = at.nearest();
             let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
@@ -323,8 +326,8 @@ impl<V: Wide> Pairs<V> {
             at = Moments::pick(going, &next, &at);
             going = going.mul(at.some);
             let (_, separation) = at.nearest();
-            let deep = less(separation, V::splat(DEEP)).mul(going);
-            let near = less(separation, V::splat(NEAR)).mul(going);
+            let deep = less(separation, scale.mul(V::splat(DEEP))).mul(going);
+            let near = less(separation, scale.mul(V::splat(NEAR))).mul(going);
             ending = ending.max(deep);
             found = found.max(deep.if_positive(zero, near));
             going = near.max(deep).if_positive(zero, going);

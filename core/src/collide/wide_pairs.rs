@@ -2,6 +2,7 @@
 //! touches within the step (`wide_touches.rs`).
 
 use crate::collide::broad_phase::Pair;
+use crate::collide::touch::scale_of;
 use crate::collide::wide_moments::Search;
 use crate::collide::wide_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
@@ -21,8 +22,8 @@ pub(super) const ROLLING: f32 = 0.0005;
 /// Sixteen pairs of bodies A and B, one of which is round.
 #[derive(Default, Debug)]
 pub(super) struct WidePairs {
-    /// One where they had a contact in the last step, else zero.
-    known: WideRow,
+    /// One where they pressed at each other in the last step, else zero.
+    pressed: WideRow,
     /// One where one of them is a static, else zero.
     fixed: WideRow,
     /// Velocity and rotation.
@@ -40,8 +41,8 @@ pub(super) trait Outlook: Default {
     /// Whether it takes longer than one pair after another where lanes are no registers.
     const NEEDS_REGISTERS: bool = false;
 
-    /// Puts a pair into a lane.
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup);
+    /// Puts a pair into a lane, and whether they pressed at each other in the last step.
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup);
 
     /// Tells of all lanes, also of those that were not set.
     fn look<V: Wide>(&mut self, search: Search, setup: &Setup);
@@ -75,7 +76,7 @@ pub(super) struct RoundOutlook {
 
 impl WidePairs {
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, is_known: bool, setup: &Setup) {
+    pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, pressed: bool, setup: &Setup) {
         let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
         let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
@@ -84,7 +85,7 @@ impl WidePairs {
         self.between[lane] = [offset.x, offset.y, bodies.angular_velocity[a], bodies.angular_velocity[b]];
         let (kind_a, kind_b) = (setup.kind(bodies.kind[a]), setup.kind(bodies.kind[b]));
         (self.kind_a[lane], self.kind_b[lane]) = (kind_a.outline(), kind_b.outline());
-        self.known[lane] = if is_known { 1.0 } else { 0.0 };
+        self.pressed[lane] = if pressed { 1.0 } else { 0.0 };
         self.fixed[lane] = if kind_a.inv_mass * kind_b.inv_mass == 0.0 { 1.0 } else { 0.0 };
     }
 
@@ -105,6 +106,7 @@ impl WidePairs {
             rotation: [Vectors::new(c_a, s_a), Vectors::new(c_b, s_b)],
             spin: [w_a, w_b],
             fixed: V::load(&self.fixed),
+            pressed: V::load(&self.pressed),
             dt: V::splat(setup.params.dt),
         }
     }
@@ -121,6 +123,8 @@ pub(super) struct Pairs<V> {
     pub(super) spin: [V; 2],
     /// One where one of them is a static, else zero.
     pub(super) fixed: V,
+    /// One where they pressed at each other in the last step, else zero.
+    pub(super) pressed: V,
     pub(super) dt: V,
 }
 
@@ -130,6 +134,12 @@ impl<V: Wide> Pairs<V> {
     pub(super) fn sweep(&self, side: usize) -> V {
         let speed = self.bound[side].mul(absolute(self.spin[side]));
         self.half[side].x.if_positive(speed, V::splat(0.0))
+    }
+
+    /// See [`scale_of`].
+    #[inline(always)]
+    pub(super) fn scale(&self) -> V {
+        scale_of(self.bound)
     }
 
     #[inline(always)]
@@ -191,16 +201,17 @@ impl<V: Wide> Pairs<V> {
         let anchor = from.plus(arm).minus(normal.scaled(half.mul(nearer)));
         let offset = offset.minus(normal.scaled(nearer));
         // They touch, slowly, and the center of the round one lies in no core.
-        let slow = V::splat(ROLLING).sub(absolute(nearer));
-        let rolls = slow.min(V::splat(TOUCHING).sub(now)).min(distance);
+        let scale = self.scale();
+        let slow = scale.mul(V::splat(ROLLING)).sub(absolute(nearer));
+        let rolls = slow.min(scale.mul(V::splat(TOUCHING)).sub(now)).min(distance);
         Touches { meets: rolls, unsure: zero, normal, offset, rotation, anchor, separation: now, now }
     }
 }
 
 impl Outlook for RoundOutlook {
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, is_known: bool, setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, is_known, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, pressed, setup);
     }
 
     #[inline(always)]
@@ -208,13 +219,13 @@ impl Outlook for RoundOutlook {
         let pairs = &self.pairs;
         let (both, zero) = (pairs.load::<V>(setup), V::splat(0.0));
         let is_slow = V::splat(setup.params.speculative_distance).sub(both.far());
-        let known = is_slow.if_positive(V::load(&pairs.known), zero);
+        let pressed = is_slow.if_positive(both.pressed, zero);
         // No closures here: they might be compiled without the lanes' instructions.
         let (one, mut others) = (V::splat(1.0), V::splat(1.0));
         let mut touches = Touches::none();
-        if known.any_positive() {
+        if pressed.any_positive() {
             touches = both.roll();
-            others = known.if_positive(touches.meets, zero).if_positive(zero, one);
+            others = pressed.if_positive(touches.meets, zero).if_positive(zero, one);
         }
         if others.any_positive() {
             touches = Touches::pick(others, &both.touch(setup), &touches);
@@ -278,6 +289,7 @@ mod tests {
     use crate::testing::{any_convex, any_rotation, cases};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::Partition;
+    use bytemuck::Zeroable;
     use glam::DVec2;
     use proptest::prelude::*;
 
@@ -285,29 +297,36 @@ mod tests {
     const LANE: usize = 5;
 
     /// Of a pair, in each of sixteen lanes, its contact; none where that cannot be told.
-    struct Look<'a>(&'a Tile, &'a Setup);
+    struct Look<'a>(&'a Tile, Option<&'a Contact>, &'a Setup);
 
     impl Kernel for Look<'_> {
         type Output = Option<Option<(Contact, [f32; 2])>>;
         fn run<V: Lanes>(self) -> Self::Output {
-            let Self(tile, setup) = self;
+            let Self(tile, known, setup) = self;
             let mut forms = [0, 1].map(|body| setup.kind(tile.bodies.kind[body]).form);
             forms.sort_by_key(|&form| form as usize);
             match forms {
-                [Form::Round, Form::Round | Form::Box] => told::<V::Wide, RoundOutlook>(tile, setup),
-                [Form::Box, Form::Box] => told::<V::Wide, PointOutlook<WideBoxes>>(tile, setup),
-                [Form::Box | Form::Polygon, Form::Polygon] => told::<V::Wide, PointOutlook<WidePolygons>>(tile, setup),
+                // Who pressed rolls, where one is round, and does not touch anew.
+                [Form::Round, Form::Round | Form::Box] => told::<V::Wide, RoundOutlook>(tile, None, setup),
+                [Form::Box, Form::Box] => told::<V::Wide, PointOutlook<WideBoxes>>(tile, known, setup),
+                [Form::Box | Form::Polygon, Form::Polygon] => {
+                    told::<V::Wide, PointOutlook<WidePolygons>>(tile, known, setup)
+                }
                 _ => None,
             }
         }
     }
 
-    fn told<V: Wide, O: Outlook>(tile: &Tile, setup: &Setup) -> Option<Option<(Contact, [f32; 2])>> {
+    fn told<V: Wide, O: Outlook>(
+        tile: &Tile,
+        known: Option<&Contact>,
+        setup: &Setup,
+    ) -> Option<Option<(Contact, [f32; 2])>> {
         let mut outlook = O::default();
-        (0..WIDE).for_each(|lane| outlook.set(lane, tile, [0, 1], false, setup));
+        (0..WIDE).for_each(|lane| outlook.set(lane, tile, [0, 1], known.is_some(), setup));
         outlook.look::<V>(Search::WhereManyNeedIt, setup);
         assert!(!outlook.is_postponed(LANE), "all sixteen need it, or none");
-        (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, None)))
+        (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, known)))
     }
 
     /// None at all as often as any other.
@@ -323,7 +342,7 @@ mod tests {
         fn sixteen_touch_as_one_does(
             kinds in [any_convex(0.05, 2.0), any_convex(0.05, 2.0)], (x, y) in (-3.0_f64..3.0, -3.0_f64..3.0),
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
-            spins in [any_spin(), any_spin()], rotations in [any_rotation(), any_rotation()], fixed: bool,
+            spins in [any_spin(), any_spin()], rotations in [any_rotation(), any_rotation()], fixed: bool, presses: bool,
         ) {
             let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
             let (dynamic, statics) = (kinds.to_vec(), Vec::new());
@@ -339,9 +358,14 @@ mod tests {
                 let (position, rotation, velocity, angular_velocity) = (positions[k], rotations[k], velocities[k], spins[k]);
                 tile.bodies.push(Body { id, kind, position, rotation, velocity, angular_velocity });
             }
-            let expected = touch(&tile, [0, 1], None, &setup);
+            // Whoever pressed did so at another point.
+            let point = ContactPoint { normal_impulse: 1.0, feature: ContactPoint::ABSENT - 1, ..ContactPoint::NONE };
+            let known = Contact { points: [point, ContactPoint::NONE], ..Contact::zeroed() };
+            let is_round = setup.kinds.iter().any(|kind| kind.form == Form::Round);
+            let known = (presses && !is_round).then_some(&known);
+            let expected = touch(&tile, [0, 1], known, &setup);
             for instructions in [Instructions::Auto, Instructions::Portable] {
-                let Some(found) = LaneSet::of(instructions).unwrap().run(Look(&tile, &setup)) else { continue };
+                let Some(found) = LaneSet::of(instructions).unwrap().run(Look(&tile, known, &setup)) else { continue };
                 prop_assert_eq!(found.is_some(), expected.is_some());
                 if let (Some((contact, separation)), Some((expected, now))) = (found, expected) {
                     prop_assert_eq!(bytemuck::bytes_of(&contact), bytemuck::bytes_of(&expected));

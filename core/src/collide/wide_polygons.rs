@@ -19,7 +19,7 @@ const QUADS: usize = MOST_CORNERS;
 /// A piece of each body of sixteen pairs, all of which have faces.
 #[derive(Debug)]
 pub(super) struct WidePolygons {
-    pairs: WidePairs,
+    pub(super) pairs: WidePairs,
     outlines: [[[Quad; WIDE]; QUADS]; 2],
     corners: [WideRow; 2],
     radii: [WideRow; 2],
@@ -40,9 +40,10 @@ impl Shaped for WidePolygons {
     const NEED_REGISTERS: bool = true;
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, setup: &Setup) {
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
-        self.set_pieces(lane, tile, bodies, [&kinds[0].pieces[0], &kinds[1].pieces[0]], setup);
+        self.pairs.set(lane, tile, bodies, pressed, setup);
+        self.set_pieces(lane, [&kinds[0].pieces[0], &kinds[1].pieces[0]]);
     }
 
     #[inline(always)]
@@ -56,10 +57,9 @@ impl Shaped for WidePolygons {
 }
 
 impl WidePolygons {
-    /// Puts two pieces of a pair's bodies into a lane.
+    /// Puts two pieces of the bodies of a lane into it.
     #[inline(always)]
-    pub(super) fn set_pieces(&mut self, lane: usize, tile: &Tile, bodies: Pair, pieces: [&Piece; 2], setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, false, setup);
+    pub(super) fn set_pieces(&mut self, lane: usize, pieces: [&Piece; 2]) {
         for (side, piece) in pieces.into_iter().enumerate() {
             let quads = piece.outline.quads();
             for (column, quad) in self.outlines[side].iter_mut().zip(&quads) {

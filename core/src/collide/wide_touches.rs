@@ -225,8 +225,10 @@ impl<V: Wide> Pairs<V> {
         let far = self.far();
         let nearest = now.separation;
         let is_slow = less(far, speculative);
-        let touching = less(nearest, V::splat(TOUCHING)).mul(is_slow);
-        let searched = less(self.sweep(0).add(self.sweep(1)).mul(dt), V::splat(NEAR)).if_positive(zero, V::splat(NEAR));
+        let scale = self.scale();
+        let touching = less(nearest, scale.mul(V::splat(TOUCHING))).mul(is_slow).mul(self.pressed);
+        let searched = scale.mul(V::splat(NEAR));
+        let searched = less(self.sweep(0).add(self.sweep(1)).mul(dt), searched).if_positive(zero, searched);
         let is_now = less(nearest, searched).max(touching);
         // Who passes by, who may touch later, and who is near anyway.
         let passes = passes(self.offset, self.between, self.bound[0].add(self.bound[1]), setup);
@@ -294,8 +296,8 @@ impl<V: Wide> Pairs<V> {
         let (mut last, mut at) = (found.if_positive(time.max(zero), nearest), *now);
         let mut exact = mixed.if_positive(zero, found.max(near.mul(asked)));
         if mixed.any_positive() {
-            let sweep = self.sweep(0).add(self.sweep(1));
-            let straight = less(sweep.mul(dt), V::splat(NEAR)).mul(mixed);
+            let (sweep, scale) = (self.sweep(0).add(self.sweep(1)), self.scale());
+            let straight = less(sweep.mul(dt), scale.mul(V::splat(NEAR))).mul(mixed);
             if straight.any_positive() {
                 let bound = sweep.sub(self.between.dot(now.normal));
                 let comes = less(bound.mul(dt), now.separation).if_positive(zero, straight);
@@ -317,8 +319,8 @@ impl<V: Wide> Pairs<V> {
                 let speed = V::splat(0.5).mul(bound.add(self.closing(at.anchor, at.offset, at.normal).max(zero)));
                 let next = self.at(at.time.add(at.separation.div(speed).min(left)));
                 at = Moments::pick(going, &next, &at);
-                let deep = less(at.separation, V::splat(DEEP)).mul(going);
-                let near = less(at.separation, V::splat(NEAR)).mul(going);
+                let deep = less(at.separation, scale.mul(V::splat(DEEP))).mul(going);
+                let near = less(at.separation, scale.mul(V::splat(NEAR))).mul(going);
                 ending = ending.max(deep);
                 found = found.max(deep.if_positive(zero, near));
                 going = near.max(deep).if_positive(zero, going);

@@ -66,6 +66,12 @@ impl Contact {
         1 + usize::from(self.points[1].feature != ContactPoint::ABSENT)
     }
 
+    /// Whether its bodies pressed at each other in the last substep.
+    #[inline(always)]
+    pub(crate) fn presses(&self) -> bool {
+        self.points.iter().any(|point| point.normal_impulse > 0.0)
+    }
+
     /// Which of their convex pieces touch, as their features say: those of the first body, then those of the second, above what tells
     /// apart the features of two pieces. Zero for circles and boxes.
     pub(crate) fn pieces(&self) -> u32 {

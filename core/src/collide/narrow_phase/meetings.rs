@@ -89,8 +89,7 @@ impl Kernel for Look<'_, '_> {
                 let mut numbers = [open[first]; WIDE];
                 numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
                 for (lane, &number) in numbers.iter().enumerate() {
-                    let Meeting { bodies, pieces, .. } = all[number as usize].1;
-                    outlook.pairs.set_pieces(lane, tile, bodies, pieces, setup);
+                    all[number as usize].1.set(lane, &mut outlook, tile, setup);
                 }
                 outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in numbers[..lanes].iter().enumerate() {

@@ -300,7 +300,7 @@ impl Block<'_> {
                 if in_lanes {
                     for (lane, &place) in places.iter().enumerate() {
                         let Named { bodies, known, .. } = self.named[usize::from(place)];
-                        outlook.set(lane, tile, bodies, known.is_some(), setup);
+                        outlook.set(lane, tile, bodies, known.is_some_and(Contact::presses), setup);
                     }
                     outlook.look::<V::Wide>(search, setup);
                 }

@@ -13,8 +13,8 @@ use crate::tiling::tile::Tile;
 
 /// Two pieces of a pair of bodies that may touch, and what came of it.
 pub(in crate::collide) struct Meeting<'a> {
-    pub(in crate::collide) bodies: Pair,
-    pub(in crate::collide) pieces: [&'a Piece; 2],
+    bodies: Pair,
+    pieces: [&'a Piece; 2],
     features: u32,
     /// The contact that they had in the last step.
     known: Option<&'a Contact>,
@@ -37,6 +37,20 @@ impl<'a> Meeting<'a> {
         let mut pair = Approach::new(tile, self.bodies, setup);
         (pair.pieces, pair.features) = (Some(self.pieces), self.features);
         self.outcome = Met::from(pair.touch(self.known, pair.far(setup.params.dt), setup));
+    }
+
+    /// Puts it into a lane.
+    #[inline(always)]
+    pub(in crate::collide) fn set(
+        &self,
+        lane: usize,
+        outlook: &mut PointOutlook<WidePolygons>,
+        tile: &Tile,
+        setup: &Setup,
+    ) {
+        let pressed = self.known.is_some_and(Contact::presses);
+        outlook.pairs.pairs.set(lane, tile, self.bodies, pressed, setup);
+        outlook.pairs.set_pieces(lane, self.pieces);
     }
 
     /// Takes what was seen of it in a lane.

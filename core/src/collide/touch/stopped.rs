@@ -59,7 +59,7 @@ impl Stopped {
             order = [f32::INFINITY, separation];
             by = None;
         }
-        let lift = pair.out(at.manifold.normal) * max(2.0 * NEAR - separation, 0.0);
+        let lift = pair.out(at.manifold.normal) * max(2.0 * pair.scale() * NEAR - separation, 0.0);
         Some(Self { time: at.time, order, lift, ways, by })
     }
 
@@ -113,7 +113,7 @@ impl Approach<'_> {
         let reach = setup.params.speculative_distance + self.far(dt);
         let mut at = self.at(0.0, reach);
         let is_straight = self.is_straight(dt);
-        let near = if is_straight { 0.0 } else { NEAR };
+        let near = if is_straight { 0.0 } else { self.scale() * NEAR };
         // Who glides along must not seem to touch what the search did not come to the end of.
         for _ in 0..SEARCHES {
             let nearest = at.manifold.nearest()?.separation;

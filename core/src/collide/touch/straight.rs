@@ -55,7 +55,7 @@ impl Approach<'_> {
             None => self.a.is_round() || self.b.is_round(),
             Some(pieces) => self.is_solid() && pieces.iter().any(|piece| piece.outline.count() == 1),
         };
-        is_one_round && (self.a.sweep() + self.b.sweep()) * dt < NEAR
+        is_one_round && (self.a.sweep() + self.b.sweep()) * dt < self.scale() * NEAR
     }
 
     /// The moment in which these two, apart now, touch, and whether that is within so many seconds; if not, about that in which they are
