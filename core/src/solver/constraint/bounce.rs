@@ -3,6 +3,7 @@
 use super::group::{PointRows, Sides, Totals};
 use crate::model::math::{clamp, max, min};
 use crate::parallel::lanes::Quad;
+use crate::tiling::blueprint::Setup;
 
 /// What becomes of a point that pressed in the step.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -19,6 +20,10 @@ pub(crate) enum Answer {
 /// How a blow is passed on; speeds in m/s.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Passing {
+    /// At which its surfaces come nearer.
+    pub(super) closing: f32,
+    /// How deep its bodies lie in each other, by the part that restitution does not give back, in m.
+    pub(super) lost: f32,
     /// What takes no more is no blow.
     pub(super) least: f32,
     /// No blow makes bodies come nearer faster: what takes more pressed from two sides. Until it is known how fast blows are, the speed at
@@ -26,6 +31,19 @@ pub(crate) struct Passing {
     pub(super) most: f32,
     /// Whether something held one of the two as the step began: then it stays that.
     pub(super) held: bool,
+}
+
+/// What lies deeper in each other than a blow takes bodies in this part of a step, and parts by less than that part of its speed, is stuck.
+const STUCK_BY_WAY: f32 = 0.015;
+const STUCK_BY_SPEED: f32 = 0.05;
+
+impl Passing {
+    /// Whether a blow of such a speed, in m/s, is to go no further. In a crowd that is pressed together there is one somewhere in every
+    /// step, and who passes it on holds nobody: bodies of restitution 0.01 went halfway into each other. Elastic ones lose nothing by
+    /// what they pass on, and part in the end.
+    pub(super) fn is_stuck(&self, blow: f32, setup: &Setup) -> bool {
+        self.lost > STUCK_BY_WAY * setup.params.dt * blow && self.closing > -STUCK_BY_SPEED * blow
+    }
 }
 
 /// How a point that bounces came, and how it is to part; speeds in m/s, those along the normal as seen from a static as it is in the last substep.

@@ -5,7 +5,8 @@
 //! nobody else go on, once they have bounced, by what that changed of their velocities, for the rest of the step. Under gravity they part
 //! slower, by what that takes of their speed until then.
 
-use super::bounce::{Answer, Parting};
+use super::approach::Approach;
+use super::bounce::{Answer, Parting, Passing};
 use super::groups::Bounce;
 use super::rows::Source;
 use crate::model::math::{max, min};
@@ -67,7 +68,10 @@ impl Bounce {
             Answer::Part(_) => Some(source.approach(contact, point).0),
             _ => None,
         });
-        let touch = approaches.iter().flatten().fold(dt, |first, approach| min(first, approach.time()));
+        let touch = approaches.iter().flatten().fold(f32::INFINITY, |first, approach| min(first, approach.time()));
+        if touch > dt {
+            return self.put_off(&approaches, dt);
+        }
         let (left, mut fastest) = (dt - touch, (0.0, 0.0));
         let mut answers = self.answers;
         for (answer, approach) in answers.iter_mut().zip(&approaches) {
@@ -85,6 +89,16 @@ impl Bounce {
         let (speed, taken) = fastest;
         if speed > 0.0 {
             (self.answers, self.left) = (answers, left * (1.0 + 0.5 * taken / speed));
+        }
+    }
+
+    /// The last substep looks beyond the step, and has stopped whom only the next one is to: he comes as fast as he would.
+    fn put_off(&mut self, approaches: &[Option<Approach>; 2], dt: f32) {
+        for (answer, approach) in self.answers.iter_mut().zip(approaches) {
+            if let Some(Approach { closing, pull, .. }) = *approach {
+                let most = closing + pull * dt;
+                *answer = Answer::NotYet(Passing { closing, lost: 0.0, least: f32::NEG_INFINITY, most, held: false });
+            }
         }
     }
 }

@@ -56,7 +56,8 @@ impl Groups {
                         Answer::Hold
                     } else {
                         let least = SURELY * max(closing, 0.0) + source.fall(i) + push;
-                        Answer::NotYet(Passing { least, most: max(-closing, 0.0), held: false })
+                        let lost = (restitution - 1.0) * source.contacts.separation[i][point];
+                        Answer::NotYet(Passing { closing, lost, least, most: max(-closing, 0.0), held: false })
                     };
                 }
                 self.add_bounce(i, (fastest, answers), source, batches);
@@ -192,6 +193,9 @@ impl Groups {
                 for answer in &mut bounce.answers {
                     if let Answer::NotYet(passing @ Passing { held: false, .. }) = answer {
                         passing.most = PASSED_ON * bounce.blow;
+                        if passing.is_stuck(bounce.blow, source.setup) {
+                            *answer = Answer::Hold;
+                        }
                     }
                 }
             }
