@@ -274,7 +274,8 @@ fn a_large_pile_comes_to_rest_over_its_borders() {
     assert!(facts.mean_penetration <= 0.020, "mean penetration {} m", facts.mean_penetration);
 }
 
-/// What the tiles at a border make of each other's impulses moves bodies, or does not show in their velocities.
+/// What the tiles at a border make of each other's impulses moves bodies, or does not show in their velocities. Defect: discs there kept 2 rad/s
+/// that never turned them.
 #[test]
 fn bodies_of_a_pile_over_borders_turn_as_they_spin() {
     let scene = scenes::pile(30, 20);
@@ -293,11 +294,10 @@ fn bodies_of_a_pile_over_borders_turn_as_they_spin() {
         }
         (sum / 50.0 / scene.bodies.len() as f64).sqrt()
     };
-    let on_one_tile = unlike((1, 1));
-    for tiles in [(1, 6), (3, 3), (8, 3)] {
+    for tiles in [(1, 1), (1, 6), (3, 3), (8, 3)] {
         let unlike = unlike(tiles);
-        println!("{tiles:?}: {unlike:.1e} rad/s, on one tile {on_one_tile:.1e}");
-        assert!(unlike < 2.0 * on_one_tile, "{tiles:?}: {unlike} rad/s, on one tile {on_one_tile}");
+        println!("{tiles:?}: {unlike:.1e} rad/s");
+        assert!(unlike < 5e-3, "{tiles:?}: {unlike} rad/s");
     }
 }
 

@@ -167,6 +167,16 @@ impl Sides {
         velocity[2] += normal * along + tangent * across;
     }
 
+    /// Moves both bodies apart along the normal, by so many meters in all, without turning them.
+    pub(super) fn move_apart(&self, lane: usize, way: f32, velocity: &[Quad], pose: &mut [Quad]) {
+        let [a, b] = self.normals(lane, velocity);
+        let share = way / (a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]);
+        for (body, [x, y], share) in [(self.a[lane], a, -share), (self.b[lane], b, share)] {
+            let pose = &mut pose[body as usize];
+            (pose[0], pose[1]) = (pose[0] + x * share, pose[1] + y * share);
+        }
+    }
+
     /// Separation at a point by the bodies' poses now, in meters.
     pub(crate) fn separation(&self, point: &PointRows, lane: usize, velocity: &[Quad], pose: &[Quad]) -> f32 {
         let rows = self.normal_rows(point, lane, velocity);

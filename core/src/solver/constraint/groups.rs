@@ -108,7 +108,7 @@ impl Lane {
     }
 
     /// Those of some bodies that its batch has.
-    fn bodies(self, all: &[Quad]) -> &[Quad] {
+    pub(super) fn bodies(self, all: &[Quad]) -> &[Quad] {
         &all[self.base as usize..]
     }
 

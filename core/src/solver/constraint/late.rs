@@ -7,7 +7,8 @@
 
 use super::approach::Approach;
 use super::bounce::{Answer, Parting, Passing};
-use super::groups::Bounce;
+use super::columns::Columns;
+use super::groups::{Bounce, Lane};
 use super::rows::Source;
 use crate::model::math::{max, min};
 use crate::parallel::lanes::Quad;
@@ -45,10 +46,17 @@ impl Late {
         }
     }
 
-    /// Notes the velocities of bodies that are to go on.
-    pub(super) fn begin(&mut self, bounces: &[Bounce], bodies: &SolverBodies) {
+    /// Notes the velocities of bodies that are to go on. They do so from where they touched: contacts are soft, and who was held for the rest
+    /// of the step has sunk in a little.
+    pub(super) fn begin(&mut self, bounces: &[Bounce], lanes: &[Lane], columns: &Columns, bodies: &mut SolverBodies) {
         self.before.clear();
         for bounce in bounces.iter().filter(|bounce| bounce.left > 0.0) {
+            let at = lanes[bounce.contact as usize];
+            let (sides, points, lane) = at.rows(columns);
+            let (velocity, pose) = (at.bodies(&bodies.velocity), at.bodies_mut(&mut bodies.pose));
+            let came = points.iter().filter(|point| point.first_separation[lane] >= 0.0);
+            let sunk = came.map(|point| -sides.separation(point, lane, velocity, pose)).fold(0.0, max);
+            sides.move_apart(lane, sunk, velocity, pose);
             let places = bounce.moving().map(|body| bodies.places()[body as usize].get());
             self.before.extend(places.map(|place| (place, bounce.left, bodies.velocity[place])));
         }

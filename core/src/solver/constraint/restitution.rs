@@ -234,7 +234,7 @@ impl Groups {
     /// Bounces of all batches that keep their rows.
     pub(crate) fn apply_restitution(&mut self, bodies: &mut SolverBodies) {
         let Self { bounces, lanes, kept, energies, late, times, .. } = self;
-        late.begin(bounces, bodies);
+        late.begin(bounces, lanes, kept, bodies);
         energies.keep(None, lanes, kept, bodies, |rows, velocity| bounce(bounces, lanes, rows, velocity, times));
         late.make_good(bodies);
     }
@@ -246,7 +246,7 @@ impl Groups {
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
         let bounces = &bounces[own];
-        late.begin(bounces, bodies);
+        late.begin(bounces, lanes, at_once, bodies);
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
             bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], times);
         });
