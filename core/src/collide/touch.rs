@@ -22,6 +22,7 @@ use crate::collide::wide_pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
+use crate::model::params::Exchange;
 use crate::model::piece::Piece;
 use crate::parallel::lanes::Arithmetic;
 use crate::tiling::blueprint::Setup;
@@ -137,6 +138,8 @@ struct Approach<'a> {
     pieces: Option<[&'a Piece; 2]>,
     /// Their numbers, as features of contacts name them (see [`Contact::pieces`]).
     features: u32,
+    /// See [`is_shared`].
+    shared: bool,
     /// Where one is a segment of a chain, and the other lay on its face in the last step: how far behind it that may be.
     lies: Lies,
 }
@@ -165,6 +168,20 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
     far(tile, pair, setup) < setup.params.speculative_distance
 }
 
+/// Whether another tile has a copy of the two's contact and does not say how that pressed, as with exchange "step": then both take it
+/// that it did.
+#[inline(always)]
+fn is_shared(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
+    let ghosts = tile.owned..tile.owned + tile.ghosts();
+    setup.params.exchange == Exchange::Step && pair.iter().any(|&body| ghosts.contains(&(body as usize)))
+}
+
+/// Whether the two pressed at each other in the last step, in the contact that they had then.
+#[inline(always)]
+pub(super) fn pressed(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> bool {
+    known.is_some_and(|known| known.presses() || is_shared(tile, pair, setup))
+}
+
 /// The contact of bodies A and B, of one piece each, if there is one, and the separation of its points. Not inlined: kernels ask for it seldom, and with
 /// it the compiler would take many minutes over them.
 #[inline(never)]
@@ -175,11 +192,12 @@ pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Se
 
 impl<'a> Approach<'a> {
     #[inline(always)]
-    fn new(tile: &Tile, [a, b]: Pair, setup: &'a Setup) -> Self {
+    fn new(tile: &Tile, pair: Pair, setup: &'a Setup) -> Self {
+        let [a, b] = pair;
         let offset = (tile.bodies.position[b as usize] - tile.bodies.position[a as usize]).as_vec2();
         let (a, b) = (Side::new(tile, a, setup), Side::new(tile, b, setup));
         let between = b.velocity - a.velocity;
-        Self { a, b, offset, between, pieces: None, features: 0, lies: None }
+        Self { a, b, offset, between, pieces: None, features: 0, shared: is_shared(tile, pair, setup), lies: None }
     }
 
     /// Of two pieces, if they have some.
@@ -201,7 +219,7 @@ impl<'a> Approach<'a> {
         let (scale, is_slow) = (self.scale(), far < setup.params.speculative_distance);
         let near = if self.is_straight(setup.params.dt) { 0.0 } else { scale * NEAR };
         // Who rests is held as he is; who comes only now, as he will touch.
-        let rests = is_slow && nearest < scale * TOUCHING && known.is_some_and(Contact::presses);
+        let rests = is_slow && nearest < scale * TOUCHING && known.is_some_and(|known| self.pressed(known));
         let is_now = (nearest < near || rests) && !now.manifold.is_distance();
         // Speeds that overflow tell of no other moment.
         if is_now || far.is_infinite() {
@@ -268,6 +286,12 @@ impl<'a> Approach<'a> {
         let gap = *offset + *between * min(max(nearest, 0.0), setup.params.dt);
         let near = a.kind.bounding_radius + b.kind.bounding_radius + setup.params.speculative_distance;
         dot(gap, gap) > near * near
+    }
+
+    /// Whether the two pressed at each other, as far as both tiles know that have a copy of their contact.
+    #[inline(always)]
+    fn pressed(&self, known: &Contact) -> bool {
+        self.shared || known.presses()
     }
 
     /// See [`scale_of`].
@@ -436,7 +460,7 @@ impl<'a> Approach<'a> {
     #[inline(always)]
     fn recycle(&self, known: &Contact, setup: &Setup) -> Option<[f32; 2]> {
         let Approach { a, b, offset, .. } = self;
-        if a.is_round() || b.is_round() || !known.presses() {
+        if a.is_round() || b.is_round() || !self.pressed(known) {
             return None;
         }
         let touching = self.scale() * TOUCHING;
@@ -472,7 +496,7 @@ impl<'a> Approach<'a> {
     /// The contact of a round body with what it has touched and still touches, slowly: that of the middle of the step, as in
     /// `wide_pairs.rs`, which tells why.
     fn roll(&self, known: &Contact, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-        if !known.presses() {
+        if !self.pressed(known) {
             return None;
         }
         let (mut then, scale) = (self.at(0.5 * setup.params.dt, f32::INFINITY), self.scale());

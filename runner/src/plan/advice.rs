@@ -3,11 +3,13 @@
 use super::Plan;
 use crate::config::{OutputConfig, TransportKind};
 use crate::folder::Ended;
-use atoll_core::{Blueprint, Exchange, Kind, Shape, TileId};
+use atoll_core::{Blueprint, Exchange, Ghosts, Kind, Shape, TileId};
 use std::thread;
 
 /// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
 const BOUNCY: f32 = 0.9;
+/// The same beside ghosts that nothing moves.
+const BOUNCY_BESIDE_FROZEN: f32 = 0.3;
 /// Longer steps, in s, are mentioned.
 const LONG_STEP: f32 = 1.0;
 /// Bodies whose masses are further apart are mentioned.
@@ -76,10 +78,13 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
         ));
     }
     let restitution = kinds().map(|kind| kind.material.restitution).fold(0.0, f32::max);
-    if restitution > BOUNCY && blueprint.partition.tiles() > 1 && params.exchange == Exchange::Step {
+    let is_frozen = params.ghosts == Ghosts::Frozen;
+    let bouncy = if is_frozen { BOUNCY_BESIDE_FROZEN } else { BOUNCY };
+    if restitution > bouncy && blueprint.partition.tiles() > 1 && params.exchange == Exchange::Step {
+        let by = if is_frozen { "ghosts = \"frozen\"" } else { "exchange = \"step\"" };
         notes.push(format!(
-            "restitution is {restitution}, and with exchange = \"step\" bounces over borders of tiles may gain energy: set \
-             exchange=substep, or use one tile"
+            "restitution is {restitution}, and with {by} bounces over borders of tiles may gain energy: set exchange=substep, or \
+             use one tile"
         ));
     }
     let masses = || blueprint.kinds.iter().map(|kind| kind.material.density * kind.shape.area());
@@ -132,6 +137,8 @@ mod tests {
             assert!(quiet.is_empty(), "{quiet:?}");
         }
         assert!(bouncing(1.0, &[("tiles", "1x1")]).is_empty());
+        let notes = bouncing(0.5, &[("ghosts", "frozen"), ("tiles", "2x2")]);
+        assert!(notes.len() == 1 && notes[0].starts_with("restitution is 0.5, and with ghosts"), "{notes:?}");
         let mut heavy = plan(&[]);
         heavy.blueprint.kinds[1].material.density *= 1e6;
         let notes = heavy.notes();

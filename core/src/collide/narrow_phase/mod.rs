@@ -10,7 +10,7 @@ pub(crate) use contacts::Contacts;
 use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
-use crate::collide::touch::{is_slow, recycle, touch};
+use crate::collide::touch::{is_slow, pressed, recycle, touch};
 use crate::collide::wide_boxes::WideBoxes;
 use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
@@ -300,7 +300,7 @@ impl Block<'_> {
                 if in_lanes {
                     for (lane, &place) in places.iter().enumerate() {
                         let Named { bodies, known, .. } = self.named[usize::from(place)];
-                        outlook.set(lane, tile, bodies, known.is_some_and(Contact::presses), setup);
+                        outlook.set(lane, tile, bodies, pressed(tile, bodies, known, setup), setup);
                     }
                     outlook.look::<V::Wide>(search, setup);
                 }

@@ -48,7 +48,7 @@ impl<'a> Meeting<'a> {
         tile: &Tile,
         setup: &Setup,
     ) {
-        let pressed = self.known.is_some_and(Contact::presses);
+        let pressed = super::pressed(tile, self.bodies, self.known, setup);
         outlook.pairs.pairs.set(lane, tile, self.bodies, pressed, setup);
         outlook.pairs.set_pieces(lane, self.pieces);
     }
