@@ -263,3 +263,83 @@ fn a_box_that_lands_flat_stays_down() {
         }
     }
 }
+
+/// Two free elastic bodies that meet beside each other, alone: momentum about their common center stays, and energy. Defect: bounces came at the
+/// end of the step, from where both had slid to by then, and a sixth of it was lost.
+#[test]
+fn free_bodies_that_bounce_keep_their_angular_momentum() {
+    let (disc, rod) = (Shape::circle(0.5), Shape::rectangle(2.0, 0.3));
+    for (shape, beside, turned, spin, within) in [
+        (&disc, 0.1, 0.0, 0.0, 1e-4),
+        (&disc, 0.5, 0.0, 0.0, 1e-4),
+        (&disc, 0.8, 0.0, 0.0, 1e-4),
+        (&rod, 0.6, 0.4, 1.0, 1e-2),
+        (&rod, -0.4, 1.2, -1.5, 1e-2),
+    ] {
+        for phase in 0..PHASES {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            scene.params.restitution_threshold = 0.0;
+            let kind = scene.kind(shape.clone(), bouncy(1.0));
+            for side in [-1.0, 1.0] {
+                let away = 2.5 + 10.0 / 60.0 * f64::from(phase) / f64::from(PHASES);
+                scene.body(kind, MIDDLE + DVec2::new(away, 0.5 * beside) * side, Vec2::new(-5.0 * side as f32, 0.0));
+                (scene.last().rotation, scene.last().angular_velocity) = (Rot::from_angle(turned), spin);
+            }
+            let mut sim = start(&scene);
+            let angular_momentum = |sim: &Sim| -> f64 {
+                let of = |body: &Body| {
+                    let inertia = f64::from(shape.inertia_per_mass()) * f64::from(body.angular_velocity);
+                    (body.position - MIDDLE).perp_dot(body.velocity.as_dvec2()) + inertia
+                };
+                sim.bodies().iter().map(of).sum()
+            };
+            let (before, energy) = (angular_momentum(&sim), sim.kinetic_energy());
+            sim.run(60);
+            let what = format!("{shape:?}, {beside} m beside each other");
+            assert!(sim.bodies()[0].velocity.x < 4.9, "{what}, phase {phase}: they do not meet");
+            assert_near(&what, phase, [angular_momentum(&sim), before], within);
+            assert_near(&what, phase, [sim.kinetic_energy(), energy], 1e-5);
+        }
+    }
+}
+
+/// Of all sizes alike. Defect: what was near, or touched, was so by millimeters, whatever came: boxes of 10 cm at 240 Hz were off by a tenth, of a
+/// centimeter at 60 Hz by a quarter.
+#[test]
+fn a_small_box_bounces_as_a_large_one() {
+    let (speed, spin, turned) = (3.0, 6.0_f32, 0.3_f32);
+    for (size, hertz) in [(1.0, 60.0), (1.0, 1000.0), (0.1, 240.0), (0.01, 60.0), (0.01, 960.0), (0.001, 60.0)] {
+        for phase in 0..PHASES {
+            let mut scene = Scene::new(MIDDLE, 0.0);
+            let long = size as f32;
+            scene.params.dt = 1.0 / hertz;
+            scene.params.restitution_threshold = 0.0;
+            scene.wall(MIDDLE - DVec2::new(0.0, 1.0), (10.0, 2.0), 0.0, bouncy(0.5));
+            let kind = scene.kind(Shape::rectangle(long, 0.5 * long), bouncy(0.5));
+            let height = size * (0.8 + 0.2 * f64::from(phase) / f64::from(PHASES));
+            let id = scene.body(kind, MIDDLE + DVec2::new(0.0, height), Vec2::new(0.0, -speed * long));
+            (scene.last().rotation, scene.last().angular_velocity) = (Rot::from_angle(turned), spin);
+            // When the first corner comes down, and how far beside the center: by small steps.
+            let corner = |time: f64| {
+                let (s, c) = (f64::from(turned) + f64::from(spin) * time).sin_cos();
+                let corners = [(0.5, 0.25), (0.5, -0.25), (-0.5, 0.25), (-0.5, -0.25)];
+                let corners = corners.map(|(x, y)| (x * s + y * c, x * c - y * s));
+                corners
+                    .into_iter()
+                    .fold((f64::INFINITY, 0.0), |low, corner| if corner.0 < low.0 { corner } else { low })
+            };
+            let falls = |time: f64| height / size - f64::from(speed) * time + corner(time).0 > 0.0;
+            let touch = (0..).map(|i| 1e-5 * f64::from(i)).find(|&time| !falls(time)).unwrap();
+            let (arm, inertia) = (corner(touch).1, (1.0 + 0.25) / 12.0);
+            let impulse = 1.5 * (f64::from(speed) - f64::from(spin) * arm) / (1.0 + arm * arm / inertia);
+            let expected = [impulse - f64::from(speed), f64::from(spin) + impulse * arm / inertia];
+            let mut sim = start(&scene);
+            sim.run((touch * hertz as f64) as u32 + 2);
+            let body = sim.body(id);
+            let found = [f64::from(body.velocity.y) / size, body.angular_velocity.into()];
+            let off = (found[0] - expected[0]).abs().max(0.5 * (found[1] - expected[1]).abs());
+            let what = format!("{size} m, {hertz} Hz, phase {phase}: {found:?} and not {expected:?}");
+            assert!(off < 0.02 * f64::from(speed), "{what}");
+        }
+    }
+}

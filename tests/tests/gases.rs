@@ -430,3 +430,33 @@ fn a_column_that_falls_and_bounces_gains_no_energy() {
         }
     }
 }
+
+/// A crowd that is pressed together from all sides, without gravity. Defect: with any restitution above zero a blow was passed on in each step anew,
+/// and nobody held anybody: bodies went halfway into each other, and came out with more energy than they had.
+#[test]
+fn a_crowd_does_not_go_into_itself() {
+    for (restitution, deep) in [(0.0, 0.05), (0.1, 0.05), (0.5, 0.05), (0.9, 0.08)] {
+        let mut scene = Scene::new(MIDDLE, 0.0);
+        let material = Material { restitution, ..Material::default() };
+        let kinds = [Shape::circle(0.3), Shape::rectangle(0.5, 0.4)].map(|shape| scene.kind(shape, material));
+        for k in 0..400 {
+            let place = DVec2::new((k % 20) as f64, (k / 20) as f64) - DVec2::splat(9.5);
+            let shake = Vec2::new(noise(21, 2 * k) as f32, noise(21, 2 * k + 1) as f32) - Vec2::splat(0.5);
+            let inward = -0.35 * place.as_vec2();
+            scene.body(kinds[k as usize % 2], MIDDLE + 0.8 * place, inward + 0.5 * shake);
+        }
+        for (tiles, steps) in [((1, 1), 80), ((1, 1), 110), ((1, 1), 140), ((4, 4), 110), ((4, 4), 140)] {
+            let mut sim = scene.start_on(tiles, Exchange::Substep);
+            let mut least = f64::INFINITY;
+            for _ in 0..steps {
+                sim.run(1);
+                let energy = sim.kinetic_energy();
+                assert!(energy < 1.1 * least, "restitution {restitution}, {tiles:?}: {energy} J of {least}");
+                least = least.min(energy);
+            }
+            let facts = sim.finish();
+            println!("restitution {restitution}, {tiles:?}, {steps} steps: {} m deep", facts.max_penetration);
+            assert!(facts.max_penetration < deep, "restitution {restitution}, {tiles:?}: {} m", facts.max_penetration);
+        }
+    }
+}
