@@ -26,15 +26,24 @@ impl Commands {
         self.given.as_ref().or(self.recorded.as_ref().filter(|_| !self.drives))
     }
 
-    /// The lines that were done before a run goes on `from` a step, or begins, with `done` of that step's lines; and those to come.
+    /// The lines that were done before a run goes on `from` a step, or begins, with `done` of that step's lines; and those to come. Of a
+    /// file that was given those lines of that step were done that it begins with as the recorded ones do.
     pub(crate) fn parted(&self, from: u64, done: u64) -> [Option<(&Script, &[Line])>; 2] {
+        let passed = |script: &Script| script.lines.partition_point(|line| line.step < from);
         let split = |script: &Script| {
-            let passed = script.lines.partition_point(|line| line.step < from);
-            let of_step = script.lines[passed..].partition_point(|line| line.step == from);
-            passed + of_step.min(usize::try_from(done).unwrap_or(usize::MAX))
+            let of_step = script.lines[passed(script)..].partition_point(|line| line.step == from);
+            passed(script) + of_step.min(usize::try_from(done).unwrap_or(usize::MAX))
         };
         let before = self.recorded.as_ref().map(|script| (script, &script.lines[..split(script)]));
-        [before, self.to_come().map(|script| (script, &script.lines[split(script)..]))]
+        let first_to_come = |script: &Script| match (&self.given, before) {
+            (Some(given), Some((recorded, lines))) => {
+                let were_done = recorded.texts(&lines[passed(recorded)..]);
+                let both = given.texts(&given.lines[passed(given)..]).zip(were_done);
+                passed(given) + both.take_while(|(text, done)| text == done).count()
+            }
+            _ => split(script),
+        };
+        [before, self.to_come().map(|script| (script, &script.lines[first_to_come(script)..]))]
     }
 
     /// How many lines of a file that was given are for steps before the one `from` which the run goes on, and are none of those that
@@ -88,5 +97,14 @@ mod tests {
         // Of the step itself some may be done, and are not said again.
         let resumed = commands(None, script(&[2, 5, 5, 9]), true);
         assert_eq!([0, 1, 2, 3].map(|done| resumed.record(5, done).lines().count()), [1, 2, 3, 3]);
+        // Of another file those were done that it begins with as it was; what it says instead of others is to come.
+        let woken = |names: &[u64]| {
+            let text: String = names.iter().map(|name| format!("{{\"step\": 5, \"wake\": {name}}}\n")).collect();
+            Some(Script::read(Path::new("a"), &text).unwrap())
+        };
+        for (given, to_come) in [(&[1, 3][..], 1), (&[3], 1), (&[1, 2], 0), (&[1, 2, 3], 1), (&[1], 0), (&[2, 1], 2)] {
+            let other = commands(woken(given), woken(&[1, 2]), false);
+            assert_eq!(other.parted(5, 2)[1].unwrap().1.len(), to_come, "{given:?}");
+        }
     }
 }

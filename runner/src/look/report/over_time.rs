@@ -21,7 +21,7 @@ const CHARTS: [Chart; 8] = [
         "energy",
         "Energy",
         "J",
-        "Kinetic with rotation; potential from where it was at the start.",
+        "Kinetic with rotation; potential from the lower left corner of the domain on.",
         Scale::AsFar,
         &[("kinetic_energy", "kinetic", "s0"), ("potential_energy", "potential", "s1"), (TOTAL, "total", "s2")],
     ),
@@ -75,13 +75,15 @@ const CHARTS: [Chart; 8] = [
         "bodies per step",
         "Copies that tiles hold of their neighbours\u{2019} bodies, and bodies that change their owner.",
         Scale::FromZero,
-        &[("ghosts", "ghosts", "s0"), ("migrations", "migrations", "s4")],
+        &[("ghosts", "ghosts", "s0"), (MIGRATIONS, "migrations", "s4")],
     ),
     ("bodies", "Bodies", "bodies", "None is ever lost.", Scale::FromZero, &[("bodies", "bodies", "s2")]),
 ];
 
 /// Stands for the sum of both energies.
 const TOTAL: &str = "kinetic_energy+potential_energy";
+/// Stands for what a log adds up from line to line, by the steps between these.
+const MIGRATIONS: &str = "migrations/step";
 
 /// All charts of which any run has logged something.
 pub(super) fn of(sources: &[Source]) -> String {
@@ -106,16 +108,19 @@ pub(super) fn of(sources: &[Source]) -> String {
     text + "</div>\n"
 }
 
-/// A column over time, or the sum of two.
+/// A column over time, or the sum of two, or what one is by another's change since the line before.
 pub(super) fn points(source: &Source, log: &Columns, column: &str) -> Option<Vec<(f64, f64)>> {
-    let times = times(source, log)?;
-    match column.split_once('+') {
-        None => Some(times.into_iter().zip(log.get(column)?.iter().copied()).collect()),
-        Some((one, other)) => {
-            let sums = log.get(one)?.iter().zip(log.get(other)?).map(|(one, other)| one + other);
-            Some(times.into_iter().zip(sums).collect())
-        }
+    let times = times(source, log)?.into_iter();
+    if let Some((one, other)) = column.split_once('+') {
+        let sums = log.get(one)?.iter().zip(log.get(other)?).map(|(one, other)| one + other);
+        return Some(times.zip(sums).collect());
     }
+    if let Some((one, other)) = column.split_once('/') {
+        let (one, other) = (log.get(one)?, log.get(other)?);
+        let parts = one.iter().skip(1).zip(other.windows(2)).map(|(one, other)| one / (other[1] - other[0]));
+        return Some(times.skip(1).zip(parts).collect());
+    }
+    Some(times.zip(log.get(column)?.iter().copied()).collect())
 }
 
 /// When each line of a log was written, in seconds of the simulated world.
