@@ -54,6 +54,7 @@ fn a_disc_leaves_a_wall_with_the_spin_that_friction_gives() {
         (60.0, Solver::SoftStep, 0.0),
         (240.0, Solver::SoftStep, 0.0),
         (60.0, Solver::SoftStep, 0.5),
+        (240.0, Solver::SoftStep, 0.5),
         (60.0, Solver::SoftStep, 1.0),
         (60.0, Solver::Pgs, 0.5),
     ] {

@@ -5,7 +5,6 @@
 //! nobody else go on, once they have bounced, by what that changed of their velocities, for the rest of the step. Under gravity they part
 //! slower, by what that takes of their speed until then.
 
-use super::approach::Approach;
 use super::bounce::{Answer, Parting, Passing};
 use super::columns::Columns;
 use super::groups::{Bounce, Lane};
@@ -78,7 +77,7 @@ impl Bounce {
         });
         let touch = approaches.iter().flatten().fold(f32::INFINITY, |first, approach| min(first, approach.time()));
         if touch > dt {
-            return self.put_off(&approaches, dt);
+            return self.put_off();
         }
         let (left, mut fastest) = (dt - touch, (0.0, 0.0));
         let mut answers = self.answers;
@@ -100,13 +99,10 @@ impl Bounce {
         }
     }
 
-    /// The last substep looks beyond the step, and has stopped whom only the next one is to: he comes as fast as he would.
-    fn put_off(&mut self, approaches: &[Option<Approach>; 2], dt: f32) {
-        for (answer, approach) in self.answers.iter_mut().zip(approaches) {
-            if let Some(Approach { closing, pull, .. }) = *approach {
-                let most = closing + pull * dt;
-                *answer = Answer::NotYet(Passing { closing, lost: 0.0, least: f32::NEG_INFINITY, most, held: false });
-            }
-        }
+    /// The last substep looks beyond the step, and has stopped whom only the next one is to: that is taken back, all of it.
+    fn put_off(&mut self) {
+        let (least, most) = (f32::NEG_INFINITY, f32::INFINITY);
+        let all = Answer::NotYet(Passing { closing: 0.0, lost: 0.0, least, most, held: false });
+        self.answers.iter_mut().filter(|answer| matches!(answer, Answer::Part(_))).for_each(|answer| *answer = all);
     }
 }
