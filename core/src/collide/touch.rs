@@ -237,11 +237,12 @@ impl<'a> Approach<'a> {
     /// what lets one pass over the other. What lies on a floor of boxes lies a little in each, and must not catch on the next.
     fn over_corner(&self, at: Moment) -> Moment {
         let &[one, two] = at.manifold.points() else { return at };
-        let touches = one.separation < TOUCHING || two.separation < TOUCHING;
+        let touching = self.scale() * TOUCHING;
+        let touches = one.separation < touching || two.separation < touching;
         let along = right_perp(at.manifold.normal);
         let overlap = dot(two.anchor - one.anchor, along).abs();
         let [a, b] = [&self.a, &self.b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
-        let is_little = overlap < min(TOUCHING, PASSABLE * min(a, b));
+        let is_little = overlap < min(touching, PASSABLE * min(a, b));
         let closing = self.closing(&at, one.anchor);
         if !self.is_solid() || !touches || !is_little || closing <= CREEPING {
             return at;

@@ -300,7 +300,7 @@ impl<V: Wide> Pairs<V> {
         let (_, nearest) = at.least();
         let overlap = absolute(at.anchor[1].minus(at.anchor[0]).cross(at.normal));
         let (a, b) = (self.half[0].x.min(self.half[0].y), self.half[1].x.min(self.half[1].y));
-        let touching = V::splat(TOUCHING);
+        let touching = self.scale().mul(V::splat(TOUCHING));
         let overlaps = less(overlap, touching.min(V::splat(PASSABLE).mul(a.min(b))));
         at.two.mul(overlaps).mul(less(nearest, touching)).mul(less(V::splat(CREEPING), closing))
     }

@@ -66,7 +66,7 @@ impl Contact {
         1 + usize::from(self.points[1].feature != ContactPoint::ABSENT)
     }
 
-    /// Whether its bodies pressed at each other in the last substep.
+    /// Whether its bodies pressed at each other in the end of the last step, and did not give all of that back.
     #[inline(always)]
     pub(crate) fn presses(&self) -> bool {
         self.points.iter().any(|point| point.normal_impulse > 0.0)

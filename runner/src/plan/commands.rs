@@ -39,7 +39,7 @@ impl Commands {
             (Some(given), Some((recorded, lines))) => {
                 let were_done = recorded.texts(&lines[passed(recorded)..]);
                 let both = given.texts(&given.lines[passed(given)..]).zip(were_done);
-                passed(given) + both.take_while(|(text, done)| text == done).count()
+                passed(given) + both.take_while(|(text, done)| text.trim() == done.trim()).count()
             }
             _ => split(script),
         };

@@ -179,7 +179,7 @@ impl Approach<'_> {
             angular_velocity: body.angular_velocity + turn,
         };
         if let [one, two] = at.manifold.points()
-            && max(one.separation, two.separation) < TOUCHING
+            && max(one.separation, two.separation) < self.scale() * TOUCHING
             && inv_inertia > 0.0
         {
             // It comes down flat.

@@ -38,7 +38,7 @@ const STUCK_BY_WAY: f32 = 0.015;
 const STUCK_BY_SPEED: f32 = 0.05;
 
 impl Passing {
-    /// Whether a blow of such a speed, in m/s, is to go no further. In a crowd that is pressed together there is one somewhere in every
+    /// Whether a blow of such a speed, in m/s, is not to be passed on here. In a crowd that is pressed together there is one somewhere in every
     /// step, and who passes it on holds nobody: bodies of restitution 0.01 went halfway into each other. Elastic ones lose nothing by
     /// what they pass on, and part in the end.
     pub(super) fn is_stuck(&self, blow: f32, setup: &Setup) -> bool {

@@ -198,18 +198,12 @@ fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies) -> Option<f32> 
 
 impl Source<'_> {
     /// Whether something gives a contact's bodies energy from outside: a static that moves, a force, or what a ghost meets elsewhere.
-    fn is_driven(self, contact: usize) -> bool {
-        let ghosts = self.tile.owned..self.tile.owned + self.tile.ghosts();
-        self.is_pushed(contact) || self.contacts.bodies[contact].iter().any(|&body| ghosts.contains(&(body as usize)))
-    }
-
-    /// As [`is_driven`](Self::is_driven), by what this tile knows of.
-    pub(super) fn is_pushed(self, contact: usize) -> bool {
+    pub(super) fn is_driven(self, contact: usize) -> bool {
         let tile = self.tile;
         let statics = tile.owned + tile.ghosts();
         self.contacts.bodies[contact].into_iter().map(|body| body as usize).any(|body| {
             let is_driven_static = body >= statics && self.setup.drives(tile.bodies.kind[body]);
-            is_driven_static || tile.gain(body).is_some()
+            (tile.owned..statics).contains(&body) || is_driven_static || tile.gain(body).is_some()
         })
     }
 

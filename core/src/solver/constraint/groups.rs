@@ -70,6 +70,8 @@ pub(crate) struct Bounce {
     pub(super) blow: f32,
     /// How long its bodies go on from there in this step, in s, where that is known: see [`Late`].
     pub(super) left: f32,
+    /// How much further they part by then than by what they do in the end, in m.
+    pub(super) rise: f32,
     /// Whether one of the two never moves.
     pub(super) off_static: bool,
     /// Of each point.

@@ -1,9 +1,9 @@
 //! What bounces lose of the step, made good where that can be told.
 //!
 //! A bounce comes at the end of the step, and until then who was stopped went along the surface that it met. Two free bodies that met
-//! beside each other parted from elsewhere than they touched: up to a sixth of their angular momentum was lost at 60 Hz. So two bodies that touch
-//! nobody else go on, once they have bounced, by what that changed of their velocities, for the rest of the step. Under gravity they part
-//! slower, by what that takes of their speed until then.
+//! beside each other parted from elsewhere than they touched: up to a sixth of their angular momentum was lost at 60 Hz. So two bodies of a
+//! tile, or one and a static, that touch nobody else go on, once they have bounced, by what that changed of their velocities, for the rest of
+//! the step, but no further than the smaller one is thick. Under gravity they part slower, by what that takes of their speed until then.
 
 use super::bounce::{Answer, Parting, Passing};
 use super::columns::Columns;
@@ -39,7 +39,7 @@ impl Late {
         }
         for bounce in bounces.into_iter().flatten().filter(|bounce| bounce.parts()) {
             let is_alone = bounce.moving().all(|body| contacts[body as usize] == 1);
-            if is_alone && !source.is_pushed(bounce.contact as usize) {
+            if is_alone && !source.is_driven(bounce.contact as usize) {
                 bounce.go_on(source);
             }
         }
@@ -55,7 +55,7 @@ impl Late {
             let (velocity, pose) = (at.bodies(&bodies.velocity), at.bodies_mut(&mut bodies.pose));
             let came = points.iter().filter(|point| point.first_separation[lane] >= 0.0);
             let sunk = came.map(|point| -sides.separation(point, lane, velocity, pose)).fold(0.0, max);
-            sides.move_apart(lane, sunk, velocity, pose);
+            sides.move_apart(lane, sunk + bounce.rise, velocity, pose);
             let places = bounce.moving().map(|body| bodies.places()[body as usize].get());
             self.before.extend(places.map(|place| (place, bounce.left, bodies.velocity[place])));
         }
@@ -71,32 +71,29 @@ impl Bounce {
     /// Notes how long its bodies go on, unless gravity brings them back by then.
     fn go_on(&mut self, source: Source<'_>) {
         let (contact, dt) = (self.contact as usize, source.setup.params.dt);
-        let approaches = [0, 1].map(|point| match self.answers[point] {
-            Answer::Part(_) => Some(source.approach(contact, point).0),
-            _ => None,
-        });
-        let touch = approaches.iter().flatten().fold(f32::INFINITY, |first, approach| min(first, approach.time()));
+        let (mut touch, mut fastest, mut slowest, mut pull) = (f32::INFINITY, 0.0, f32::INFINITY, 0.0);
+        for (point, answer) in self.answers.iter().enumerate() {
+            if let Answer::Part(Parting { speed, .. }) = *answer {
+                let approach = source.approach(contact, point).0;
+                (touch, pull) = (min(approach.time(), touch), approach.pull);
+                (fastest, slowest) = (max(speed, fastest), min(speed, slowest));
+            }
+        }
         if touch > dt {
             return self.put_off();
         }
-        let (left, mut fastest) = (dt - touch, (0.0, 0.0));
-        let mut answers = self.answers;
-        for (answer, approach) in answers.iter_mut().zip(&approaches) {
-            let (Answer::Part(Parting { closing, speed, .. }), Some(approach)) = (answer, approach) else { continue };
-            let taken = approach.pull * left;
-            if *speed <= SURELY_UP * max(taken, 0.0) {
-                return;
-            }
-            (*closing, *speed) = (*closing - taken, *speed - taken);
-            if *speed > fastest.0 {
-                fastest = (*speed, taken);
+        // Nobody knows who stands there.
+        let left = min(dt - touch, source.inner_radius(contact) / fastest);
+        let taken = pull * left;
+        if slowest <= SURELY_UP * max(taken, 0.0) {
+            return;
+        }
+        for answer in &mut self.answers {
+            if let Answer::Part(Parting { closing, speed, .. }) = answer {
+                (*closing, *speed) = (*closing - taken, *speed - taken);
             }
         }
-        // They part as fast as on the average from the touch on.
-        let (speed, taken) = fastest;
-        if speed > 0.0 {
-            (self.answers, self.left) = (answers, left * (1.0 + 0.5 * taken / speed));
-        }
+        (self.left, self.rise) = (left, 0.5 * taken * left);
     }
 
     /// The last substep looks beyond the step, and has stopped whom only the next one is to: that is taken back, all of it.
@@ -104,5 +101,13 @@ impl Bounce {
         let (least, most) = (f32::NEG_INFINITY, f32::INFINITY);
         let all = Answer::NotYet(Passing { closing: 0.0, lost: 0.0, least, most, held: false });
         self.answers.iter_mut().filter(|answer| matches!(answer, Answer::Part(_))).for_each(|answer| *answer = all);
+    }
+}
+
+impl Source<'_> {
+    /// Of the smaller of a contact's bodies that move, in m.
+    fn inner_radius(self, contact: usize) -> f32 {
+        let inner = self.moving(contact).map(|body| self.setup.kind(self.tile.bodies.kind[body as usize]).inner_radius);
+        inner.fold(f32::INFINITY, min)
     }
 }

@@ -103,7 +103,16 @@ impl Groups {
         let off_static = moving[1].is_none();
         let at_once = batches.of_body(self.lanes[contact].base as usize).at_once;
         let bounces = if at_once { &mut self.bounces_at_once } else { &mut self.bounces };
-        bounces.push(Bounce { contact: contact as u32, moving, closing, blow: 0.0, left: 0.0, off_static, answers });
+        bounces.push(Bounce {
+            contact: contact as u32,
+            moving,
+            closing,
+            blow: 0.0,
+            left: 0.0,
+            rise: 0.0,
+            off_static,
+            answers,
+        });
     }
 
     /// Contacts that never bounce hold, too, beside what parts or passes on: what pressed there against a blow that is given back would

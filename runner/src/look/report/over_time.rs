@@ -117,8 +117,8 @@ pub(super) fn points(source: &Source, log: &Columns, column: &str) -> Option<Vec
     }
     if let Some((one, other)) = column.split_once('/') {
         let (one, other) = (log.get(one)?, log.get(other)?);
-        let parts = one.iter().skip(1).zip(other.windows(2)).map(|(one, other)| one / (other[1] - other[0]));
-        return Some(times.skip(1).zip(parts).collect());
+        let parts = one.iter().skip(1).zip(other.windows(2)).map(|(one, other)| one / (other[1] - other[0]).max(1.0));
+        return Some(times.skip(1).zip(parts).collect()).filter(|points: &Vec<_>| !points.is_empty());
     }
     Some(times.zip(log.get(column)?.iter().copied()).collect())
 }
