@@ -409,7 +409,7 @@ fn what_is_refused_is_not_kept_and_a_run_goes_on_from_there() {
     let ended = run(later.args(["--quiet", "--steps", "8", "--commands"]).arg(path("late.jsonl")));
     assert!(ended.stderr.contains("late.jsonl: 1 line is for steps before 3, which are made; left out"), "{ended}");
     // No run gives way to one that cannot begin, or go on; of step 3 the first line was done before.
-    let text = "{\"step\":0,\"remove\":[40,40]}\n{\"step\":3,\"wake\":0}\n{\"step\":3,\"name\":\"b\",\"wake\":40}\n";
+    let text = "{\"step\":0,\"remove\":[40,40]}\n".to_owned() + &of(&[1]) + "{\"step\":3,\"name\":\"b\",\"wake\":40}\n";
     fs::write(path("bad.jsonl"), text).unwrap();
     let leaves = |mut command: Command, out: &str, expected: &str| {
         let before = files(&path(out));
