@@ -118,5 +118,9 @@ fn hull(points: &[Vec2]) -> Vec<DVec2> {
         }
         corners.remove(flattest);
     }
+    // That may have been the leftmost.
+    let place = |i: &usize| (corners[*i].x, corners[*i].y);
+    let leftmost = (0..corners.len()).min_by(|a, b| place(a).partial_cmp(&place(b)).expect("numbers"));
+    corners.rotate_left(leftmost.unwrap_or(0));
     corners
 }
