@@ -47,15 +47,22 @@ impl Late {
 
     /// Notes the velocities of bodies that are to go on. They do so from where they touched: contacts are soft, and who was held for the rest
     /// of the step has sunk in a little.
-    pub(super) fn begin(&mut self, bounces: &[Bounce], lanes: &[Lane], columns: &Columns, bodies: &mut SolverBodies) {
+    pub(super) fn begin(
+        &mut self,
+        bounces: &mut [Bounce],
+        lanes: &[Lane],
+        columns: &Columns,
+        bodies: &mut SolverBodies,
+    ) {
         self.before.clear();
-        for bounce in bounces.iter().filter(|bounce| bounce.left > 0.0) {
+        for bounce in bounces.iter_mut().filter(|bounce| bounce.left > 0.0) {
             let at = lanes[bounce.contact as usize];
             let (sides, points, lane) = at.rows(columns);
             let (velocity, pose) = (at.bodies(&bodies.velocity), at.bodies_mut(&mut bodies.pose));
             let came = points.iter().filter(|point| point.first_separation[lane] >= 0.0);
             let sunk = came.map(|point| -sides.separation(point, lane, velocity, pose)).fold(0.0, max);
-            sides.move_apart(lane, sunk + bounce.rise, velocity, pose);
+            // Once, however often they are asked to bounce.
+            sides.move_apart(lane, sunk + std::mem::take(&mut bounce.rise), velocity, pose);
             let places = bounce.moving().map(|body| bodies.places()[body as usize].get());
             self.before.extend(places.map(|place| (place, bounce.left, bodies.velocity[place])));
         }

@@ -254,7 +254,7 @@ impl Groups {
         let before =
             |place: usize| bounces.partition_point(|bounce| (lanes[bounce.contact as usize].base as usize) < place);
         let own = before(batch.bodies.start)..before(batch.bodies.end);
-        let bounces = &bounces[own];
+        let bounces = &mut bounces[own];
         late.begin(bounces, lanes, at_once, bodies);
         energies.keep(Some(batch), lanes, at_once, bodies, |rows, velocity| {
             bounce(bounces, lanes, rows, &mut velocity[..batch.bodies.end], times);
