@@ -81,10 +81,13 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
     let is_frozen = params.ghosts == Ghosts::Frozen;
     let bouncy = if is_frozen { BOUNCY_BESIDE_FROZEN } else { BOUNCY };
     if restitution > bouncy && blueprint.partition.tiles() > 1 && params.exchange == Exchange::Step {
-        let by = if is_frozen { "ghosts = \"frozen\"" } else { "exchange = \"step\"" };
+        let (by, mend) = if is_frozen {
+            ("ghosts = \"frozen\"", "ghosts=dynamic and exchange=substep")
+        } else {
+            ("exchange = \"step\"", "exchange=substep")
+        };
         notes.push(format!(
-            "restitution is {restitution}, and with {by} bounces over borders of tiles may gain energy: set exchange=substep, or \
-             use one tile"
+            "restitution is {restitution}, and with {by} bounces over borders of tiles may gain energy: set {mend}, or use one tile"
         ));
     }
     let masses = || blueprint.kinds.iter().map(|kind| kind.material.density * kind.shape.area());
