@@ -10,11 +10,12 @@ use crate::collide::touch::{self, Stopped};
 use crate::collide::wide_pairs::TOUCHING;
 use crate::model::contact::{Contact, PairKey, SlotKind};
 use crate::model::kind::{Form, KindRow};
-use crate::model::math::{dot, min};
+use crate::model::math::{dot, max, min};
 use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::{DVec2, Vec2};
+use glam::Vec2;
+use std::cmp::Ordering;
 use std::ops::Range;
 
 /// What stands out of a plane by less is not before it, in m, and as part of the radius of what there is room for in the body.
@@ -24,30 +25,17 @@ const LEVEL_BY_SIZE: f32 = 0.02;
 /// Normals count as one whose angle has a greater cosine.
 const ONE_NORMAL: f32 = 0.999_99;
 
-/// Looks again for those contacts of a tile that are behind others.
+/// Looks again for those contacts of a tile that are behind others. Time grows with the contacts of a body times the directions of these.
 pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
-    let (mut gone, mut faces) = (Vec::new(), Vec::new());
-    let mut first = 0;
+    let (mut gone, mut first) = (Vec::new(), 0);
     while let Some(run) = next_of_several(tile, first) {
         first = run.end;
         let (key, bodies) = (tile.contacts.keys[run.start], contacts.bodies[run.start]);
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
         // Who goes no further passes over corners that lie no deeper in it.
         let may_catch = || is_with_static(key) || touch::far(tile, bodies, setup) >= TOUCHING;
-        if !may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) || !may_catch() {
-            continue;
-        }
-        faces.clear();
-        for &surface in surfaces(key, kinds) {
-            faces.extend(run.clone().map(|number| Face::new(tile, contacts, number, surface, setup)));
-        }
-        let is_behind = |first: usize, other: usize| {
-            faces.chunks(run.len()).any(|faces| faces[other - run.start].is_behind(&faces[first - run.start]))
-        };
-        let pairs = run.clone().flat_map(|other| run.clone().map(move |first| (first, other)));
-        let behind: Vec<(usize, usize)> = pairs.filter(|&(first, other)| is_behind(first, other)).collect();
-        if !behind.is_empty() {
-            mend_of_one(tile, contacts, &behind, setup, &mut gone);
+        if may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) && may_catch() {
+            mend_run(tile, contacts, (run, surfaces(key, kinds)), setup, &mut gone);
         }
     }
     if !gone.is_empty() {
@@ -104,14 +92,15 @@ fn presses(contact: &Contact, key: PairKey) -> bool {
     !key.is_border() && contact.points().iter().any(|point| point.normal_impulse > 0.0)
 }
 
-/// Where a body is touched.
+/// Where a surface is touched.
 struct Face<'a> {
-    of: DVec2,
-    /// Which of its pieces is, if it moves.
+    /// Of the contact.
+    number: usize,
+    /// Which piece of a body is, if it moves.
     piece: Option<&'a Piece>,
     /// Out of it; in the frame of the body if it moves.
     normal: Vec2,
-    /// On its surface, from its center.
+    /// On it: from the center of the body if it moves, and else from that of the one which touches it.
     points: [Vec2; 2],
     count: usize,
     /// What stands out of a plane by less than this is not before it.
@@ -135,7 +124,7 @@ impl<'a> Face<'a> {
         let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
         let kind = setup.kind(tile.bodies.kind[body as usize]);
         let face = Self {
-            of: tile.bodies.position[of as usize],
+            number,
             piece: None,
             normal,
             points,
@@ -144,7 +133,10 @@ impl<'a> Face<'a> {
             is_stood_on: presses(contact, key) && kind.form != Form::Round,
         };
         let (piece, rotation) = match surface {
-            Surface::Static => return face,
+            Surface::Static => {
+                let from = (tile.bodies.position[of as usize] - tile.bodies.position[body as usize]).as_vec2();
+                return Self { points: points.map(|point| point + from), ..face };
+            }
             Surface::A => (contact.piece_numbers()[0], contact.rotation_a),
             Surface::B => (contact.piece_numbers()[1], contact.rotation_b),
         };
@@ -156,15 +148,19 @@ impl<'a> Face<'a> {
         Self { piece: Some(piece), normal: rotation.unrotate(normal), points, is_stood_on, ..face }
     }
 
-    /// Whether it is of another direction than a first one, and not before the plane of that; and if they are of two pieces of a body, where
-    /// these meet. Round bodies roll from one to the other; what else pressed already, or is deep in a part, is held by both.
-    fn is_behind(&self, first: &Self) -> bool {
-        if dot(first.normal, self.normal) > ONE_NORMAL || self.is_stood_on {
-            return false;
+    /// Where its plane is, along its normal.
+    fn height(&self) -> f32 {
+        dot(self.points[0], self.normal)
+    }
+
+    /// What planes of that normal stand higher than if it is behind them; none, if it is of that direction itself. Round bodies roll from
+    /// one to the other; what else pressed already, or is deep in a part, is held by both.
+    fn is_behind_higher_than(&self, normal: Vec2) -> f32 {
+        if self.is_stood_on || dot(normal, self.normal) > ONE_NORMAL {
+            return f32::INFINITY;
         }
-        let between = (self.of - first.of).as_vec2() - first.points[0];
-        let points = &self.points[..self.count];
-        points.iter().all(|&point| dot(point + between, first.normal) < self.level) && self.is_at_seam(first)
+        let points = self.points[..self.count].iter().map(|&point| dot(point, normal));
+        points.fold(f32::NEG_INFINITY, max) - self.level
     }
 
     /// Whether they are of two pieces of a body that meet there, or of statics.
@@ -175,36 +171,103 @@ impl<'a> Face<'a> {
     }
 }
 
-/// Looks again for those contacts of a run that are behind others, each on the way that the first of these leaves. Given are, one after
-/// another, those that are, each with all that it is behind: first these, then that one.
-fn mend_of_one(
+/// What is touched of one surface.
+struct Touched<'a> {
+    /// One direction after another.
+    faces: Vec<Face<'a>>,
+    directions: Vec<Direction>,
+}
+
+/// Faces of one direction.
+struct Direction {
+    faces: Range<usize>,
+    normal: Vec2,
+    /// Where the plane of the highest is.
+    highest: f32,
+}
+
+impl<'a> Touched<'a> {
+    fn new(mut faces: Vec<Face<'a>>) -> Self {
+        let name = |face: &Face<'_>| face.normal.to_array().map(f32::to_bits);
+        faces.sort_by_key(name);
+        let mut first = 0;
+        let of_one = faces.chunk_by(|one, two| name(one) == name(two)).map(|faces| {
+            let highest = faces.iter().map(Face::height).fold(f32::NEG_INFINITY, max);
+            let direction = Direction { faces: first..first + faces.len(), normal: faces[0].normal, highest };
+            first += faces.len();
+            direction
+        });
+        let directions = of_one.collect();
+        Self { faces, directions }
+    }
+
+    /// Sorts those of each direction.
+    fn sort_by(&mut self, order: impl Fn(&Face<'_>, &Face<'_>) -> Ordering) {
+        for Direction { faces, .. } in &self.directions {
+            self.faces[faces.clone()].sort_by(&order);
+        }
+    }
+
+    /// The first of each direction that a face is behind: of another direction than its own, and the face not before its plane; and where
+    /// they are of two pieces of a body, these meet there.
+    fn firsts(&self, face: &Face<'_>) -> impl Iterator<Item = &Face<'a>> {
+        self.directions.iter().filter_map(move |direction| {
+            let height = face.is_behind_higher_than(direction.normal);
+            let hides = |first: &&Face<'_>| first.height() > height && face.is_at_seam(first);
+            let may_hide = direction.highest > height;
+            may_hide.then(|| self.faces[direction.faces.clone()].iter().find(hides)).flatten()
+        })
+    }
+}
+
+/// Looks again for those contacts of a run that are behind others, each on the way that the first of these leaves.
+fn mend_run(
     tile: &mut Tile,
     contacts: &mut Contacts,
-    behind: &[(usize, usize)],
+    (run, surfaces): (Range<usize>, &[Surface]),
     setup: &Setup,
     gone: &mut Vec<usize>,
 ) {
+    let touched = |&surface| {
+        let faces = run.clone().map(|number| Face::new(tile, contacts, number, surface, setup));
+        Touched::new(faces.collect())
+    };
+    let mut surfaces: Vec<Touched<'_>> = surfaces.iter().map(touched).collect();
+    let mut all = surfaces.iter().flat_map(|surface| surface.faces.iter().map(move |face| (surface, face)));
+    if !all.any(|(surface, face)| surface.firsts(face).next().is_some()) {
+        return;
+    }
     let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
-    let mut numbers: Vec<usize> = behind.iter().flat_map(|&(first, other)| [first, other]).collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let all = numbers.iter().map(|&number| Stopped::new(tile, contact(number), setup));
-    let Some(all) = all.collect::<Option<Vec<_>>>() else { return };
-    let stopped = |number: usize| &all[numbers.partition_point(|&other| other < number)];
-    let again = behind.chunk_by(|one, two| one.1 == two.1).filter_map(|of_one| {
-        let other = of_one[0].1;
-        let before =
-            of_one.iter().map(|&(first, _)| first).filter(|&first| stopped(first).order() < stopped(other).order());
-        let first = before.reduce(|one, two| if stopped(two).order() < stopped(one).order() { two } else { one })?;
-        Some((first, other, stopped(first).touch(tile, contact(other), setup)))
+    let all: Vec<Option<Stopped>> = run.clone().map(|number| Stopped::new(tile, contact(number), setup)).collect();
+    let stopped = |number: usize| all[number - run.start].as_ref();
+    let order = |one: usize, two: usize| {
+        let [one, two] = [one, two].map(|number| stopped(number).map_or([f32::INFINITY; 2], Stopped::order));
+        one[0].total_cmp(&two[0]).then(one[1].total_cmp(&two[1]))
+    };
+    let sooner = |one: &usize, two: &usize| order(*one, *two).then(one.cmp(two));
+    let mut behind = Vec::new();
+    for surface in &mut surfaces {
+        surface.sort_by(|one, two| order(one.number, two.number));
+        let of_one = surface.faces.iter().filter_map(|face| {
+            stopped(face.number)?;
+            let first = surface.firsts(face).map(|first| first.number).min_by(sooner)?;
+            order(first, face.number).is_lt().then_some((face.number, first))
+        });
+        behind.extend(of_one);
+    }
+    behind.sort_by(|one, two| one.0.cmp(&two.0).then(sooner(&one.1, &two.1)));
+    behind.dedup_by_key(|&mut (other, _)| other);
+    let again = behind.iter().filter_map(|&(other, first)| {
+        let stopped = stopped(first)?;
+        Some((stopped, first, other, stopped.touch(tile, contact(other), setup)))
     });
     let again: Vec<_> = again.collect();
     let mut write = |number: usize, found| (tile.contacts.contacts[number], contacts.separation[number]) = found;
     // What is relied upon must be there just so, unless it is itself behind another.
-    for (first, found) in again.iter().filter_map(|&(first, _, _)| Some((first, stopped(first).by()?))) {
+    for (first, found) in again.iter().filter_map(|&(stopped, first, ..)| Some((first, stopped.by()?))) {
         write(first, found);
     }
-    for (_, other, found) in again {
+    for (.., other, found) in again {
         match found {
             Some(found) => write(other, found),
             None => gone.push(other),
