@@ -3,14 +3,13 @@
 //! met a static.
 
 use crate::collide::passage::Passage;
-use crate::exchange::far::StaticsByPlace;
+use crate::exchange::far::sweeping;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot};
 use crate::solver::SolverBodies;
 use crate::tiling::blueprint::Setup;
-use crate::tiling::terrain::ascend;
 use crate::tiling::tile::{Fastest, Tile};
 use glam::DVec2;
 
@@ -82,16 +81,20 @@ pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
     if ways.is_empty() {
         return;
     }
-    let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
-    for &Way { row, start, rotation } in ways {
+    let around = |way: &Way| {
+        let whole = tile.bodies.position[way.row] - way.start;
+        let radius = setup.kind(tile.bodies.kind[way.row]).bounding_radius;
+        let (half, middle) = (DVec2::splat(radius.into()) + 0.5 * whole.abs(), way.start + 0.5 * whole);
+        (middle - half, middle + half)
+    };
+    let around: Vec<_> = ways.iter().map(around).collect();
+    for met in sweeping(&around, setup, step).chunk_by(|one, two| one.0 == two.0) {
+        let Way { row, start, rotation } = ways[met[0].0];
         let body = tile.bodies.get(row);
         let (kind, whole) = (setup.kind(body.kind), body.position - start);
         let passage = Passage::new(kind, [rotation, body.rotation], whole.as_vec2());
-        let (half, middle) = (DVec2::splat(kind.bounding_radius.into()) + 0.5 * whole.abs(), start + 0.5 * whole);
         let mut held: Option<(f32, [Body; 2])> = None;
-        statics.meeting(middle - half, middle + half, &mut met);
-        ascend(&mut met);
-        for fixed in met.drain(..) {
+        for &(_, fixed) in met {
             let course = [step, step + 1].map(|step| setup.static_at(fixed, step));
             let other = setup.kind(course[0].kind);
             if kind.touches(other) {

@@ -31,31 +31,32 @@ impl Bounds {
     }
 }
 
-/// All statics, to find those that sweep over a rectangle in a step.
-pub(crate) struct StaticsByPlace<'a> {
-    setup: &'a Setup,
-    step: u64,
-    /// Those that the terrain does not find.
-    others: Bounds,
-}
-
-impl<'a> StaticsByPlace<'a> {
-    pub(crate) fn new(setup: &'a Setup, step: u64) -> Self {
-        let bounds = |&row: &u32| {
-            let [low, high] = setup.static_box(row, step);
-            (row as usize, low, high)
-        };
-        Self { setup, step, others: Bounds::new(setup.terrain.at_large().iter().map(bounds).collect()) }
-    }
-
-    /// Adds the rows of those that meet a rectangle, in any order, and maybe more than once.
-    pub(crate) fn meeting(&self, low: DVec2, high: DVec2, rows: &mut Vec<u32>) {
-        rows.extend(self.others.meeting(low, high).map(|row| row as u32));
-        self.setup.terrain.meeting(low, high, |row| {
-            let meets = |[own_low, own_high]: [DVec2; 2]| own_low.cmple(high).all() && own_high.cmpge(low).all();
-            if self.setup.path(row).is_none() || meets(self.setup.static_box(row, self.step)) {
-                rows.push(row);
+/// For each of some rectangles the rows of the statics that sweep over it in a step, ascending: with the number of the rectangle. Where a
+/// static comes in the step is found once, for all that it may come to at any time.
+pub(crate) fn sweeping(rectangles: &[(DVec2, DVec2)], setup: &Setup, step: u64) -> Vec<(usize, u32)> {
+    let (mut met, mut on_paths) = (Vec::new(), Vec::new());
+    let mut is_known = vec![0_u64; setup.statics.len().div_ceil(64)];
+    for (number, &(low, high)) in rectangles.iter().enumerate() {
+        setup.terrain.meeting(low, high, |row| {
+            if setup.path(row).is_none() {
+                return met.push((number, row));
+            }
+            let (known, bit) = (&mut is_known[row as usize / 64], 1_u64 << (row % 64));
+            if *known & bit == 0 {
+                *known |= bit;
+                on_paths.push(row);
             }
         });
     }
+    let bounds = |&row: &u32| {
+        let [low, high] = setup.static_box(row, step);
+        (row as usize, low, high)
+    };
+    let others = Bounds::new(on_paths.iter().chain(setup.terrain.at_large()).map(bounds).collect());
+    for (number, &(low, high)) in rectangles.iter().enumerate() {
+        met.extend(others.meeting(low, high).map(|row| (number, row as u32)));
+    }
+    met.sort_unstable();
+    met.dedup();
+    met
 }

@@ -15,7 +15,7 @@
 mod bounds;
 mod unseen;
 
-pub(crate) use bounds::StaticsByPlace;
+pub(crate) use bounds::sweeping;
 
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
@@ -192,17 +192,13 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, setup: &Setup, step: u64)
 /// The rows of the statics that those may come to who go far, or who are in nobody's usual halo here. The others stay near those that
 /// reach the tile's region.
 fn find_on_the_way(tile: &Tile, setup: &Setup, step: u64) -> Vec<u32> {
-    let (statics, mut met) = (StaticsByPlace::new(setup, step), Vec::new());
     // Rounding decides nothing here.
     let near = tile.region.shrunk(-0.999 * setup.reach_of_statics());
-    for row in 0..tile.bodies.len() {
-        if row >= tile.owned || setup.goes_far(tile.bodies.velocity[row]) {
-            let (low, high) = surroundings(&tile.bodies, row, tile.rectangle.min, setup);
-            if !(low.cmpge(near.min) & high.cmple(near.max)).all() {
-                statics.meeting(low, high, &mut met);
-            }
-        }
-    }
+    let may = |&row: &usize| row >= tile.owned || setup.goes_far(tile.bodies.velocity[row]);
+    let rows = (0..tile.bodies.len()).filter(may);
+    let ways = rows.map(|row| surroundings(&tile.bodies, row, tile.rectangle.min, setup));
+    let ways: Vec<_> = ways.filter(|(low, high)| !(low.cmpge(near.min) & high.cmple(near.max)).all()).collect();
+    let mut met = sweeping(&ways, setup, step).into_iter().map(|(_, row)| row).collect();
     ascend(&mut met);
     met
 }
