@@ -204,7 +204,8 @@ impl Setup {
         let halo_width = halo_width(&blueprint.kinds, &params);
         let boxes = blueprint.statics.iter().zip(&statics);
         let boxes = boxes.map(|(fixed, body)| box_of_static(body, &kinds[body.kind.0 as usize], fixed.path.as_ref()));
-        let terrain = Arc::new(Terrain::new(boxes.collect(), halo_width));
+        let goes = |row: u32| blueprint.statics[row as usize].path.is_some();
+        let terrain = Arc::new(Terrain::new(boxes.collect(), goes, halo_width));
         let wide_halo = width_for(largest_radius(&blueprint.kinds, f32::INFINITY), &params);
         let bouncy = kinds.iter().any(|kind| kind.material.restitution > 0.0);
         let filters = kinds.iter().any(is_choosy);
@@ -379,7 +380,8 @@ impl Setup {
         let (region, mut rows) = (self.partition.region(tile), self.terrain.at_large().to_vec());
         // Rounding decides nothing here.
         let reach = DVec2::splat(1.001 * self.reach_of_statics());
-        self.terrain.meeting(region.min - reach, region.max + reach, |row| rows.push(row));
+        let (still, going) = self.terrain.meeting(&[(region.min - reach, region.max + reach)]);
+        rows.extend(still.into_iter().map(|(_, row)| row).chain(going));
         ascend(&mut rows);
         rows.retain(|&row| self.static_reaches(row, tile));
         rows

@@ -73,9 +73,10 @@ impl Near {
             for square in squares {
                 looks = looks.saturating_sub(1);
                 if self.squares.insert(square) {
-                    let those = setup.terrain.rows_of(square);
-                    rows.extend(those);
-                    looks = looks.saturating_sub(those.len());
+                    for those in setup.terrain.rows_of(square) {
+                        rows.extend(those);
+                        looks = looks.saturating_sub(those.len());
+                    }
                 }
             }
         }

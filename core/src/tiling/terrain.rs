@@ -3,7 +3,7 @@
 //! Detection of Deformable Objects", 2003).
 
 use glam::DVec2;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::ops::Range;
 
 /// What meets more squares than this is in none of them.
@@ -14,8 +14,8 @@ const MOST_SQUARES: f64 = 64.0;
 pub(crate) struct Terrain {
     /// Squares in a meter.
     per_meter: f64,
-    /// For each square with anything in it where its part of `rows` is.
-    squares: FxHashMap<[i32; 2], Range<u32>>,
+    /// For each square with anything in it where its parts of `rows` are: of those that stand still, and of those that go.
+    squares: FxHashMap<[i32; 2], [Range<u32>; 2]>,
     rows: Vec<u32>,
     /// Low and high corner of each static's box, by row.
     bounds: Vec<[DVec2; 2]>,
@@ -43,19 +43,19 @@ impl Span {
 }
 
 impl Terrain {
-    /// Of the boxes of all statics, by row, each of two corners. Squares are as wide as half of these, and no less than `least_side`, in
-    /// meters. Takes time n log n.
-    pub(crate) fn new(bounds: Vec<[DVec2; 2]>, least_side: f64) -> Self {
+    /// Of the boxes of all statics, by row, each of two corners, and whether it goes. Squares are as wide as half of these, and no less than
+    /// `least_side`, in meters. Takes time n log n.
+    pub(crate) fn new(bounds: Vec<[DVec2; 2]>, goes: impl Fn(u32) -> bool, least_side: f64) -> Self {
         let mut sides: Vec<f64> = bounds.iter().map(|[low, high]| (*high - *low).max_element()).collect();
         sides.retain(|side| side.is_finite());
         let middle = sides.len() / 2;
         let usual = if sides.is_empty() { 0.0 } else { *sides.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let mut terrain = Self { per_meter: 1.0 / usual.max(least_side), bounds, ..Self::default() };
-        let mut places: Vec<([i32; 2], u32)> = Vec::with_capacity(2 * terrain.bounds.len());
+        let mut places: Vec<([i32; 2], bool, u32)> = Vec::with_capacity(2 * terrain.bounds.len());
         for (row, &[low, high]) in (0..).zip(&terrain.bounds) {
             let span = terrain.span(low, high);
             if span.count() <= MOST_SQUARES {
-                places.extend(span.squares().map(|square| (square, row)));
+                places.extend(span.squares().map(|square| (square, goes(row), row)));
             } else {
                 terrain.at_large.push(row);
             }
@@ -63,8 +63,9 @@ impl Terrain {
         places.sort_unstable();
         for same in places.chunk_by(|a, b| a.0 == b.0) {
             let first = terrain.rows.len() as u32;
-            terrain.rows.extend(same.iter().map(|(_, row)| row));
-            terrain.squares.insert(same[0].0, first..terrain.rows.len() as u32);
+            terrain.rows.extend(same.iter().map(|(.., row)| row));
+            let (middle, end) = (first + same.partition_point(|place| !place.1) as u32, terrain.rows.len() as u32);
+            terrain.squares.insert(same[0].0, [first..middle, middle..end]);
         }
         terrain
     }
@@ -86,9 +87,10 @@ impl Terrain {
         (span.count() <= most as f64).then(|| span.squares())
     }
 
-    /// The rows of those that meet a square.
-    pub(crate) fn rows_of(&self, square: [i32; 2]) -> &[u32] {
-        self.squares.get(&square).map_or(&[], |Range { start, end }| &self.rows[*start as usize..*end as usize])
+    /// The rows of those that meet a square: that stand still, and that go.
+    pub(crate) fn rows_of(&self, square: [i32; 2]) -> [&[u32]; 2] {
+        let rows = |part: &Range<u32>| &self.rows[part.start as usize..part.end as usize];
+        self.squares.get(&square).map_or([&[]; 2], |parts| parts.each_ref().map(rows))
     }
 
     /// The rows of those that are in no square, ascending: they may be anywhere.
@@ -96,18 +98,27 @@ impl Terrain {
         &self.at_large
     }
 
-    /// Hands over each of the others whose box meets a rectangle, in any order, and maybe more than once.
-    pub(crate) fn meeting(&self, low: DVec2, high: DVec2, mut found: impl FnMut(u32)) {
-        let mut look_at = |row: u32| {
-            let [own_low, own_high] = self.bounds[row as usize];
-            if (own_low.cmple(high) & own_high.cmpge(low)).all() {
-                found(row);
+    /// Of the others, those which stand still and whose box meets one of some rectangles, with the number of that, in any order, and maybe
+    /// more than once; and all that go and may come there, ascending: each of them is looked at once, however many rectangles there are.
+    pub(crate) fn meeting(&self, rectangles: &[(DVec2, DVec2)]) -> (Vec<(usize, u32)>, Vec<u32>) {
+        let (mut still, mut going, mut squares) = (Vec::new(), Vec::new(), FxHashSet::default());
+        for (number, &(low, high)) in rectangles.iter().enumerate() {
+            let meets = |[own_low, own_high]: [DVec2; 2]| (own_low.cmple(high) & own_high.cmpge(low)).all();
+            let mut look_at = |square: [i32; 2]| {
+                let [standing, on_paths] = self.rows_of(square);
+                let met = standing.iter().filter(|row| meets(self.bounds[**row as usize]));
+                still.extend(met.map(|&row| (number, row)));
+                if !on_paths.is_empty() && squares.insert(square) {
+                    going.extend(on_paths);
+                }
+            };
+            match self.squares(low, high, self.squares.len()) {
+                Some(squares) => squares.for_each(look_at),
+                None => self.squares.keys().copied().for_each(&mut look_at),
             }
-        };
-        match self.squares(low, high, self.squares.len()) {
-            Some(squares) => squares.for_each(|square| self.rows_of(square).iter().copied().for_each(&mut look_at)),
-            None => self.rows.iter().copied().for_each(look_at),
         }
+        ascend(&mut going);
+        (still, going)
     }
 }
 
@@ -137,19 +148,25 @@ mod tests {
             };
             let mut boxes: Vec<[DVec2; 2]> = boxes.into_iter().map(around).collect();
             boxes.iter_mut().rev().take(endless).for_each(|[_, high]| high.x = f64::INFINITY);
-            let terrain = Terrain::new(boxes.clone(), 0.5);
+            let goes = |row: u32| row.is_multiple_of(3);
+            let terrain = Terrain::new(boxes.clone(), goes, 0.5);
             prop_assert!(terrain.at_large.is_sorted());
             prop_assert!((0..boxes.len() as u32).rev().take(endless).all(|row| terrain.at_large.contains(&row)));
-            for [low, high] in asked.into_iter().map(around) {
-                let mut found = Vec::new();
-                terrain.meeting(low, high, |row| found.push(row));
-                ascend(&mut found);
-                let meets = |row: &u32| {
-                    let [own_low, own_high] = boxes[*row as usize];
-                    !terrain.at_large.contains(row) && own_low.cmple(high).all() && own_high.cmpge(low).all()
-                };
-                prop_assert_eq!(found, (0..boxes.len() as u32).filter(meets).collect::<Vec<_>>());
-            }
+            let asked: Vec<_> = asked.into_iter().map(around).map(|[low, high]| (low, high)).collect();
+            let (mut still, going) = terrain.meeting(&asked);
+            still.sort_unstable();
+            still.dedup();
+            let meets = |(low, high): (DVec2, DVec2), row: u32| {
+                let [own_low, own_high] = boxes[row as usize];
+                !terrain.at_large.contains(&row) && own_low.cmple(high).all() && own_high.cmpge(low).all()
+            };
+            let rows = 0..boxes.len() as u32;
+            let pairs: Vec<_> = (0..asked.len()).flat_map(|number| rows.clone().map(move |row| (number, row))).collect();
+            let (moving, standing): (Vec<_>, Vec<_>) =
+                pairs.into_iter().filter(|&(number, row)| meets(asked[number], row)).partition(|pair| goes(pair.1));
+            prop_assert_eq!(still, standing);
+            prop_assert!(going.is_sorted() && going.iter().all(|&row| goes(row)));
+            prop_assert!(moving.iter().all(|(_, row)| going.contains(row)));
         }
     }
 }

@@ -34,20 +34,7 @@ impl Bounds {
 /// For each of some rectangles the rows of the statics that sweep over it in a step, ascending: with the number of the rectangle. Where a
 /// static comes in the step is found once, for all that it may come to at any time.
 pub(crate) fn sweeping(rectangles: &[(DVec2, DVec2)], setup: &Setup, step: u64) -> Vec<(usize, u32)> {
-    let (mut met, mut on_paths) = (Vec::new(), Vec::new());
-    let mut is_known = vec![0_u64; setup.statics.len().div_ceil(64)];
-    for (number, &(low, high)) in rectangles.iter().enumerate() {
-        setup.terrain.meeting(low, high, |row| {
-            if setup.path(row).is_none() {
-                return met.push((number, row));
-            }
-            let (known, bit) = (&mut is_known[row as usize / 64], 1_u64 << (row % 64));
-            if *known & bit == 0 {
-                *known |= bit;
-                on_paths.push(row);
-            }
-        });
-    }
+    let (mut met, on_paths) = setup.terrain.meeting(rectangles);
     let bounds = |&row: &u32| {
         let [low, high] = setup.static_box(row, step);
         (row as usize, low, high)
