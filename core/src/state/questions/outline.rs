@@ -4,7 +4,7 @@ use super::RayHit;
 use super::pieces;
 use super::tree::Bounds;
 use crate::model::body::Body;
-use crate::model::id::GlobalId;
+use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::Rot;
 use crate::model::piece::Piece;
@@ -16,8 +16,9 @@ use std::sync::Arc;
 #[repr(align(64))]
 pub(super) struct Outline {
     pub(super) id: GlobalId,
-    center: DVec2,
-    rotation: Rot,
+    pub(super) center: DVec2,
+    pub(super) rotation: Rot,
+    pub(super) kind: KindId,
     figure: Figure,
 }
 
@@ -36,16 +37,12 @@ impl Outline {
             Form::Box => Figure::Box { half: kind.extent },
             Form::Polygon | Form::Pieces => Figure::Pieces(kind.pieces.clone()),
         };
-        Self { id: body.id, center: body.position, rotation: body.rotation, figure }
+        Self { id: body.id, center: body.position, rotation: body.rotation, kind: body.kind, figure }
     }
 
     /// Cosine and sine.
     fn turned(&self) -> DVec2 {
         DVec2::new(f64::from(self.rotation.c), f64::from(self.rotation.s))
-    }
-
-    pub(super) fn center(&self) -> DVec2 {
-        self.center
     }
 
     /// A rectangle around it, a little larger than it need be, so that rounding leaves nothing out.

@@ -28,16 +28,15 @@ impl World {
             let half = kind.half_extents(sensor.rotation).as_dvec2() * (1.0 + 1e-6);
             let bounds = Bounds { low: sensor.position - half, high: sensor.position + half };
             self.visit_moving(bounds, |outline| {
+                let other = setup.kind(outline.kind);
                 // Statics that move are in no sensor.
-                let Some(body) = self.get(outline.id) else { return };
-                let other = setup.kind(body.kind);
-                if other.sensor || !kind.filter.admits(&other.filter) {
+                if !setup.has_kind(outline.kind) || other.sensor || !kind.filter.admits(&other.filter) {
                     return;
                 }
-                let offset = (body.position - sensor.position).as_vec2();
-                let manifold = nearest(kind, sensor.rotation, other, body.rotation, offset, 0.0);
+                let offset = (outline.center - sensor.position).as_vec2();
+                let manifold = nearest(kind, sensor.rotation, other, outline.rotation, offset, 0.0);
                 if manifold.nearest().is_some_and(|point| point.separation <= 0.0) {
-                    found.push((sensor.id, body.id));
+                    found.push((sensor.id, outline.id));
                 }
             });
         }

@@ -102,14 +102,14 @@ impl Tree {
     /// Takes time n log n for n outlines.
     pub(super) fn new(outlines: Vec<Outline>) -> Self {
         let around = |outlines: &[Outline]| {
-            let centers = outlines.iter().map(|outline| Bounds { low: outline.center(), high: outline.center() });
+            let centers = outlines.iter().map(|outline| Bounds { low: outline.center, high: outline.center });
             centers.fold(Bounds::NONE, Bounds::join)
         };
         let all = outlines.par_chunks(4096).map(around).reduce(|| Bounds::NONE, Bounds::join);
         let scale =
             DVec2::splat(f64::from((1 << ORDER) - 1)) / (all.high - all.low).max(DVec2::splat(f64::MIN_POSITIVE));
         let key = |outline: &Outline| {
-            let cell = (outline.center() - all.low) * scale;
+            let cell = (outline.center - all.low) * scale;
             along_curve(cell.x as u32, cell.y as u32)
         };
         let mut order: Vec<(u64, u32)> =
