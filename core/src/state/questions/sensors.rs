@@ -22,9 +22,11 @@ impl World {
     pub fn inside_sensors(&self, moving: &[Body]) -> Vec<(GlobalId, GlobalId)> {
         let setup = &self.setup;
         let fixed = setup.statics_at(self.step).filter(|body| setup.kind(body.kind).sensor);
+        let mut sensors: Vec<Body> = fixed.chain(moving.iter().copied()).collect();
+        sensors.sort_unstable_by_key(|sensor| sensor.id);
         let mut found = Vec::new();
-        for sensor in fixed.chain(moving.iter().copied()) {
-            let kind = setup.kind(sensor.kind);
+        for sensor in sensors {
+            let (kind, first) = (setup.kind(sensor.kind), found.len());
             let half = kind.half_extents(sensor.rotation).as_dvec2() * (1.0 + 1e-6);
             let bounds = Bounds { low: sensor.position - half, high: sensor.position + half };
             self.visit_moving(bounds, |outline| {
@@ -39,8 +41,8 @@ impl World {
                     found.push((sensor.id, outline.id));
                 }
             });
+            found[first..].sort_unstable();
         }
-        found.sort_unstable();
         found
     }
 }
