@@ -55,7 +55,7 @@ fn of_run(folder: &RunFolder, trouble: &mut Vec<String>) -> Result<String, RunEr
     let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
     let tiling = tiles::in_words(tiles, config.run.retiling.map(|retiling| retiling.how));
     let seed = if matches!(config.scene.kind, SceneKind::File(_)) { String::new() } else { format!(", seed {seed}") };
-    let mut text = format!("{kind}: {bodies} bodies{seed}, {tiling}\n");
+    let mut text = format!("{kind}: {}{seed}, {tiling}\n", plural(bodies, "body"));
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     let mut told = |what: Result<String, String>| {

@@ -7,6 +7,7 @@ use super::output::{self, Kept};
 use super::progress::Show;
 use crate::config::{Config, OutputConfig};
 use crate::error::{Exit, RunError};
+use crate::folder::RunFolder;
 use crate::look::film::{Film, FilmKind, Rate, remove_unfinished};
 use crate::look::frame::{Frame, Setting};
 use crate::look::picture::{ColorBy, Layers, Look, Painter, View, whole_view};
@@ -148,8 +149,10 @@ fn open(args: &RenderArgs) -> Result<Source, RunError> {
         return Err(unsuitable(option, "what is recorded stays as it is; name a configuration to run it anew"));
     }
     if let Some(option) = needs_run(args) {
-        let again = args.source.join("run.toml");
-        let reason = format!("a recording does not tell; {} runs it again, and shows it", again.display());
+        let folder = RunFolder::new("render", &args.source);
+        let again = folder.configuration();
+        let but = if folder.commands().exists() { ", but without what was done in it" } else { "" };
+        let reason = format!("a recording does not tell; {} runs it again, and shows it{but}", again.display());
         return Err(unsuitable(option, reason));
     }
     let recorded = Recorded::open(&args.source)?;

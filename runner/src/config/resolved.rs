@@ -11,6 +11,10 @@ use toml::Value;
 const HEADING: &str = "# The configuration of this run, every key with the value that was used. `atoll run` this file \
                        to repeat it.\n";
 
+/// Stands below it.
+const MORE: &str =
+    "# What was done in the run, if anything was, is in commands.jsonl: give that with `--commands` as well.\n";
+
 impl Config {
     /// Every key with the value that is used, in the order of the documentation; keys that nobody chose and that have
     /// no default are left out. `tiles` is the grid that is really used.
@@ -25,7 +29,7 @@ impl Config {
 
     /// [`entries`](Self::entries) as a file that repeats the run.
     pub fn to_toml(&self, tiles: [u32; 2]) -> String {
-        let mut text = HEADING.to_owned();
+        let mut text = format!("{HEADING}{MORE}");
         let mut begun = "";
         for (path, value) in self.entries(tiles) {
             let (section, key) = path.split_once('.').expect("every key is in a section");

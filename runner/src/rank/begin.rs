@@ -66,11 +66,14 @@ pub(super) fn check_crowding(world: &World, transport: &mut impl Transport) -> R
     let told = transport.all_gather(bytemuck::bytes_of(&own)).map_err(RankError::Transport)?;
     let told: Vec<[u64; 2]> = records(&told).map_err(RankError::Transport)?;
     let [pairs, bodies] = [0, 1].map(|which| told.iter().map(|counts| counts[which]).sum::<u64>());
-    if pairs <= PAIRS + PAIRS_OF_A_BODY * bodies {
-        return Ok(());
-    }
-    let error = RunError::Crowded { pairs, bodies };
-    Err(RankError::Agreed { text: error.to_string(), exit: error.exit() })
+    let refused = |error: RunError| RankError::Agreed { text: error.to_string(), exit: error.exit() };
+    not_crowded(pairs, bodies).map_err(refused)
+}
+
+/// Refuses so many pairs of bodies that are nearer to each other than they are wide, as [`World::crowding`] counts them.
+pub(crate) fn not_crowded(pairs: u64, bodies: u64) -> Result<(), RunError> {
+    let is_crowded = pairs > PAIRS + PAIRS_OF_A_BODY * bodies;
+    if is_crowded { Err(RunError::Crowded { pairs, bodies }) } else { Ok(()) }
 }
 
 /// This rank's part of a scene that is made, with which nothing can be wrong on one rank alone.

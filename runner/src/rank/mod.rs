@@ -17,6 +17,7 @@ mod recorder;
 pub(crate) mod trace;
 pub(crate) mod trouble;
 
+pub(crate) use begin::not_crowded;
 pub use begin::scene as part_of_scene;
 pub(crate) use commands::check_commands;
 pub(crate) use facts::{Gathered, RankFacts};

@@ -11,7 +11,7 @@ impl fmt::Display for Summary {
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
         let tiling = tiles::in_words(self.tiles, self.retile);
         let seed = if self.is_seeded { format!(", seed {}", self.seed) } else { String::new() };
-        writeln!(f, "{}: {} bodies{seed}, {tiling}", self.scene, self.bodies)?;
+        writeln!(f, "{}: {}{seed}, {tiling}", self.scene, plural(self.bodies, "body"))?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
         let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };
@@ -48,11 +48,12 @@ impl Summary {
         row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
         let [mean, most] = [self.constraint_violation, self.max_constraint_violation].map(Figure);
         row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
-        let (islands, largest, colors) = (self.islands, self.largest_island, self.colors);
-        let asleep = if self.asleep > 0 { format!(", {} bodies asleep", self.asleep) } else { String::new() };
+        let (islands, largest) = (self.islands, plural(self.largest_island, "body"));
+        let colors = plural(self.colors, "color");
+        let asleep = if self.asleep > 0 { format!(", {} asleep", plural(self.asleep, "body")) } else { String::new() };
         // One over a border is counted in each of its tiles.
         let within = if self.tile_count > 1 { " within tiles" } else { "" };
-        row(f, "islands", format_args!("{islands}{within}, the largest of {largest} bodies{asleep}; {colors} colors"))?;
+        row(f, "islands", format_args!("{islands}{within}, the largest of {largest}{asleep}; {colors}"))?;
         let [half_v2, spin2] = [self.mean_half_v2, self.mean_spin2].map(Figure);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;

@@ -6,10 +6,10 @@ use super::super::output;
 use crate::config::{Config, Override};
 use crate::error::{Exit, RunError};
 use crate::plan::Plan;
-use crate::rank::part_of_scene;
+use crate::rank::{not_crowded, part_of_scene};
 use crate::scene::SceneFile;
 use crate::scene::file::Found;
-use crate::wording::{Figure, OneLine};
+use crate::wording::{Figure, OneLine, plural};
 use atoll_core::{Facts, Loopback, Shape};
 use atoll_transport::Rank;
 use std::fmt::Write as _;
@@ -43,6 +43,7 @@ pub(super) fn run(args: &SceneCheckArgs) -> Result<Exit, RunError> {
     match Plan::new(&config) {
         Ok(plan) => {
             let world = part_of_scene(&plan, Rank(0))?;
+            not_crowded(world.crowding(), world.body_count() as u64)?;
             let measured = atoll_core::measure(&world, &mut Loopback);
             let facts = Facts::total(measured.map_err(|error| RunError::Unsuitable {
                 option: args.scene.display().to_string(),
@@ -65,14 +66,17 @@ pub(super) fn run(args: &SceneCheckArgs) -> Result<Exit, RunError> {
 
 fn in_words(scene: &SceneFile, found: &Found) -> String {
     let name = scene.name().map(|name| format!("{}: ", OneLine(name))).unwrap_or_default();
-    let mut text = format!("{name}{} bodies, {} statics\n", scene.count(), scene.statics().len());
+    let counts = [(scene.count(), "body"), (scene.statics().len() as u64, "static")];
+    let [bodies, statics] = counts.map(|(count, word)| plural(count, word));
+    let mut text = format!("{name}{bodies}, {statics}\n");
     let (low, high) = scene.domain();
     row(&mut text, "domain", &format!("{}, {} to {}, {} m", low.x, low.y, high.x, high.y));
     if let Some((low, high)) = found.extent {
         row(&mut text, "extent", &format!("{:.6}, {:.6} to {:.6}, {:.6} m", low.x, low.y, high.x, high.y));
     }
     if found.outside > 0 {
-        row(&mut text, "outside", &format!("{} bodies are outside of the domain", found.outside));
+        let are = if found.outside == 1 { "is" } else { "are" };
+        row(&mut text, "outside", &format!("{} {are} outside of the domain", plural(found.outside, "body")));
     }
     if let Some([least, most]) = found.ids {
         row(&mut text, "ids", &format!("{least} to {most}"));

@@ -5,6 +5,7 @@ use super::letter;
 use super::source::Source;
 use crate::config;
 use crate::plan::tiles;
+use crate::wording::plural;
 use std::fmt::Write as _;
 
 /// What the page is called.
@@ -142,7 +143,7 @@ fn facts(sources: &[Source]) -> String {
     fn whole(source: &Source, key: &str) -> Option<String> {
         source.number(key).map(|number| Whole(number as u64).to_string())
     }
-    let rows: [(&str, Fact); 20] = [
+    let rows: [(&str, Fact); 21] = [
         ("Scene", |source| Some(source.config.scene.kind.name().to_owned())),
         ("Seed", |source| Some(source.config.scene.seed.to_string())),
         ("Bodies", |source| Some(Whole(source.config.scene.bodies).to_string())),
@@ -179,6 +180,9 @@ fn facts(sources: &[Source]) -> String {
         ("Sent between ranks", |source| {
             let (bytes, messages) = (source.number("bytes_sent")?, whole(source, "messages_sent")?);
             Some(format!("{} in {messages} messages", Unit(bytes, "B")))
+        }),
+        ("Commands", |source| {
+            source.commands.map(|count| format!("{}, in <code>commands.jsonl</code>", plural(count, "line")))
         }),
         ("Migrations", |source| {
             let since = whole(source, "resumed_at").filter(|step| step != "0");

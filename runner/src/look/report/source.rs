@@ -2,6 +2,7 @@
 //! asked to write it.
 
 use super::columns::Columns;
+use crate::command::Script;
 use crate::config::Config;
 use crate::error::RunError;
 use crate::folder::recording::{Recording, RecordingError};
@@ -29,6 +30,8 @@ pub(super) struct Source {
     /// Time of each phase of each rank.
     pub timings: Option<Columns>,
     pub recording: Option<Recording>,
+    /// How many commands there were, if any, and how many are to come.
+    pub commands: Option<u64>,
     /// Bytes on disk: of the recording, of snapshots.
     pub size: [u64; 2],
 }
@@ -61,6 +64,8 @@ impl Source {
             Err(RecordingError::Nothing { .. }) => None,
             Err(error) => return Err(error.into()),
         };
+        let commands = folder.commands().exists().then(|| Script::load_recorded(&folder.commands())).transpose();
+        let commands = commands.map_err(|error| refusal(error.to_string()))?.map(|script| script.lines.len() as u64);
         let bytes = |files: &[PathBuf]| files.iter().map(|file| fs::metadata(file).map_or(0, |data| data.len())).sum();
         let recorded = recording.as_ref().map_or(0, |recording| bytes(recording.files()));
         let size = [recorded, size_within(&folder.snapshots()).unwrap_or(0)];
@@ -74,6 +79,7 @@ impl Source {
             log: table("log.csv")?,
             timings: table("timings.csv")?,
             recording,
+            commands,
             size,
         })
     }
