@@ -1,6 +1,8 @@
 //! Signals that ask a run to stop.
 
 use super::console::complain;
+use crate::error::Exit;
+use crate::folder::durable::give_up_begun;
 use crate::rank::StopFlag;
 use std::error::Error;
 #[cfg(unix)]
@@ -42,6 +44,18 @@ pub(super) fn stop_on_signals(announce: bool, quit: impl Fn() + Send + 'static) 
         warn!("interrupts will end the run without a summary: {error}");
     }
     flag
+}
+
+/// Has the same signals end the program with a word, and nothing half written behind: for what is done at once or not at all.
+pub(super) fn quit_on_signals() {
+    let quit = |_| {
+        give_up_begun();
+        complain(&"interrupted before it was done");
+        std::process::exit(Exit::Interrupted as i32)
+    };
+    if let Err(error) = listen(quit) {
+        warn!("interrupts may leave files behind: {error}");
+    }
 }
 
 /// Calls `heard` at every signal, on a thread of its own.

@@ -36,6 +36,9 @@ pub fn main() -> ExitCode {
     };
     let begun = console::init(matches!(&command, Command::Run(args) if args.trace.is_some()));
     interrupt::outlive_file_limits();
+    if matches!(command, Command::Diff(_) | Command::Info(_) | Command::Report(_) | Command::Scene(_)) {
+        interrupt::quit_on_signals();
+    }
     let result = begun.and_then(|()| match &command {
         Command::Run(args) => run::run(args),
         Command::View(args) => view::run(args),
