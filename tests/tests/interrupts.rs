@@ -97,3 +97,20 @@ fn an_interrupted_run_is_the_beginning_of_the_whole_one() {
         assert_eq!(cut[key], whole[key], "{key}");
     }
 }
+
+/// Files that are begun under other names are not left.
+#[test]
+fn an_interrupted_export_leaves_nothing_half_written() {
+    let folder = tempdir().unwrap();
+    let export = ["scene", "export", "configs/normal.toml", "--bodies", "1000000", "--bodies-as", "csv", "--out"];
+    let running = Running::start(program::command().args(export).arg(folder.path()));
+    let names = || folder.path().read_dir().unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
+    while !names().any(|name| name.starts_with(".bodies.csv.")) {
+        assert!(names().next().is_none(), "it was done before it was seen");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    running.signal("TERM");
+    let ended = running.end();
+    assert_eq!((ended.code, ended.complaints().len()), (Some(130), 1), "{ended}");
+    assert_eq!(names().collect::<Vec<_>>(), Vec::<String>::new());
+}
