@@ -81,7 +81,7 @@ impl<'a> Job<'a> {
                 let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
                 (self.groups.range(color.slice(slice)), bodies)
             };
-            groups.pass::<V::Wide>(pass, bodies);
+            groups.pass_color::<V::Wide>(color, pass, bodies);
         }
     }
 

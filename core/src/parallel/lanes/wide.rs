@@ -26,6 +26,38 @@ pub(crate) trait Wide: Arithmetic {
     fn any_positive(self) -> bool;
 }
 
+/// The first of sixteen alone, where the others have nothing to do.
+impl Wide for f32 {
+    #[inline(always)]
+    fn load(from: &WideRow) -> Self {
+        from[0]
+    }
+    #[inline(always)]
+    fn store(self, to: &mut WideRow) {
+        to[0] = self;
+    }
+    #[inline(always)]
+    fn gather(from: &[Cell<Quad>], index: &[u32; WIDE]) -> [Self; 4] {
+        from[index[0] as usize].get()
+    }
+    #[inline(always)]
+    fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; WIDE]) {
+        to[index[0] as usize].set(columns);
+    }
+    #[inline(always)]
+    fn load_quads(from: &[Quad; WIDE]) -> [Self; 4] {
+        from[0]
+    }
+    #[inline(always)]
+    fn store_quads(columns: [Self; 4], to: &mut [Quad; WIDE]) {
+        to[0] = columns;
+    }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self > 0.0
+    }
+}
+
 /// Two eights.
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<V>(V, V);

@@ -139,7 +139,7 @@ impl<'a> Slices<'a> {
 
     /// One pass over all of them.
     #[inline(always)]
-    pub(crate) fn pass<V: Wide>(self, pass: impl Pass, bodies: Table<'_>) {
+    fn pass<V: Wide>(self, pass: impl Pass, bodies: Table<'_>) {
         for group in self.single {
             fetch_rows_behind(group);
             pass.group::<V, 1>(group, bodies);
@@ -147,6 +147,28 @@ impl<'a> Slices<'a> {
         for group in self.double {
             fetch_rows_behind(group);
             pass.group::<V, 2>(group, bodies);
+        }
+    }
+
+    /// One pass over some of their contacts, one by one. Not inlined: it is the same with any instructions.
+    #[inline(never)]
+    fn pass_each(self, contacts: &[At], pass: impl Pass, bodies: Table<'_>) {
+        let (mut single, mut double) = (Group::EMPTY, Group::EMPTY);
+        for &At { column, lane, group } in contacts {
+            let (lane, group) = (usize::from(lane), group as usize);
+            match column {
+                0 => self.single[group].pass_lane(lane, &mut single, pass, bodies),
+                _ => self.double[group].pass_lane(lane, &mut double, pass, bodies),
+            }
+        }
+    }
+
+    /// One pass over the groups of a color.
+    #[inline(always)]
+    pub(crate) fn pass_color<V: Wide>(self, color: &Color, pass: impl Pass, bodies: Table<'_>) {
+        match &color.one_by_one[..] {
+            [] => self.pass::<V>(pass, bodies),
+            contacts => self.pass_each(contacts, pass, bodies),
         }
     }
 
@@ -182,13 +204,31 @@ impl SharedColumns<'_> {
     }
 }
 
-/// The groups of one color of a batch.
+/// A contact among the groups of a color.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct At {
+    column: u8,
+    lane: u8,
+    group: u32,
+}
+
+impl At {
+    /// That of such a number in a column, counted by lanes.
+    pub(super) fn new(column: usize, number: usize) -> Self {
+        Self { column: column as u8, lane: (number % WIDE) as u8, group: (number / WIDE) as u32 }
+    }
+}
+
+/// The groups of one color of a batch, or of several that have few contacts each.
 #[derive(Clone, Debug)]
 pub(crate) struct Color {
     /// Within the batch's groups.
     pub(super) groups: Each<Range<usize>>,
     /// Into how many pieces the groups are cut.
     pub(crate) slices: u32,
+    /// Where these are several colors of few contacts, in which order these are solved, one after the other: empty where they are one
+    /// color.
+    pub(super) one_by_one: Vec<At>,
 }
 
 impl Color {

@@ -1,5 +1,6 @@
 //! Groups: sixteen contacts side by side, one in each lane.
 
+use super::kernels::{Pass, Table};
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
 /// Sixteen contacts of `N` points each that share no moving body. All rows are mass-weighted.
@@ -82,6 +83,34 @@ impl PointRows {
 impl<const N: usize> Group<N> {
     pub(crate) const EMPTY: Self =
         Self { sides: Sides::EMPTY, points: [PointRows::EMPTY; N], totals: [Totals::NONE; N] };
+
+    /// A pass over the contact in a lane alone, which for that goes to the first lane of another group.
+    #[inline(always)]
+    pub(super) fn pass_lane(&mut self, lane: usize, alone: &mut Self, pass: impl Pass, bodies: Table<'_>) {
+        let (own, sides) = (&self.sides, &mut alone.sides);
+        (sides.a[0], sides.b[0]) = (own.a[lane], own.b[lane]);
+        (sides.normal_x[0], sides.normal_y[0]) = (own.normal_x[lane], own.normal_y[lane]);
+        sides.friction[0] = own.friction[lane];
+        for (own, alone) in self.points.iter().zip(&mut alone.points) {
+            (alone.normal_a[0], alone.normal_b[0]) = (own.normal_a[lane], own.normal_b[lane]);
+            (alone.tangent_a[0], alone.tangent_b[0]) = (own.tangent_a[lane], own.tangent_b[lane]);
+            (alone.normal_mass[0], alone.tangent_mass[0]) = (own.normal_mass[lane], own.tangent_mass[lane]);
+            (alone.first_separation[0], alone.separation[0]) = (own.first_separation[lane], own.separation[lane]);
+            (alone.normal_impulse[0], alone.tangent_impulse[0]) = (own.normal_impulse[lane], own.tangent_impulse[lane]);
+        }
+        for (own, alone) in self.totals.iter().zip(&mut alone.totals) {
+            (alone.normal[0], alone.tangent[0]) = (own.normal[lane], own.tangent[lane]);
+        }
+        pass.group::<f32, N>(alone, bodies);
+        // All that passes change.
+        for (own, alone) in self.points.iter_mut().zip(&alone.points) {
+            own.separation[lane] = alone.separation[0];
+            (own.normal_impulse[lane], own.tangent_impulse[lane]) = (alone.normal_impulse[0], alone.tangent_impulse[0]);
+        }
+        for (own, alone) in self.totals.iter_mut().zip(&alone.totals) {
+            (own.normal[lane], own.tangent[lane]) = (alone.normal[0], alone.tangent[0]);
+        }
+    }
 }
 
 /// The speed of a body along a row.
