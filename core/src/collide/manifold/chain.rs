@@ -29,8 +29,14 @@ type AtEnd = Option<(f32, Manifold)>;
 
 /// The manifold of a segment, of which `own` has the face first, and a piece, seen from the body of the segment. `center` is that of
 /// the piece, which is before the segment; or over it, where the piece [lies](Lies) there already and no more than so far behind. What has no
-/// contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance).
-pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, center: Vec2, lies: Lies) -> Manifold {
+/// contact with it here, as another segment has, only [tells how far it is](Manifold::is_distance); what is further than `reach` need not.
+pub(super) fn collide(
+    own: &Convex,
+    side: Side,
+    (other, radius, center): (&Convex, f32, Vec2),
+    reach: f32,
+    lies: Lies,
+) -> Manifold {
     let [to, from] = own.edge(0);
     let along = to - from;
     let length = dot(along, along).sqrt();
@@ -40,6 +46,12 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let none = (f32::INFINITY, from, 0);
     let highest = heights.clone().fold(f32::NEG_INFINITY, |most, at| max(at.0, most));
     let (lowest, corner, number) = heights.fold(none, |least, at| if at.0 < least.0 { at } else { least });
+    let places = other.corners().map(|corner| dot(corner - from, along));
+    let ends = places.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], at| [min(low, at), max(high, at)]);
+    let far = reach + radius;
+    if lowest > far || highest < -far || ends[0] > length + far || ends[1] < -far {
+        return Manifold::EMPTY;
+    }
     let is_over = (0.0..=length).contains(&dot(corner - from, along));
     let is_center_over = (0.0..=length).contains(&dot(center - from, along));
     let is_pressed = is_center_over && lies.is_some_and(|most| highest + radius >= -most);
@@ -49,7 +61,8 @@ pub(super) fn collide(own: &Convex, side: Side, other: &Convex, radius: f32, cen
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
     // What has come behind the segment around an end of it is not pressed into its face.
     let is_behind = |over: &Manifold| over.nearest().is_some_and(|nearest| nearest.separation < 0.0);
-    let band = -(radius + lies.unwrap_or(0.0))..=radius;
+    // Its lowest corner may be above the surface by no more than rounding then.
+    let band = -(radius + lies.unwrap_or(0.0))..=max(radius, lowest);
     let over = over.filter(|over| !is_behind(over) || comes_to(other, [from, along, n], length, radius, band));
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over

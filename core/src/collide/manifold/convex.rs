@@ -30,7 +30,7 @@ pub(in crate::collide) fn collide(
     let (own, other) = (&a.outline, &b.outline.seen(turn, seen));
     let radii = [a.radius, b.radius];
     let mut manifold = match a.side {
-        Some(side) => chain::collide(own, side, other, b.radius, turn.rotate(b.center) + seen, lies),
+        Some(side) => chain::collide(own, side, (other, b.radius, turn.rotate(b.center) + seen), reach, lies),
         None => polygons(own, other, radii, reach),
     };
     manifold.normal = rot_a.rotate(manifold.normal);
