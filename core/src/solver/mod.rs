@@ -290,8 +290,10 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use crate::model::id::KindId;
-    use crate::testing::rectangle;
-    use crate::{Blueprint, Body, Exchange, GlobalId, Loopback, Params, Partition, StaticBody, TileId, World, step};
+    use crate::testing::{circle, rectangle};
+    use crate::{
+        Blueprint, Body, Exchange, GlobalId, Loopback, Parallel, Params, Partition, StaticBody, TileId, World, step,
+    };
     use glam::{DVec2, Vec2};
 
     /// Two towers, one of them on the border of two tiles, and a box that falls onto the other.
@@ -359,5 +361,31 @@ mod tests {
         }
         assert!(states[0] != states[1], "nothing has bounced");
         assert!(counts[0] < counts[149] && counts[140..].iter().all(|&count| count == counts[149]), "{counts:?}");
+    }
+
+    /// Discs that fall and bounce, with blows that go on from tile to tile; some alone, in batches that are solved at once or keep their rows.
+    #[test]
+    fn who_bounces_beside_blows_from_other_tiles_does_so_once_in_any_batch() {
+        let [mut serial, mut islands] = [Parallel::Serial, Parallel::Islands].map(|parallel| {
+            let gravity = Vec2::new(0.0, -10.0);
+            let params = Params { exchange: Exchange::Substep, gravity, parallel, ..Params::default() };
+            let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(24.0), 6, 6).unwrap();
+            let floor = StaticBody::new(GlobalId(0), rectangle(60.0, 1.0), DVec2::new(12.0, 0.0));
+            let mut kind = circle(0.25);
+            kind.material.restitution = 1.0;
+            let blueprint = Blueprint { params, partition, kinds: vec![kind], statics: vec![floor] };
+            let mut world = World::whole(&blueprint).unwrap();
+            for k in 0..1600_u32 {
+                let place = DVec2::new(0.4 + 0.58 * f64::from(k % 40), 1.0 + 0.56 * f64::from(k / 40));
+                let velocity = Vec2::new((k * 37 % 101) as f32 - 50.0, (k * 53 % 103) as f32 - 51.0) * 0.1;
+                let body = Body::at_rest(GlobalId(u64::from(k) + 1), KindId(0), place);
+                world.add(Body { velocity, ..body }).unwrap();
+            }
+            world
+        });
+        for at in 0..80 {
+            let [one, other] = [&mut serial, &mut islands].map(|world| step(world, &mut Loopback).unwrap());
+            assert_eq!((one, serial.hashes()), (other, islands.hashes()), "step {at}");
+        }
     }
 }

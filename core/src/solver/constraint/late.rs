@@ -23,13 +23,19 @@ pub(super) struct Late {
     contacts: Vec<u8>,
     /// The solver's bodies that go on, for how long, in s, and their velocities before they bounce.
     before: Vec<(usize, f32, Quad)>,
+    /// The contacts whose bodies have risen in this step.
+    risen: Vec<u32>,
 }
 
 impl Late {
-    /// Finds the bounces whose bodies touch nobody else, and tells how long these go on.
-    pub(super) fn find(&mut self, bounces: [&mut [Bounce]; 2], source: Source<'_>) {
-        let Self { contacts, .. } = self;
+    /// Finds the bounces whose bodies touch nobody else, and tells how long these go on; for the first time in a step, or anew.
+    pub(super) fn find(&mut self, bounces: [&mut [Bounce]; 2], is_first: bool, source: Source<'_>) {
+        let Self { contacts, risen, .. } = self;
         contacts.clear();
+        if is_first {
+            risen.clear();
+        }
+        risen.sort_unstable();
         if !bounces.iter().any(|bounces| bounces.iter().any(Bounce::parts)) {
             return;
         }
@@ -41,6 +47,9 @@ impl Late {
             let is_alone = bounce.moving().all(|body| contacts[body as usize] == 1);
             if is_alone && !source.is_driven(bounce.contact as usize) {
                 bounce.go_on(source);
+                if risen.binary_search(&bounce.contact).is_ok() {
+                    bounce.rise = 0.0;
+                }
             }
         }
     }
@@ -61,8 +70,11 @@ impl Late {
             let (velocity, pose) = (at.bodies(&bodies.velocity), at.bodies_mut(&mut bodies.pose));
             let came = points.iter().filter(|point| point.first_separation[lane] >= 0.0);
             let sunk = came.map(|point| -sides.separation(point, lane, velocity, pose)).fold(0.0, max);
+            sides.move_apart(lane, sunk + bounce.rise, velocity, pose);
             // Once, however often they are asked to bounce.
-            sides.move_apart(lane, sunk + std::mem::take(&mut bounce.rise), velocity, pose);
+            if std::mem::take(&mut bounce.rise) != 0.0 {
+                self.risen.push(bounce.contact);
+            }
             let places = bounce.moving().map(|body| bodies.places()[body as usize].get());
             self.before.extend(places.map(|place| (place, bounce.left, bodies.velocity[place])));
         }

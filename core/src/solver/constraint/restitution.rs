@@ -85,7 +85,7 @@ impl Groups {
         // Who comes in faster first: that may be all it takes, where several throw the same body back.
         let first = |bounce: &Bounce, other: &Bounce| other.closing.total_cmp(&bounce.closing);
         let Self { bounces, bounces_at_once, lanes, energies, late, on, .. } = self;
-        late.find([bounces, bounces_at_once], source);
+        late.find([bounces, bounces_at_once], heard.is_empty(), source);
         let batch = |bounce: &Bounce| lanes[bounce.contact as usize].base;
         bounces.sort_by(first);
         bounces_at_once.sort_by(|one, other| batch(one).cmp(&batch(other)).then_with(|| first(one, other)));
