@@ -76,7 +76,8 @@ impl<'a> Job<'a> {
     fn colors_of_stage<V: Lanes>(&self, stage: &[Color], slice: u32, pass: impl Pass) {
         for color in stage {
             // SAFETY: the pieces of a stage are different groups of one color, and these share no body that moves; each
-            // piece has a body of its own that stands for statics. A stage of several colors has one piece.
+            // piece has a body of its own that stands for statics. A stage of several colors has one piece, and so have contacts that
+            // are solved one by one.
             let (groups, bodies) = unsafe {
                 let bodies = Table { velocity: self.velocity.cells(), pose: self.pose.cells() };
                 (self.groups.range(color.slice(slice)), bodies)

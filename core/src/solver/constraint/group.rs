@@ -3,7 +3,7 @@
 use super::kernels::{Pass, Table};
 use crate::parallel::lanes::{Quad, WIDE, WideRow};
 
-/// Sixteen contacts of `N` points each that share no moving body. All rows are mass-weighted.
+/// Sixteen contacts of `N` points each that share no moving body, or are solved one by one. All rows are mass-weighted.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Group<const N: usize> {
