@@ -28,7 +28,7 @@ pub enum Exit {
     Physics = 4,
     /// Output could not be written.
     Output = 5,
-    /// Interrupted; the summary tells how far it came.
+    /// Interrupted; of a run the summary tells how far it came.
     Interrupted = 130,
 }
 

@@ -106,7 +106,7 @@ fn an_interrupted_export_leaves_nothing_half_written() {
     let running = Running::start(program::command().args(export).arg(folder.path()));
     let names = || folder.path().read_dir().unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
     while !names().any(|name| name.starts_with(".bodies.csv.")) {
-        assert!(names().next().is_none(), "it was done before it was seen");
+        assert!(!folder.path().join("bodies.csv").exists(), "it was done before it was seen");
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     running.signal("TERM");

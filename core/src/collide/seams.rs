@@ -25,7 +25,8 @@ const LEVEL_BY_SIZE: f32 = 0.02;
 /// Normals count as one whose angle has a greater cosine.
 const ONE_NORMAL: f32 = 0.999_99;
 
-/// Looks again for those contacts of a tile that are behind others. Time grows with the contacts of a body times the directions of these.
+/// Looks again for those contacts of a tile that are behind others. Time grows with the contacts of a body times the directions of these, where
+/// those of one direction stand out alike.
 pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let (mut gone, mut first) = (Vec::new(), 0);
     while let Some(run) = next_of_several(tile, first) {

@@ -3,7 +3,7 @@
 //! met a static.
 
 use crate::collide::passage::Passage;
-use crate::exchange::far::sweeping;
+use crate::exchange::far::each_swept;
 use crate::model::body::Body;
 use crate::model::contact::SlotKind;
 use crate::model::kind::KindRow;
@@ -88,8 +88,8 @@ pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
         (middle - half, middle + half)
     };
     let around: Vec<_> = ways.iter().map(around).collect();
-    for met in sweeping(&around, setup, step).chunk_by(|one, two| one.0 == two.0) {
-        let Way { row, start, rotation } = ways[met[0].0];
+    each_swept(&around, setup, step, |way, met| {
+        let Way { row, start, rotation } = ways[way];
         let body = tile.bodies.get(row);
         let (kind, whole) = (setup.kind(body.kind), body.position - start);
         let passage = Passage::new(kind, [rotation, body.rotation], whole.as_vec2());
@@ -109,7 +109,7 @@ pub(crate) fn hold(tile: &mut Tile, ways: &[Way], setup: &Setup, step: u64) {
             tile.bodies.position[row] = carried(start + whole * f64::from(part), part, &course, setup);
             tile.bodies.rotation[row] = passage.rotation_at(part);
         }
-    }
+    });
 }
 
 /// The passage of a static, given where it is as the step begins and as it ends.

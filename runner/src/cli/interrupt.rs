@@ -1,4 +1,4 @@
-//! Signals that ask a run to stop.
+//! Signals that ask a run, or whatever else is done, to stop.
 
 use super::console::complain;
 use crate::error::Exit;
@@ -46,7 +46,7 @@ pub(super) fn stop_on_signals(announce: bool, quit: impl Fn() + Send + 'static) 
     flag
 }
 
-/// Has the same signals end the program with a word, and nothing half written behind: for what is done at once or not at all.
+/// Has the same signals end the program with a word, and no file half written behind: for what is no run.
 pub(super) fn quit_on_signals() {
     let quit = |_| {
         give_up_begun();

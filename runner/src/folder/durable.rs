@@ -4,7 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What this process has begun under other names and not finished.
 static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -19,23 +19,32 @@ const MOST_LINKS: usize = 40;
 pub(crate) fn write_durably(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let path = &follow(path)?;
     let temporary = temporary(path);
-    let begun = || BEGUN.lock().unwrap_or_else(PoisonError::into_inner);
-    begun().push(temporary.clone());
-    let written = File::create(&temporary).and_then(|mut file| {
+    let begin = || {
+        let mut begun = begun();
+        begun.push(temporary.clone());
+        File::create(&temporary)
+    };
+    let written = begin().and_then(|mut file| {
         write(&mut file)?;
         file.sync_all()
     });
-    let renamed = written.and_then(|()| fs::rename(&temporary, path)).and_then(|()| sync_folder_of(path));
+    let mut begun = begun();
+    let renamed = written.and_then(|()| fs::rename(&temporary, path));
     if renamed.is_err() {
         drop(fs::remove_file(&temporary));
     }
-    begun().retain(|path| *path != temporary);
-    renamed
+    begun.retain(|path| *path != temporary);
+    drop(begun);
+    renamed.and_then(|()| sync_folder_of(path))
+}
+
+fn begun() -> MutexGuard<'static, Vec<PathBuf>> {
+    BEGUN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes what was begun and not finished, for whoever is about to end this process; from then on nothing is begun or finished.
 pub(crate) fn give_up_begun() {
-    let begun = BEGUN.lock().unwrap_or_else(PoisonError::into_inner);
+    let begun = begun();
     begun.iter().for_each(|path| drop(fs::remove_file(path)));
     // Never unlocked again.
     std::mem::forget(begun);

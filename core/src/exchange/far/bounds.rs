@@ -31,9 +31,26 @@ impl Bounds {
     }
 }
 
-/// For each of some rectangles the rows of the statics that sweep over it in a step, ascending: with the number of the rectangle. Where a
-/// static comes in the step is found once, for all that it may come to at any time.
-pub(crate) fn sweeping(rectangles: &[(DVec2, DVec2)], setup: &Setup, step: u64) -> Vec<(usize, u32)> {
+/// So many rectangles are looked at together: these may be swept by very many.
+const TOGETHER: usize = 256;
+
+/// Shows for each of some rectangles, by its number, the rows of the statics that sweep over it in a step, ascending, if there are any. Where a
+/// static comes in the step is found once for many rectangles, however many it may come to at any time.
+pub(crate) fn each_swept(
+    rectangles: &[(DVec2, DVec2)],
+    setup: &Setup,
+    step: u64,
+    mut show: impl FnMut(usize, &[(usize, u32)]),
+) {
+    for (part, some) in rectangles.chunks(TOGETHER).enumerate() {
+        for swept in sweeping(some, setup, step).chunk_by(|one, two| one.0 == two.0) {
+            show(TOGETHER * part + swept[0].0, swept);
+        }
+    }
+}
+
+/// The same of rectangles that are looked at together, each static with the number of its rectangle.
+fn sweeping(rectangles: &[(DVec2, DVec2)], setup: &Setup, step: u64) -> Vec<(usize, u32)> {
     let (mut met, on_paths) = setup.terrain.meeting(rectangles);
     let bounds = |&row: &u32| {
         let [low, high] = setup.static_box(row, step);

@@ -15,7 +15,7 @@
 mod bounds;
 mod unseen;
 
-pub(crate) use bounds::sweeping;
+pub(crate) use bounds::each_swept;
 
 use crate::exchange::mail::{Mail, Mailbag};
 use crate::exchange::overlap::Outline;
@@ -198,7 +198,8 @@ fn find_on_the_way(tile: &Tile, setup: &Setup, step: u64) -> Vec<u32> {
     let rows = (0..tile.bodies.len()).filter(may);
     let ways = rows.map(|row| surroundings(&tile.bodies, row, tile.rectangle.min, setup));
     let ways: Vec<_> = ways.filter(|(low, high)| !(low.cmpge(near.min) & high.cmple(near.max)).all()).collect();
-    let mut met = sweeping(&ways, setup, step).into_iter().map(|(_, row)| row).collect();
+    let mut met = Vec::new();
+    each_swept(&ways, setup, step, |_, swept| met.extend(swept.iter().map(|(_, row)| row)));
     ascend(&mut met);
     met
 }

@@ -28,7 +28,7 @@ pub(super) struct Late {
 }
 
 impl Late {
-    /// Finds the bounces whose bodies touch nobody else, and tells how long these go on; for the first time in a step, or anew.
+    /// Finds the bounces whose bodies touch nobody else, and tells how long these go on; for the first time in a step, or anew, once more has been heard.
     pub(super) fn find(&mut self, bounces: [&mut [Bounce]; 2], is_first: bool, source: Source<'_>) {
         let Self { contacts, risen, .. } = self;
         contacts.clear();

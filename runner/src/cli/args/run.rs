@@ -68,7 +68,7 @@ pub struct RunArgs {
     #[arg(long, requires = "commanded")]
     pub skip_refused: bool,
     /// Let a page in the browser look while it goes on; its address is told.
-    #[arg(long)]
+    #[arg(long, group = "commanded")]
     pub view: bool,
     /// Serve that page at this port [default: any that is free].
     #[arg(long, value_name = "P", requires = "view")]

@@ -30,7 +30,7 @@ pub(super) struct Source {
     /// Time of each phase of each rank.
     pub timings: Option<Columns>,
     pub recording: Option<Recording>,
-    /// How many commands there were, if any, and how many are to come.
+    /// How many lines there are of commands that were done or are to come, if there is such a file and it can be read.
     pub commands: Option<u64>,
     /// Bytes on disk: of the recording, of snapshots.
     pub size: [u64; 2],
@@ -64,8 +64,7 @@ impl Source {
             Err(RecordingError::Nothing { .. }) => None,
             Err(error) => return Err(error.into()),
         };
-        let commands = folder.commands().exists().then(|| Script::load_recorded(&folder.commands())).transpose();
-        let commands = commands.map_err(|error| refusal(error.to_string()))?.map(|script| script.lines.len() as u64);
+        let commands = Script::load_recorded(&folder.commands()).ok().map(|script| script.lines.len() as u64);
         let bytes = |files: &[PathBuf]| files.iter().map(|file| fs::metadata(file).map_or(0, |data| data.len())).sum();
         let recorded = recording.as_ref().map_or(0, |recording| bytes(recording.files()));
         let size = [recorded, size_within(&folder.snapshots()).unwrap_or(0)];
