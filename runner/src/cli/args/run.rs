@@ -158,6 +158,7 @@ mod tests {
         for line in ["c.toml --log-every 5 --log a.csv", "c.toml --log-every 5 --out d --log a.csv"] {
             assert!(parse(line).unwrap().log.is_some(), "{line}");
         }
+        assert!(parse("c.toml --view --skip-refused").unwrap().skip_refused);
         for (line, expected) in [
             (
                 "c.toml --log-every 5",
@@ -165,7 +166,7 @@ mod tests {
             ),
             (
                 "c.toml --skip-refused",
-                "the following required arguments were not provided: <--resume <DIR>|--commands <FILE>>; see",
+                "the following required arguments were not provided: <--resume <DIR>|--commands <FILE>|--view>; see",
             ),
             ("c.toml --overwrite", "the following required arguments were not provided: --out <DIR>; see"),
             ("--overwrite --resume d", "the argument '--overwrite' cannot be used with '--resume <DIR>'; see"),
