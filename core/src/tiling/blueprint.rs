@@ -442,14 +442,14 @@ impl Setup {
         (0..self.statics.len() as u32).map(move |row| self.static_at(row, step))
     }
 
-    /// Those that move, as a step begins.
-    pub(crate) fn statics_that_go(&self, step: u64) -> impl Iterator<Item = Body> + '_ {
-        self.going.iter().map(move |&row| self.static_at(row, step))
+    /// The rows of those that move.
+    pub(crate) fn rows_that_go(&self) -> impl Iterator<Item = u32> + '_ {
+        self.going.iter().copied()
     }
 
-    /// Those that never do.
-    pub(crate) fn statics_that_stay(&self) -> impl Iterator<Item = Body> + '_ {
-        (0..).zip(&self.statics).filter(|&(row, _)| self.path(row).is_none()).map(|(_, &body)| body)
+    /// The rows of those that never do.
+    pub(crate) fn rows_that_stay(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.statics.len() as u32).filter(|&row| self.path(row).is_none())
     }
 
     /// Whether the surface of any static moves.

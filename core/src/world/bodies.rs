@@ -67,7 +67,7 @@ impl World {
         if let Some(locator) = self.locator.get_mut() {
             locator.insert(body.id, Place { tile: place as u32, at });
         }
-        self.note_change();
+        self.note_change(place);
     }
 
     /// The body of that name, if it is one of this world's. The first time this is asked, all are looked at; from then on it takes
@@ -90,7 +90,7 @@ impl World {
         let found = self.locator.get_mut().and_then(|locator| locator.remove(id, may_have_left, &self.tiles));
         let Some(Place { tile, at }) = found else { return false };
         self.tiles[tile as usize].remove(id, at);
-        self.note_change();
+        self.note_change(tile as usize);
         true
     }
 
@@ -161,6 +161,7 @@ impl World {
         }
         self.tiles.par_iter_mut().for_each(Tile::settle);
         self.changed = true;
+        self.places.forget();
     }
 
     /// The tile that owns a body, and its place there, if it is one of this world's and was there in the last step.
@@ -188,16 +189,15 @@ impl World {
         self.tiles.iter_mut().for_each(|tile| tile.forget_ghost(id));
     }
 
-    /// Something is there to be settled, or is otherwise than the last step left it.
-    pub(super) fn note_change(&mut self) {
+    /// Something is there to be settled in a tile.
+    fn note_change(&mut self, tile: usize) {
         self.is_unsettled = true;
-        self.questions.forget();
+        self.places.forget_tile(tile);
     }
 
     /// After a step: bodies that went from tile to tile are found in their new ones.
     pub(super) fn follow_bodies(&mut self) {
         self.removed.clear();
-        self.questions.forget();
         let bodies = || self.tiles.iter().map(Tile::count).sum();
         let Some(locator) = self.locator.get_mut() else { return };
         if locator.is_stale(bodies()) {
@@ -214,6 +214,6 @@ impl World {
     pub(super) fn forget_places(&mut self) {
         self.locator.take();
         self.knows_names = false;
-        self.questions.forget();
+        self.places.forget();
     }
 }

@@ -99,6 +99,7 @@ impl World {
                 if let Some(Place { tile, at }) = self.look_up(id) {
                     let is_it = |slot| matches!(slot, SlotKind::Owned(index) if index == at as usize);
                     self.tiles[tile as usize].forget_contacts(|slot| is_it(slot.kind()));
+                    self.places.forget_tile(tile as usize);
                 }
                 Ok(changed)
             }
@@ -178,7 +179,6 @@ impl World {
         let Some(Place { tile, at }) = self.look_up(id) else { return Ok(false) };
         let body = change(self, self.tiles[tile as usize].at(at))?;
         self.tiles[tile as usize].change_at(at, body);
-        self.questions.forget();
         Ok(true)
     }
 }

@@ -17,7 +17,7 @@ use crate::parallel::schedule::Schedule;
 use crate::parallel::team::Team;
 use crate::state::figures::Figures;
 use crate::state::hash::Hashes;
-use crate::state::questions::Questions;
+use crate::state::questions::Places;
 use crate::state::view::TileView;
 use crate::step::phase::Timings;
 use crate::step::stage::{Hand, Work};
@@ -55,8 +55,8 @@ pub struct World {
     removed: Noted,
     /// Where each body is, once anybody has asked.
     locator: OnceLock<Locator>,
-    /// What questions are answered by.
-    pub(crate) questions: Questions,
+    /// Where all are, once anybody has asked.
+    pub(crate) places: Places,
     /// What pushes at bodies for some steps.
     forces: Vec<Force>,
     /// What of these acts in the step under way, all together upon each body.
@@ -144,7 +144,7 @@ impl World {
             greatest_name: setup.statics.iter().map(|fixed| fixed.id).max().unwrap_or_default(),
             removed: Noted::default(),
             locator: OnceLock::new(),
-            questions: Questions::default(),
+            places: Places::default(),
             forces: Vec::new(),
             loads: FxHashMap::default(),
             hands: Vec::new(),

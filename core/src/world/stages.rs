@@ -18,6 +18,7 @@ impl World {
     /// Starts a step: no sync point passed, nothing counted.
     pub(crate) fn begin_step(&mut self) {
         self.settle();
+        self.places.forget();
         self.borders_moved = self.follow_borders();
         self.sync = 0;
         let threads = rayon::current_num_threads();

@@ -2,68 +2,41 @@
 
 use super::RayHit;
 use super::pieces;
-use super::tree::Bounds;
 use crate::model::body::Body;
-use crate::model::id::{GlobalId, KindId};
+use crate::model::id::GlobalId;
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::Rot;
 use crate::model::piece::Piece;
 use glam::{DVec2, Vec2};
-use std::sync::Arc;
 
-/// A shape at its place, in a line of the cache.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-pub(super) struct Outline {
+/// A shape at its place.
+pub(super) struct Outline<'a> {
     pub(super) id: GlobalId,
-    pub(super) center: DVec2,
-    pub(super) rotation: Rot,
-    pub(super) kind: KindId,
-    figure: Figure,
+    center: DVec2,
+    rotation: Rot,
+    figure: Figure<'a>,
 }
 
 /// What a shape is made of.
-#[derive(Clone, Debug)]
-enum Figure {
+enum Figure<'a> {
     Circle { radius: f32 },
     Box { half: Vec2 },
-    Pieces(Arc<[Piece]>),
+    Pieces(&'a [Piece]),
 }
 
-impl Outline {
-    pub(super) fn new(body: &Body, kind: &KindRow) -> Self {
+impl<'a> Outline<'a> {
+    pub(super) fn new(body: &Body, kind: &'a KindRow) -> Self {
         let figure = match kind.form {
             Form::Round => Figure::Circle { radius: kind.radius },
             Form::Box => Figure::Box { half: kind.extent },
-            Form::Polygon | Form::Pieces => Figure::Pieces(kind.pieces.clone()),
+            Form::Polygon | Form::Pieces => Figure::Pieces(&kind.pieces),
         };
-        Self { id: body.id, center: body.position, rotation: body.rotation, kind: body.kind, figure }
+        Self { id: body.id, center: body.position, rotation: body.rotation, figure }
     }
 
     /// Cosine and sine.
     fn turned(&self) -> DVec2 {
         DVec2::new(f64::from(self.rotation.c), f64::from(self.rotation.s))
-    }
-
-    /// A rectangle around it, a little larger than it need be, so that rounding leaves nothing out.
-    pub(super) fn bounds(&self) -> Bounds {
-        let (c, s) = (self.turned().x.abs(), self.turned().y.abs());
-        let half = match self.figure {
-            Figure::Circle { radius } => DVec2::splat(f64::from(radius)),
-            Figure::Box { half } => {
-                let half = half.as_dvec2();
-                DVec2::new(c * half.x + s * half.y, s * half.x + c * half.y)
-            }
-            Figure::Pieces(ref all) => all.iter().map(|piece| self.extent(piece)).fold(DVec2::ZERO, DVec2::max),
-        };
-        let half = half * (1.0 + 1e-6) + self.center.abs() * 1e-14;
-        Bounds { low: self.center - half, high: self.center + half }
-    }
-
-    /// Half extents of an upright rectangle around the center of the body that holds a piece of it.
-    fn extent(&self, piece: &Piece) -> DVec2 {
-        let corners = piece.outline.corners().map(|corner| self.rotate(corner.as_dvec2()).abs());
-        corners.fold(DVec2::ZERO, DVec2::max) + f64::from(piece.radius)
     }
 
     /// A vector as it is seen from the body.
@@ -83,7 +56,7 @@ impl Outline {
         match self.figure {
             Figure::Circle { radius } => offset.length_squared() <= f64::from(radius) * f64::from(radius),
             Figure::Box { half } => self.unrotate(offset).abs().cmple(half.as_dvec2()).all(),
-            Figure::Pieces(ref all) => {
+            Figure::Pieces(all) => {
                 let point = self.unrotate(offset);
                 all.iter().any(|piece| pieces::holds(piece, point))
             }
@@ -106,7 +79,7 @@ impl Outline {
                 let own = half + DVec2::new(c * other.x + s * other.y, s * other.x + c * other.y);
                 offset.abs().cmple(reach).all() && self.unrotate(offset).abs().cmple(own).all()
             }
-            Figure::Pieces(ref all) => {
+            Figure::Pieces(all) => {
                 let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
                 let corners = corners.map(|corner| self.unrotate(corner - self.center));
                 all.iter().any(|piece| pieces::meets(piece, &corners))
@@ -138,7 +111,7 @@ impl Outline {
                 let (fraction, normal) = enter(start, along, half.as_dvec2())?;
                 (fraction, self.rotate(normal))
             }
-            Figure::Pieces(ref all) => {
+            Figure::Pieces(all) => {
                 let (start, along) = (self.unrotate(from - self.center), self.unrotate(way));
                 let hits = all.iter().filter_map(|piece| pieces::enter(piece, start, along));
                 let (fraction, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;

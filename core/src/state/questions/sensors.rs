@@ -1,6 +1,6 @@
 //! Who is inside the sensors of a world.
 
-use super::tree::Bounds;
+use super::places::bounds;
 use crate::collide::manifold::nearest;
 use crate::model::body::Body;
 use crate::model::id::GlobalId;
@@ -27,18 +27,15 @@ impl World {
         let mut found = Vec::new();
         for sensor in sensors {
             let (kind, first) = (setup.kind(sensor.kind), found.len());
-            let half = kind.half_extents(sensor.rotation).as_dvec2() * (1.0 + 1e-6);
-            let bounds = Bounds { low: sensor.position - half, high: sensor.position + half };
-            self.visit_moving(bounds, |outline| {
-                let other = setup.kind(outline.kind);
-                // Statics that move are in no sensor.
-                if !setup.has_kind(outline.kind) || other.sensor || !kind.filter.admits(&other.filter) {
+            self.visit_bodies(bounds(&sensor, setup), |body| {
+                let other = setup.kind(body.kind);
+                if other.sensor || !kind.filter.admits(&other.filter) {
                     return;
                 }
-                let offset = (outline.center - sensor.position).as_vec2();
-                let manifold = nearest(kind, sensor.rotation, other, outline.rotation, offset, 0.0);
+                let offset = (body.position - sensor.position).as_vec2();
+                let manifold = nearest(kind, sensor.rotation, other, body.rotation, offset, 0.0);
                 if manifold.nearest().is_some_and(|point| point.separation <= 0.0) {
-                    found.push((sensor.id, outline.id));
+                    found.push((sensor.id, body.id));
                 }
             });
             found[first..].sort_unstable();

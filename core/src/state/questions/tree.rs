@@ -1,12 +1,10 @@
-//! Outlines by place: a tree of rectangles, each around eight of the level below, over outlines in the order of a Hilbert curve. Built in
-//! one go for many questions (as in "packed" R-trees: N. Roussopoulos, D. Leifker, 1985; in the order of a curve: I. Kamel,
-//! C. Faloutsos, 1993).
+//! Rectangles by place: a tree of rectangles, each around eight of the level below, over those that are asked for, in the order of a
+//! curve. Built in one go (as in "packed" R-trees: N. Roussopoulos, D. Leifker, 1985; in the order of a curve: I. Kamel, C. Faloutsos,
+//! 1993).
 
 use super::RayHit;
-use super::outline::Outline;
 use crate::parallel::ahead::fetch;
 use glam::DVec2;
-use rayon::prelude::*;
 
 /// A rectangle between two corners, borders included.
 #[derive(Clone, Copy, Debug)]
@@ -16,10 +14,14 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    const NONE: Self = Self { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
+    pub(super) const NONE: Self = Self { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
 
-    fn join(self, other: Self) -> Self {
+    pub(super) fn join(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    fn center(self) -> DVec2 {
+        (self.low + self.high) * 0.5
     }
 }
 
@@ -28,10 +30,11 @@ const FAN: usize = 8;
 
 #[derive(Debug)]
 pub(super) struct Tree {
-    outlines: Vec<Outline>,
+    /// Who the rectangles belong to, along the curve.
+    order: Vec<u32>,
     /// Coordinates of nodes count from here.
     origin: DVec2,
-    /// Around each eight outlines, around each eight of these, and so on, until there is one.
+    /// Around each eight of these, around each eight of those, and so on, until there is one.
     levels: Vec<Vec<Node>>,
 }
 
@@ -46,11 +49,10 @@ struct Node {
 impl Node {
     const EMPTY: Self = Self { low: [[f32::INFINITY; FAN]; 2], high: [[f32::NEG_INFINITY; FAN]; 2] };
 
-    fn around_outlines(outlines: &[Outline], origin: DVec2) -> Self {
+    fn around_bounds<'a>(few: impl Iterator<Item = &'a Bounds>, origin: DVec2) -> Self {
         let mut node = Self::EMPTY;
-        for (place, outline) in outlines.iter().enumerate() {
-            let Bounds { low, high } = outline.bounds();
-            let (low, high) = (low - origin, high - origin);
+        for (place, bounds) in few.enumerate() {
+            let (low, high) = (bounds.low - origin, bounds.high - origin);
             for axis in 0..2 {
                 node.low[axis][place] = (low[axis] as f32).next_down();
                 node.high[axis][place] = (high[axis] as f32).next_up();
@@ -76,69 +78,58 @@ impl Node {
 }
 
 /// Cells along an axis, as a power of two.
-const ORDER: u32 = 24;
+const ORDER: u32 = 16;
 
-/// The place of a cell on a curve through all of them, on which neighbours are near each other (D. Hilbert, 1891). By what each pair
-/// of bits makes of the next: the quarter, and how it is turned.
-fn along_curve(x: u32, y: u32) -> u64 {
-    /// By how a quarter is turned, and which quarter of it: which one that is on the curve, and how that is turned.
-    const NEXT: [[(u64, u8); 4]; 4] = [
-        [(0, 1), (1, 0), (3, 3), (2, 0)],
-        [(0, 0), (3, 2), (1, 1), (2, 1)],
-        [(2, 2), (3, 1), (1, 2), (0, 3)],
-        [(2, 3), (1, 3), (3, 0), (0, 2)],
-    ];
-    let (mut place, mut turned) = (0, 0);
-    for bit in (0..ORDER).rev() {
-        let quarter = (x >> bit & 1) << 1 | (y >> bit & 1);
-        let (next, then) = NEXT[usize::from(turned)][quarter as usize];
-        place = place << 2 | next;
-        turned = then;
-    }
-    place
+/// The place of a cell on a curve through all of them, on which neighbours are mostly near each other: the bits of its two coordinates
+/// in turn (G. Morton, 1966).
+fn along_curve(x: u32, y: u32) -> u32 {
+    let spread = |bits: u32| {
+        let bits = (bits | bits << 8) & 0x00ff_00ff;
+        let bits = (bits | bits << 4) & 0x0f0f_0f0f;
+        let bits = (bits | bits << 2) & 0x3333_3333;
+        (bits | bits << 1) & 0x5555_5555
+    };
+    spread(x) | spread(y) << 1
 }
 
 impl Tree {
-    /// Takes time n log n for n outlines.
-    pub(super) fn new(outlines: Vec<Outline>) -> Self {
-        let around = |outlines: &[Outline]| {
-            let centers = outlines.iter().map(|outline| Bounds { low: outline.center, high: outline.center });
-            centers.fold(Bounds::NONE, Bounds::join)
-        };
-        let all = outlines.par_chunks(4096).map(around).reduce(|| Bounds::NONE, Bounds::join);
-        let scale =
-            DVec2::splat(f64::from((1 << ORDER) - 1)) / (all.high - all.low).max(DVec2::splat(f64::MIN_POSITIVE));
-        let key = |outline: &Outline| {
-            let cell = (outline.center - all.low) * scale;
+    /// Of somebody's number and rectangle each. Takes time n log n for n of them.
+    pub(super) fn new(all: &[(u32, Bounds)]) -> Self {
+        let centers = all.iter().map(|(_, bounds)| bounds.center());
+        let around = centers.clone().fold(Bounds::NONE, |around, at| around.join(Bounds { low: at, high: at }));
+        let extent = (around.high - around.low).max(DVec2::splat(f64::MIN_POSITIVE));
+        let scale = DVec2::splat(f64::from((1 << ORDER) - 1)) / extent;
+        let key = |center: DVec2| {
+            let cell = (center - around.low) * scale;
             along_curve(cell.x as u32, cell.y as u32)
         };
-        let mut order: Vec<(u64, u32)> =
-            outlines.par_iter().zip(0..outlines.len() as u32).map(|(outline, i)| (key(outline), i)).collect();
-        order.par_sort_unstable();
-        let outlines: Vec<Outline> = order.par_iter().map(|&(_, i)| outlines[i as usize].clone()).collect();
-        let origin = if outlines.is_empty() { DVec2::ZERO } else { (all.low + all.high) * 0.5 };
-        let mut levels: Vec<Vec<Node>> =
-            vec![outlines.par_chunks(FAN).map(|few| Node::around_outlines(few, origin)).collect()];
+        // Place on the curve and in the list in one number: half as much to move.
+        let mut keys: Vec<u64> = centers.zip(0..).map(|(center, at)| u64::from(key(center)) << 32 | at).collect();
+        keys.sort_unstable();
+        let at = |key: &u64| &all[*key as u32 as usize];
+        let origin = if all.is_empty() { DVec2::ZERO } else { around.center() };
+        let first = keys.chunks(FAN).map(|few| Node::around_bounds(few.iter().map(|key| &at(key).1), origin));
+        let mut levels: Vec<Vec<Node>> = vec![first.collect()];
         while let Some(level) = levels.last().filter(|level| level.len() > 1) {
-            let next = level.par_chunks(FAN).map(Node::around).collect();
+            let next = level.chunks(FAN).map(Node::around).collect();
             levels.push(next);
         }
-        Self { outlines, origin, levels }
+        Self { order: keys.iter().map(|key| at(key).0).collect(), origin, levels }
     }
 
     /// How many children a node has, and the first of them.
     fn children(&self, level: usize, number: usize) -> (usize, usize) {
-        let (all, first) = (if level == 0 { self.outlines.len() } else { self.levels[level - 1].len() }, number * FAN);
+        let (all, first) = (if level == 0 { self.order.len() } else { self.levels[level - 1].len() }, number * FAN);
         (FAN.min(all - first), first)
     }
 
     /// Where a search begins: at the node around all, if there is any.
     fn root(&self) -> Option<usize> {
-        (!self.outlines.is_empty()).then_some(self.levels.len() - 1)
+        (!self.order.is_empty()).then_some(self.levels.len() - 1)
     }
 
-    /// Visits the outlines whose rectangles meet another.
-    pub(super) fn visit(&self, bounds: Bounds, mut visitor: impl FnMut(&Outline)) {
+    /// Visits those whose rectangles meet another, and maybe a few more.
+    pub(super) fn visit(&self, bounds: Bounds, mut visitor: impl FnMut(u32)) {
         let (low, high) = (bounds.low - self.origin, bounds.high - self.origin);
         let low = [low.x, low.y].map(|x| (x as f32).next_down());
         let high = [high.x, high.y].map(|x| (x as f32).next_up());
@@ -147,7 +138,7 @@ impl Tree {
             let (node, (count, first)) = (&self.levels[level][number], self.children(level, number));
             for child in (0..count).filter(|&child| node.meets(child, low, high)) {
                 if level == 0 {
-                    visitor(&self.outlines[first + child]);
+                    visitor(self.order[first + child]);
                 } else {
                     open.push((level - 1, first + child));
                 }
@@ -155,45 +146,47 @@ impl Tree {
         }
     }
 
-    /// Finds what a ray meets before the `best` that is known already.
-    pub(super) fn cast_ray(&self, from: DVec2, to: DVec2, best: &mut Option<RayHit>) {
+    /// Finds what a ray meets before the `best` that is known already, by asking those whose rectangles it comes to.
+    pub(super) fn cast_ray(
+        &self,
+        (from, to): (DVec2, DVec2),
+        best: &mut Option<RayHit>,
+        mut ask: impl FnMut(u32, &mut Option<RayHit>),
+    ) {
         let Some(root) = self.root() else { return };
         let line = Line::new(from - self.origin, to - self.origin);
-        // Each level leaves seven at most behind, and twelve levels hold more than can be counted in 32 bits.
+        // What is open, by how soon the ray comes to it, how many levels are below, and its number. Each level leaves seven at most
+        // behind, and twelve hold more than can be counted in 32 bits.
         let mut open = [(0.0_f32, 0_u32, 0_u32); 7 * 12 + 1];
-        open[0] = (0.0, root as u32, 0);
+        open[0] = (0.0, root as u32 + 1, 0);
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
-            let (enters, level, number) = open[depth];
+            let (enters, height, number) = open[depth];
             let limit = best.map_or(1.0, |best| (best.fraction as f32).next_up());
             if enters > limit {
                 continue;
             }
-            let (level, number) = (level as usize, number as usize);
+            let number = number as usize;
+            let Some(level) = (height as usize).checked_sub(1) else {
+                ask(self.order[number], best);
+                continue;
+            };
             let (count, first) = self.children(level, number);
             let enters = line.enters(&self.levels[level][number], limit);
             let bottom = depth;
-            let met = || enters[..count].iter().enumerate().filter(|(_, enters)| **enters <= limit);
-            if level > 0 {
-                for (child, &enters) in met() {
-                    // The nearest comes last, to be looked at first, which leaves least of the others.
-                    let mut place = depth;
-                    while place > bottom && open[place - 1].0 < enters {
-                        open[place] = open[place - 1];
-                        place -= 1;
-                    }
-                    open[place] = (enters, level as u32 - 1, (first + child) as u32);
+            for (child, &enters) in enters[..count].iter().enumerate().filter(|(_, enters)| **enters <= limit) {
+                // The nearest comes last, to be looked at first, which leaves least of the others.
+                let mut place = depth;
+                while place > bottom && open[place - 1].0 < enters {
+                    open[place] = open[place - 1];
+                    place -= 1;
+                }
+                open[place] = (enters, height - 1, (first + child) as u32);
+                if level > 0 {
                     fetch(&self.levels[level - 1], first + child);
-                    depth += 1;
                 }
-                continue;
-            }
-            met().for_each(|(child, _)| fetch(&self.outlines, first + child));
-            for (child, _) in met() {
-                if let Some(hit) = self.outlines[first + child].cast_ray(from, to) {
-                    *best = Some(best.map_or(hit, |best| best.nearer(hit)));
-                }
+                depth += 1;
             }
         }
     }
@@ -245,13 +238,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_curve_goes_from_neighbour_to_neighbour_through_all_cells() {
-        let mut cells: Vec<(u64, [i64; 2])> =
-            (0..32 * 32).map(|k| (along_curve(k % 32, k / 32), [i64::from(k % 32), i64::from(k / 32)])).collect();
+    fn the_curve_goes_through_each_square_before_the_next() {
+        let mut cells: Vec<(u32, [u32; 2])> =
+            (0..32 * 32).map(|k| (along_curve(k % 32, k / 32), [k % 32, k / 32])).collect();
         cells.sort_unstable();
-        for two in cells.windows(2) {
-            let [(before, [x0, y0]), (after, [x1, y1])] = [two[0], two[1]];
-            assert_eq!((after - before, (x1 - x0).abs() + (y1 - y0).abs()), (1, 1), "{two:?}");
+        for side in [2, 4, 8, 16] {
+            for square in cells.chunks((side * side) as usize) {
+                let of = |(_, [x, y]): &(u32, [u32; 2])| [x / side, y / side];
+                assert!(square.iter().all(|cell| of(cell) == of(&square[0])), "{square:?}");
+            }
         }
+        assert_eq!(along_curve(0xffff, 0), 0x5555_5555);
     }
 }
