@@ -249,6 +249,13 @@ impl Tile {
         slot.index(self.owned, self.ghosts())
     }
 
+    /// The place of the static of that name, if it mattered here in the last step.
+    pub(crate) fn place_of_static(&self, id: GlobalId) -> Option<usize> {
+        let first = self.owned + self.ghosts();
+        let statics = self.bodies.id.get(first..)?;
+        Some(first + statics.iter().position(|&name| name == id)?)
+    }
+
     /// The names of a contact's bodies, the lower first, and whether the slot order is the other way round.
     #[inline(always)]
     pub(crate) fn pair_of(&self, key: PairKey) -> (GlobalId, GlobalId) {

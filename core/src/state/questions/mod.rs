@@ -83,8 +83,9 @@ impl World {
         let mut found: Vec<ContactView> = match self.owned(id) {
             Some((tile, place)) => TileView::new(tile).contacts_of(|other| other == place).collect(),
             None if self.is_static(id) => {
-                let is_of = |contact: &ContactView| contact.bodies.contains(&id);
-                self.views().flat_map(|tile| tile.contacts().filter(is_of)).collect()
+                let tiles = self.tile_states().iter();
+                let places = tiles.filter_map(|tile| Some((tile, tile.place_of_static(id)?)));
+                places.flat_map(|(tile, place)| TileView::new(tile).contacts_of(move |other| other == place)).collect()
             }
             None => Vec::new(),
         };
