@@ -32,6 +32,8 @@ enum Act {
     Throw(usize, f64),
     Change(usize, usize),
     Gravity(f64),
+    Look([f64; 2], [f64; 2]),
+    Follow(usize),
 }
 
 fn rounded(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
@@ -127,6 +129,8 @@ fn any_act() -> impl Strategy<Value = Act> {
         (who.clone(), rounded(-80.0..80.0)).prop_map(|(who, speed)| Act::Throw(who, speed)),
         (who.clone(), who).prop_map(|(who, kind)| Act::Change(who, kind)),
         rounded(-10.0..5.0).prop_map(Act::Gravity),
+        (anywhere(), anywhere()).prop_map(|(from, to)| Act::Look(from, to)),
+        any::<u16>().prop_map(|who| Act::Follow(who.into())),
     ]
 }
 
@@ -207,24 +211,42 @@ impl Any {
     fn commands(&self) -> String {
         let mut acts = self.acts.clone();
         acts.sort_by_key(|(step, _)| *step);
-        let line = |(number, (step, act)): (usize, &(u32, Act))| {
+        let lines = |(number, (step, act)): (usize, &(u32, Act))| {
             let name = |who: usize| who % self.bodies.len();
-            let (what, value): (&str, Value) = match act {
+            let all: Vec<(&str, Value)> = match act {
                 Act::Add(row) => {
                     let figures: Vec<f64> = row.split(',').map(|figure| figure.parse().unwrap()).collect();
                     let [x, y, angle, vx, vy, omega] = figures[..] else { unreachable!("it has six") };
                     let id = 1000 + number;
-                    ("add", json!({"id": id, "x": x, "y": y, "angle": angle, "vx": vx, "vy": vy, "omega": omega}))
+                    vec![("add", json!({"id": id, "x": x, "y": y, "angle": angle, "vx": vx, "vy": vy, "omega": omega}))]
                 }
-                Act::Remove(who) => ("remove", json!(name(*who))),
-                Act::Strike(who, blow) => ("impulse", json!({"id": name(*who), "x": blow, "y": 1.0, "angular": 0.1})),
-                Act::Throw(who, speed) => ("velocity", json!({"id": name(*who), "vx": speed, "vy": 1.0, "omega": 1.0})),
-                Act::Change(who, kind) => ("kind", json!({"id": name(*who), "kind": kind % self.kinds.len()})),
-                Act::Gravity(y) => ("gravity", json!([0.0, y])),
+                Act::Remove(who) => vec![("remove", json!(name(*who)))],
+                Act::Strike(who, blow) => {
+                    vec![("impulse", json!({"id": name(*who), "x": blow, "y": 1.0, "angular": 0.1}))]
+                }
+                Act::Throw(who, speed) => {
+                    vec![("velocity", json!({"id": name(*who), "vx": speed, "vy": 1.0, "omega": 1.0}))]
+                }
+                Act::Change(who, kind) => vec![("kind", json!({"id": name(*who), "kind": kind % self.kinds.len()}))],
+                Act::Gravity(y) => vec![("gravity", json!([0.0, y]))],
+                Act::Look(from, to) => {
+                    let [low, high] = [f64::min, f64::max].map(|of| [of(from[0], to[0]), of(from[1], to[1])]);
+                    vec![
+                        ("ray", json!({"from": from, "to": to})),
+                        ("rectangle", json!({"low": low, "high": high})),
+                        ("point", json!(from)),
+                    ]
+                }
+                Act::Follow(who) => vec![
+                    ("touching", json!(name(*who))),
+                    ("body", json!(name(*who))),
+                    ("contacts", json!(who % 2 == 0)),
+                    ("sensors", json!(who % 3 == 0)),
+                ],
             };
-            format!("{}\n", json!({"step": step, what: value}))
+            all.into_iter().map(|(what, value)| format!("{}\n", json!({"step": step, what: value}))).collect::<String>()
         };
-        acts.iter().enumerate().map(line).collect()
+        acts.iter().enumerate().map(lines).collect()
     }
 
     fn run(&self, world: &Path, steps: u32, how: &[&str]) -> Ended {
@@ -236,6 +258,7 @@ impl Any {
         });
         if !self.acts.is_empty() {
             command.arg("--commands").arg(world.with_file_name("acts.jsonl")).arg("--skip-refused");
+            command.arg("--answers").arg(world.with_file_name("answers.jsonl"));
         }
         program::run(&mut command)
     }
@@ -266,11 +289,17 @@ proptest! {
         // A world that flies apart does so everywhere.
         let (code, hashes) = outcome(&alone);
         prop_assert!(code == Some(0) && hashes.len() == 2 || code == Some(4), "{alone}");
-        let spread = any.run(&world, any.steps, &["--ranks", "3", "--threads", "2", "--set", "balance=shuffled"]);
+        let answers = |world: &Path| fs::read_to_string(world.with_file_name("answers.jsonl")).unwrap_or_default();
+        let heard = answers(&world);
+        let way = "--ranks 3 --threads 2 --set balance=shuffled --set parallel=islands";
+        let spread = any.run(&world, any.steps, &way.split(' ').collect::<Vec<_>>());
         prop_assert_eq!(outcome(&spread), (code, hashes.clone()), "on three ranks: {}", spread.stderr);
-        let other = "--ranks 1 --threads 2 --set instructions=portable --set broad_phase=quadtree --set islands=dfs";
+        prop_assert!(code == Some(4) || answers(&world) == heard, "other answers on three ranks");
+        let other = "--ranks 1 --threads 2 --set instructions=portable --set broad_phase=quadtree --set islands=dfs \
+                     --set parallel=coloring";
         let otherwise = any.run(&turned, any.steps, &other.split(' ').collect::<Vec<_>>());
         prop_assert_eq!(outcome(&otherwise), (code, hashes.clone()), "computed otherwise: {}", otherwise.stderr);
+        prop_assert!(code == Some(4) || answers(&turned) == heard, "other answers where it is computed otherwise");
         if code == Some(0) {
             let out = folder.path().join("out");
             let first = any.run(&world, any.steps / 2, &["--checkpoint-every", "10", "--out", out.to_str().unwrap()]);
