@@ -98,9 +98,9 @@ impl Convex {
         [self.corner(face), self.corner(self.next(face))]
     }
 
-    /// The first face of which a figure is greatest.
+    /// The first face, or corner, of which a figure is greatest.
     #[inline(always)]
-    fn most(of_faces: &[f32; MOST_CORNERS]) -> (usize, f32) {
+    pub(crate) fn most(of_faces: &[f32; MOST_CORNERS]) -> (usize, f32) {
         // By halves, as one after the other would have to wait for each.
         let fours: [f32; MOST_CORNERS / 2] = from_fn(|i| max(of_faces[i], of_faces[i + MOST_CORNERS / 2]));
         let most = max(max(fours[0], fours[2]), max(fours[1], fours[3]));
@@ -108,6 +108,19 @@ impl Convex {
         // Where nothing is a number it is the first.
         let face = are_most.trailing_zeros() as usize % MOST_CORNERS;
         (face, of_faces[face])
+    }
+
+    /// The first corner of which a figure is least.
+    #[inline(always)]
+    pub(crate) fn least(of_corners: &[f32; MOST_CORNERS]) -> (usize, f32) {
+        let (corner, least) = Self::most(&of_corners.map(|figure| -figure));
+        (corner, -least)
+    }
+
+    /// How far each corner is from a point along a direction.
+    #[inline(always)]
+    pub(crate) fn along(&self, from: Vec2, direction: Vec2) -> [f32; MOST_CORNERS] {
+        from_fn(|i| (self.x[i] - from.x) * direction.x + (self.y[i] - from.y) * direction.y)
     }
 
     /// The face along which another lies furthest out, and how far.

@@ -42,16 +42,14 @@ pub(super) fn collide(
     let length = dot(along, along).sqrt();
     let along = along / length;
     let n = Vec2::new(-along.y, along.x);
-    let heights = other.corners().zip(0..).map(|(corner, number)| (dot(corner - from, n), corner, number));
-    let none = (f32::INFINITY, from, 0);
-    let highest = heights.clone().fold(f32::NEG_INFINITY, |most, at| max(at.0, most));
-    let (lowest, corner, number) = heights.fold(none, |least, at| if at.0 < least.0 { at } else { least });
-    let places = other.corners().map(|corner| dot(corner - from, along));
-    let ends = places.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], at| [min(low, at), max(high, at)]);
+    let (heights, places) = (other.along(from, n), other.along(from, along));
+    let (number, lowest) = Convex::least(&heights);
+    let ((_, highest), (_, first), (_, last)) = (Convex::most(&heights), Convex::least(&places), Convex::most(&places));
     let far = reach + radius;
-    if lowest > far || highest < -far || ends[0] > length + far || ends[1] < -far {
+    if lowest > far || highest < -far || first > length + far || last < -far {
         return Manifold::EMPTY;
     }
+    let (corner, number) = (other.corner(number), number as u32);
     let is_over = (0.0..=length).contains(&dot(corner - from, along));
     let is_center_over = (0.0..=length).contains(&dot(center - from, along));
     let is_pressed = is_center_over && lies.is_some_and(|most| highest + radius >= -most);
@@ -59,10 +57,19 @@ pub(super) fn collide(
     // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
     let of_lowest = || is_over.then(|| of_corner(corner, lowest, n, radius, 1 << 9 | number));
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
+    // What is between the ends has nothing to do with these.
+    let is_within = first >= BEYOND * length && last <= length - BEYOND * length;
+    let behind = -(radius + lies.unwrap_or(0.0));
+    if let Some(over) = over
+        && is_within
+        && highest >= behind
+    {
+        return over;
+    }
     // What has come behind the segment around an end of it is not pressed into its face.
     let is_behind = |over: &Manifold| over.nearest().is_some_and(|nearest| nearest.separation < 0.0);
     // Its lowest corner may be above the surface by no more than rounding then.
-    let band = -(radius + lies.unwrap_or(0.0))..=max(radius, lowest);
+    let band = behind..=max(radius, lowest);
     let over = over.filter(|over| !is_behind(over) || comes_to(other, [from, along, n], length, radius, band));
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over

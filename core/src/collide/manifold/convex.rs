@@ -9,7 +9,7 @@ use super::chain::{self, Lies};
 use super::{Manifold, ManifoldPoint};
 use crate::model::convex::Convex;
 use crate::model::math::{Rot, clamp, dot, min};
-use crate::model::piece::Piece;
+use crate::model::piece::{Piece, Side};
 use glam::Vec2;
 
 /// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. Where one is
@@ -22,22 +22,30 @@ pub(in crate::collide) fn collide(
     reach: f32,
     lies: Lies,
 ) -> Manifold {
-    if b.side.is_some() {
-        let back = collide([b, a], [rot_b, rot_a], -offset, reach, lies);
-        return back.swapped(offset);
+    match (a.side, b.side) {
+        (_, Some(side)) => on_segment([b, a], side, [rot_b, rot_a], -offset, reach, lies).swapped(offset),
+        (Some(side), None) => on_segment([a, b], side, [rot_a, rot_b], offset, reach, lies),
+        (None, None) => {
+            let other = b.outline.seen(rot_a.to(rot_b), rot_a.unrotate(offset));
+            polygons(&a.outline, &other, [a.radius, b.radius], reach).rotated(rot_a)
+        }
     }
-    let (turn, seen) = (rot_a.to(rot_b), rot_a.unrotate(offset));
-    let (own, other) = (&a.outline, &b.outline.seen(turn, seen));
-    let radii = [a.radius, b.radius];
-    let mut manifold = match a.side {
-        Some(side) => chain::collide(own, side, (other, b.radius, turn.rotate(b.center) + seen), reach, lies),
-        None => polygons(own, other, radii, reach),
-    };
-    manifold.normal = rot_a.rotate(manifold.normal);
-    for point in &mut manifold.points[..manifold.count] {
-        point.anchor = rot_a.rotate(point.anchor);
-    }
-    manifold
+}
+
+/// The manifold of a segment and a piece.
+#[inline(never)]
+fn on_segment(
+    [segment, piece]: [&Piece; 2],
+    side: Side,
+    [rot_segment, rot_piece]: [Rot; 2],
+    offset: Vec2,
+    reach: f32,
+    lies: Lies,
+) -> Manifold {
+    let (turn, seen) = (rot_segment.to(rot_piece), rot_segment.unrotate(offset));
+    let other = piece.outline.seen(turn, seen);
+    let center = turn.rotate(piece.center) + seen;
+    chain::collide(&segment.outline, side, (&other, piece.radius, center), reach, lies).rotated(rot_segment)
 }
 
 fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) -> Manifold {

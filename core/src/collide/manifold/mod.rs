@@ -52,6 +52,13 @@ impl Manifold {
         self.turned_round()
     }
 
+    /// The same, seen from where all is turned back.
+    fn rotated(mut self, rotation: Rot) -> Self {
+        self.normal = rotation.rotate(self.normal);
+        self.points[..self.count].iter_mut().for_each(|point| point.anchor = rotation.rotate(point.anchor));
+        self
+    }
+
     /// The same, of B and A.
     fn turned_round(self) -> Self {
         Self { normal: -self.normal, ..self }
