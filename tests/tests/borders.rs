@@ -1,6 +1,8 @@
 //! What a tile border may not do to bodies that touch across it: the rule for ghosts, measured.
 
-use atoll_core::{Exchange, GlobalId, Material, Rot, Shape};
+use atoll_core::{
+    Body, Exchange, GlobalId, Loopback, Material, Partition, Path, Rot, Shape, Travel, World, halo_width, step,
+};
 use atoll_tests::scenes;
 use atoll_tests::world::{ALL_WAYS, Cut, EXACT_WAYS, Scene, Sim, Way, noise};
 use glam::{DVec2, Vec2};
@@ -250,6 +252,90 @@ fn a_stack_under_a_heavy_top_rests_over_its_borders() {
             println!("{grid:?}, top {density} times as dense: {energy:.1e} J/kg");
             assert!(energy < most, "{grid:?}, top {density} times as dense: {energy} J/kg");
         }
+    }
+}
+
+/// What presses and is carried over border after border is pressed as before: not one of the contacts begins anew where only some of a
+/// stack's bodies change tiles, and the tile that they come to owned nothing.
+#[test]
+fn a_stack_that_is_carried_over_borders_keeps_what_it_presses_with() {
+    let stack = |velocity: Vec2, lifts: bool| {
+        let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+        scene.half = DVec2::new(15.0, 7.0);
+        let material = Material { friction: 0.3, ..Material::default() };
+        scene.wall(DVec2::new(0.0, -1.0), (60.0, 2.0), 0.0, material);
+        let (mut heavy, mut place) = ([1.0, 1.0, 1.0], -10.0);
+        if lifts {
+            scene.statics[0].path = Some(Path { travel: Travel::Line { velocity: velocity.as_dvec2() }, turning: 0.0 });
+            (heavy, place) = ([1.0, 1.0, 100.0], 0.0);
+        }
+        for (k, density) in heavy.into_iter().enumerate() {
+            let kind = scene.kind(Shape::rectangle(1.0, 1.0), Material { density, ..material });
+            scene.body(kind, DVec2::new(place + 0.05 * (k % 2) as f64, 0.5 + k as f64), velocity);
+        }
+        scene
+    };
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        // Up, under a top a hundred times as dense: nobody goes at another speed than the lift, but while it settles; with one exchange a
+        // step they sway over their borders, lift or no lift.
+        let lift = stack(Vec2::new(0.0, 0.5), true);
+        let mut sim = lift.start_on((1, 23), exchange);
+        sim.run(60);
+        let mut most = 0.0_f32;
+        for _ in 0..480 {
+            sim.run(1);
+            let off = |body: Body| (body.velocity.y - 0.5).abs();
+            most = sim.bodies().into_iter().map(off).fold(most, f32::max);
+        }
+        let limit = if exchange == Exchange::Step { 0.3 } else { 0.02 };
+        assert!(most < limit, "{exchange:?}: {most} m/s off the lift's speed");
+        // Along, as far as friction lets them: as on one tile.
+        let slide = stack(Vec2::new(8.0, 0.0), false);
+        let distances = [(1, 1), (61, 1)].map(|tiles| {
+            let mut sim = slide.start_on(tiles, exchange);
+            sim.run(200);
+            sim.bodies()[0].position.x - slide.bodies[0].position.x
+        });
+        assert!((distances[0] - distances[1]).abs() < 0.01, "{exchange:?}: {distances:?} m");
+    }
+}
+
+/// Whoever cuts the domain anew changes nothing that presses, either.
+#[test]
+fn stacks_rest_while_the_borders_of_tiles_move() {
+    let mut scene = Scene::new(DVec2::new(0.0, 5.0), -10.0);
+    scene.wall(DVec2::new(0.0, -1.0), (60.0, 2.0), 0.0, Material::default());
+    let kinds =
+        [1.0, 100.0].map(|density| scene.kind(Shape::rectangle(1.0, 1.0), Material { density, ..Material::default() }));
+    for k in 0..24 {
+        let (tower, row) = (k / 4, k % 4);
+        let place = DVec2::new(f64::from(tower) * 5.0 - 12.0 + 0.1 * f64::from(row % 2), 0.5 + f64::from(row));
+        scene.body(kinds[usize::from(row == 3)], place, Vec2::ZERO);
+    }
+    for exchange in [Exchange::Step, Exchange::Substep] {
+        let mut blueprint = scene.blueprint((1, 1), exchange);
+        let (min, max, halo) =
+            (scene.middle - scene.half, scene.middle + scene.half, halo_width(&blueprint.kinds, &blueprint.params));
+        // As if only some of the bodies counted, and others each time: cuts go through towers, and between their boxes.
+        let cut = |number: u64| {
+            let counted = (0..).zip(&scene.bodies).filter(|&(k, _)| noise(number, k) < 0.5);
+            Partition::bisected(min, max, 6, halo, counted.map(|(_, body)| (body.position, 1))).unwrap()
+        };
+        blueprint.partition = cut(0);
+        let mut world = World::whole(&blueprint).unwrap();
+        for &body in &scene.bodies {
+            world.add(body).unwrap();
+        }
+        let mut most = 0.0_f32;
+        for number in 0..600_u32 {
+            if number % 24 == 0 {
+                world.retile(&cut(u64::from(number))).unwrap();
+            }
+            step(&mut world, &mut Loopback).unwrap();
+            let fastest = world.bodies().map(|body| body.velocity.length()).fold(0.0, f32::max);
+            most = if number < 120 { 0.0 } else { most.max(fastest) };
+        }
+        assert!(most < 0.2, "{exchange:?}: {most} m/s");
     }
 }
 

@@ -5,11 +5,13 @@
 //! others' bodies as well, where both are near it: an overlapping domain decomposition (H. A. Schwarz, 1870; in the form in
 //! which each part solves a little beyond its border and keeps what is its own: X.-C. Cai, M. Sarkis, "A restricted additive
 //! Schwarz preconditioner for general sparse linear systems", 1999). Of such a contact only what it does to bodies within the
-//! step is used; it is scratch otherwise, and remembered for the next step's scratch alone.
+//! step is used; it is scratch otherwise, and remembered for the next step's scratch alone. What a tile cannot remember, as it did not
+//! solve it in the step before, it is told by an owner: begun without impulses, it would give way.
 //!
 //! Who is near follows from bit-exact copies, so that who sends knows what who receives solves.
 
 use crate::exchange::rim::RimBody;
+use crate::model::body::Body;
 use crate::model::id::TileId;
 use crate::model::params::{Exchange, Ghosts, Params};
 use crate::tiling::blueprint::Setup;
@@ -32,6 +34,9 @@ pub(crate) fn depth(params: &Params) -> Option<f64> {
         (_, Exchange::Step) => Some(UNHEARD_OF),
     }
 }
+
+/// What a body may move in a step that is not told by its velocity, in m.
+const CREEP: f32 = 0.001;
 
 /// A body's place and the half extents of its grown AABB.
 #[derive(Clone, Copy)]
@@ -60,6 +65,16 @@ impl Outline {
     #[inline]
     pub(crate) fn is_near(&self, tile: TileId, setup: &Setup) -> bool {
         setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, self.place, self.half, depth))
+    }
+
+    /// Whether a body was so near to a tile in the last step as well, if that had the same region then; it may have been where this says no.
+    pub(crate) fn was_near(body: &Body, tile: TileId, setup: &Setup) -> bool {
+        let kind = setup.kind(body.kind);
+        // It was as far outside as it can have come in, and as small as it may have been.
+        let turned = setup.params.dt * kind.not_round * kind.bounding_radius * body.angular_velocity.abs();
+        let half = kind.half_extents(body.rotation) + (setup.params.margin_floor - turned - CREEP);
+        let half = half - body.velocity.abs() * setup.params.dt;
+        setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, body.position, half, depth))
     }
 
     /// Whether a tile that does not own it has it as a ghost.

@@ -14,10 +14,17 @@ pub struct ContactRecord {
     pub low: GlobalId,
     /// Body B.
     pub high: GlobalId,
-    /// One if the sending tile owned body A, else zero: where two tiles hold an entry of one pair, that one wins.
-    pub from_owner_of_low: u64,
+    /// One if the sending tile owned body A, zero if it owned body B alone: where two tiles hold an entry of one pair, that one wins. Two
+    /// if the receiving tile owns neither, and is to solve it for others.
+    pub standing: u64,
     /// Geometry and impulses.
     pub contact: Contact,
+}
+
+impl ContactRecord {
+    pub(crate) const OF_OWNER_OF_LOW: u64 = 1;
+    pub(crate) const OF_OWNER_OF_HIGH: u64 = 0;
+    pub(crate) const LENT: u64 = 2;
 }
 
 /// An impulse and its moment about a body's center: what a ghost is given in every substep.

@@ -8,12 +8,21 @@ use super::id::GlobalId;
 pub(crate) enum Authority {
     /// This tile's own cache, of a contact that it solved for others: good for nothing else.
     Overlap,
+    /// Another tile, of a contact that this one is to solve for others: good for nothing else, either.
+    Lent,
     /// Another tile, which did not own the lower GlobalId.
     Foreign,
     /// This tile's own cache.
     Own,
     /// Another tile, which owned the lower GlobalId.
     ForeignOwner,
+}
+
+impl Authority {
+    /// Whether it serves a contact of which one is owned.
+    fn is_own(self) -> bool {
+        self > Self::Lent
+    }
 }
 
 /// A contact known by the names of its bodies, because one of them is a ghost, has left or has arrived.
@@ -118,14 +127,14 @@ impl Strays {
     #[inline]
     pub(crate) fn find(&self, names: Names, is_own: bool) -> Option<&Contact> {
         let found = &self.all[self.first(names)?];
-        (!is_own || found.authority != Authority::Overlap).then_some(&found.contact)
+        (!is_own || found.authority.is_own()).then_some(&found.contact)
     }
 
     /// All that is remembered of a pair, ascending by their pieces.
     pub(crate) fn find_all(&self, names: Names, is_own: bool) -> impl Iterator<Item = &Contact> {
         let of_pair = std::iter::successors(self.first(names), |&place| place_of(self.next[place]));
         let known = of_pair.map(|place| &self.all[place]);
-        known.filter(move |stray| !is_own || stray.authority != Authority::Overlap).map(|stray| &stray.contact)
+        known.filter(move |stray| !is_own || stray.authority.is_own()).map(|stray| &stray.contact)
     }
 }
 
@@ -142,8 +151,8 @@ mod tests {
     use bytemuck::Zeroable;
     use proptest::prelude::*;
 
-    const AUTHORITIES: [Authority; 4] =
-        [Authority::Overlap, Authority::Foreign, Authority::Own, Authority::ForeignOwner];
+    const AUTHORITIES: [Authority; 5] =
+        [Authority::Overlap, Authority::Lent, Authority::Foreign, Authority::Own, Authority::ForeignOwner];
 
     proptest! {
         #![proptest_config(cases(64))]
@@ -151,7 +160,7 @@ mod tests {
         /// As one looks through all of them: each is known by an impulse of its own.
         #[test]
         fn strays_are_found_by_name_and_the_highest_authority_decides(
-            pushed in prop::collection::btree_map((0..8_u64, 0..8_u64, 0..3_u32, 0..4_usize), any::<()>(), 0..120)
+            pushed in prop::collection::btree_map((0..8_u64, 0..8_u64, 0..3_u32, 0..5_usize), any::<()>(), 0..120)
         ) {
             let mut pushed: Vec<_> = pushed.into_keys().zip(1..).collect();
             // In any order, but the same in every run.
@@ -173,7 +182,7 @@ mod tests {
                     let best = |piece: u32| {
                         let of_pieces = pushed.iter().filter(|((a, b, p, _), _)| (*a, *b, *p) == (low, high, piece));
                         let best = of_pieces.max_by_key(|((.., authority), _)| *authority)?;
-                        (!is_own || best.0.3 > 0).then_some(best.1 as f32)
+                        (!is_own || best.0.3 > 1).then_some(best.1 as f32)
                     };
                     let expected: Vec<f32> = (0..3).filter_map(best).collect();
                     let names = (GlobalId(low), GlobalId(high));

@@ -37,7 +37,7 @@ layout!(Rot { c: 0, s: 4 } 8);
 layout!(Body { id: 0, position: 8, rotation: 24, velocity: 32, angular_velocity: 40, kind: 44 } 48);
 layout!(ContactPoint { anchor: 0, separation: 8, normal_impulse: 12, tangent_impulse: 16, feature: 20 } 24);
 layout!(Contact { normal: 0, offset: 8, rotation_a: 16, rotation_b: 24, points: 32 } 80);
-layout!(ContactRecord { low: 0, high: 8, from_owner_of_low: 16, contact: 24 } 104);
+layout!(ContactRecord { low: 0, high: 8, standing: 16, contact: 24 } 104);
 layout!(Unseen { linear: 0, angular: 8 } 12);
 layout!(MigrantRecord { body: 0, rested: 48, padding: 52 } 56);
 layout!(GhostRecord { body: 0, unseen: 48, rested: 60 } 64);

@@ -38,10 +38,16 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             let (id, ghost) = (tile.bodies.id[low_index], tile.bodies.id[tile.index(high)]);
             tile.sleep.lean((id, low_index), ghost);
         }
-        let (high_mark, high_owner) = match high.kind() {
-            SlotKind::Owned(index) => (mark[index], Some(tile.id)),
-            SlotKind::Ghost(ghost) => (0, Some(tile.ghost_owners[ghost])),
-            SlotKind::Static(_) => (0, None),
+        let high_mark = if let SlotKind::Owned(index) = high.kind() { mark[index] } else { 0 };
+        // From now on.
+        let owner_of = |slot: Slot| match slot.kind() {
+            SlotKind::Owned(index) => Some(border_of(mark[index]).map_or(tile.id, |border| border.owner)),
+            SlotKind::Ghost(ghost) => {
+                let (position, owner) = (tile.bodies.position[tile.index(slot)], tile.ghost_owners[ghost]);
+                let stays = setup.partition.region(owner).contains(position);
+                Some(if stays { owner } else { setup.partition.locate(position) })
+            }
+            SlotKind::Static(_) => None,
         };
         let is_near = |slot: Slot, target| match slot.kind() {
             // Whoever is no ghost of any tile is near to none.
@@ -52,10 +58,18 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             SlotKind::Ghost(_) => Outline::of(tile, tile.index(slot), setup).is_near(target, setup),
             SlotKind::Static(_) => true,
         };
-        let with_ghost = high_owner.is_some_and(|owner| owner != tile.id);
+        let is_new = |slot: Slot, target| match slot.kind() {
+            SlotKind::Static(_) => false,
+            _ => !Outline::was_near(&tile.bodies.get(tile.index(slot)), target, setup),
+        };
+        let with_ghost = high.is_ghost();
         let low_is_a = tile.bodies.id[low_index] == pair.0;
+        let record = |standing| ContactRecord { low: pair.0, high: pair.1, standing, contact: *contact };
+        let tells = low_is_a || !with_ghost;
+        let standing = if tells { ContactRecord::OF_OWNER_OF_LOW } else { ContactRecord::OF_OWNER_OF_HIGH };
         let (mut stray, mut heir, mut impulse) = (with_ghost, tile.id, None);
-        let sides = [(mark[low_index], low_is_a, high_owner, high), (high_mark, !low_is_a, Some(tile.id), low)];
+        let owner_of_high = owner_of(high);
+        let sides = [(mark[low_index], low_is_a, owner_of_high, high), (high_mark, !low_is_a, owner_of(low), low)];
         for (mark, is_a, owner, partner) in sides {
             let Some(border) = border_of(mark) else { continue };
             for send in &mut sends[border.first_send as usize..border.end_send as usize] {
@@ -71,11 +85,16 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             // Both bodies may leave for one tile: one record is enough.
             if border.owner != tile.id && border.owner != heir {
                 heir = border.owner;
-                let from_owner_of_low = u64::from(low_is_a || !with_ghost);
-                contacts
-                    .push((heir, ContactRecord { low: pair.0, high: pair.1, from_owner_of_low, contact: *contact }));
+                contacts.push((heir, record(standing)));
             }
             stray |= border.owner != tile.id;
+        }
+        if let Some(border) = border_of(mark[low_index]).filter(|_| tells) {
+            let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
+                send.near && send.target != tile.id && owner_of_high != Some(send.target) && is_near(high, send.target)
+            });
+            let new = others.filter(|send| send.is_new || is_new(high, send.target));
+            contacts.extend(new.map(|send| (send.target, record(ContactRecord::LENT))));
         }
         if stray {
             tile.strays.push(Stray { pair, authority: Authority::Own, contact: *contact });

@@ -2,7 +2,7 @@
 
 use super::{MigrateWork, place};
 use crate::exchange::mail::Mail;
-use crate::exchange::record::{GhostRecord, MigrantRecord};
+use crate::exchange::record::{ContactRecord, GhostRecord, MigrantRecord};
 use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
@@ -31,7 +31,11 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     settle(tile, arrivals, setup);
     for message in mail.messages() {
         for record in message.contacts {
-            let authority = if record.from_owner_of_low != 0 { Authority::ForeignOwner } else { Authority::Foreign };
+            let authority = match record.standing {
+                ContactRecord::LENT => Authority::Lent,
+                ContactRecord::OF_OWNER_OF_HIGH => Authority::Foreign,
+                _ => Authority::ForeignOwner,
+            };
             tile.strays.push(Stray { pair: (record.low, record.high), authority, contact: record.contact });
         }
     }

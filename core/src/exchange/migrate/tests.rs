@@ -289,7 +289,7 @@ fn pushes(world: &World) -> Vec<Push> {
 }
 
 /// Every ghost is given what its owner stored for contacts that the ghost's tile does not solve, by the owners and places that its
-/// owner knew: those with partners that are neither its own nor, like the ghost, near it.
+/// owner knew: those with partners that are neither that tile's now nor, like the ghost, near it.
 fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push]) {
     for tile in world.tile_states() {
         let is_near = |body: &Body| world.setup.overlap.is_some_and(|depth| reaches(world, tile.id, body, depth));
@@ -318,8 +318,12 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             }
             for push in owners {
                 for (me, other) in [(0, 1), (1, 0)] {
-                    let name = [push.pair.0, push.pair.1][me];
-                    let is_seen = push.owners[other] == Some(tile.id)
+                    let names = [push.pair.0, push.pair.1];
+                    let name = names[me];
+                    // Its owner knows where its own bodies go.
+                    let is_own = push.owners[other] == Some(push.tile);
+                    let owner = if is_own { owner_now(&names[other]) } else { push.owners[other] };
+                    let is_seen = owner == Some(tile.id)
                         || is_near(&bodies[id]) && push.bodies[other].as_ref().is_none_or(is_near);
                     if name == *id && push.owners[me] == Some(push.tile) && !is_seen {
                         for (sum, value) in wanted.iter_mut().zip(push.upon[me]) {
