@@ -4,17 +4,20 @@
 //! from another within the step: as the step began its bodies moved apart, and by `energy = impulse * (speed apart before + after) / 2` it
 //! gives what nobody had. In columns that fall and bounce that came to many times the energy of the fall. So bodies in contacts that
 //! bounce, one next to the other, go from where the solver left them only as far towards what bounces make of them as they keep to the energy of
-//! motion that they came with. Impulses do so too, and momentum is what it was. Not where something gives energy from outside, a static that
-//! moves, or a ghost.
+//! motion that they came with. Impulses do so too, and momentum is what it was. A static that moves gives them what it does to them: impulse
+//! times the speed of its surface. Where a force or a ghost gives energy nothing is known.
 
 use super::columns::Columns;
 use super::groups::{Bounce, Lane};
 use super::restitution::join_all;
 use super::rows::Source;
 use crate::islands::union_find::root_of;
+use crate::model::contact::Contact;
+use crate::model::math::{dot, right_perp, turn};
 use crate::parallel::lanes::Quad;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
+use glam::Vec2;
 use std::ops::Range;
 
 /// How far rounding may be beyond, as a part.
@@ -29,6 +32,8 @@ pub(super) struct Energies {
     /// Of the clusters, one after the other: bodies, and contacts.
     bodies: Vec<Body>,
     contacts: Vec<u32>,
+    /// For each contact how its static moves, if it does, at each point.
+    driven: Vec<Option<[Drive; 2]>>,
     /// What the solver left: velocities of the bodies, and what each contact pressed.
     solved: Vec<Quad>,
     pressed: Vec<[Pressed; 2]>,
@@ -53,6 +58,22 @@ struct Body {
 struct Pressed {
     totals: [f32; 2],
     last: [f32; 2],
+}
+
+/// How the surface of a static moves at a point, as what its impulses along normal and tangent are multiplied with to get what it gives.
+#[derive(Clone, Copy, Default, Debug)]
+struct Drive {
+    /// Along normal and tangent, in m/s.
+    speeds: [f64; 2],
+    /// By how much it becomes faster within the step, in m/s.
+    faster: f64,
+}
+
+impl Drive {
+    /// What the static gives by these impulses, in J.
+    fn given(&self, impulses: [f64; 2]) -> f64 {
+        impulses.iter().zip(self.speeds).map(|(impulse, speed)| impulse * speed + impulse.abs() * self.faster).sum()
+    }
 }
 
 /// Two contacts or more, each of which shares a body with another.
@@ -84,6 +105,7 @@ impl Energies {
         self.clear();
         self.bodies.clear();
         self.contacts.clear();
+        self.driven.clear();
         join_all(on, source, bounces.into_iter().flatten());
         for (bounces, at_once) in bounces.into_iter().zip([false, true]) {
             self.sorted.clear();
@@ -95,11 +117,12 @@ impl Energies {
             let clusters = if at_once { &mut self.at_once } else { &mut self.kept };
             for cluster in self.sorted.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1)) {
                 let among = || cluster.iter().map(|(.., i)| &bounces[*i as usize]);
-                if cluster.len() == 1 || among().any(|bounce| source.is_driven(bounce.contact as usize)) {
+                if cluster.len() == 1 || among().any(|bounce| source.has_strangers(bounce.contact as usize)) {
                     continue;
                 }
                 let (first_body, first_contact) = (self.bodies.len(), self.contacts.len());
                 self.contacts.extend(among().map(|bounce| bounce.contact));
+                self.driven.extend(among().map(|bounce| source.drives_of(bounce.contact as usize)));
                 self.moving.clear();
                 self.moving.extend(among().flat_map(Bounce::moving));
                 self.moving.sort_unstable();
@@ -120,7 +143,7 @@ impl Energies {
         solver: &mut SolverBodies,
         bounce: impl FnOnce(&mut Columns, &mut [Quad]),
     ) {
-        let Self { kept, at_once: others, bodies, contacts, solved, pressed, .. } = self;
+        let Self { kept, at_once: others, bodies, contacts, driven, solved, pressed, .. } = self;
         let clusters = match at_once {
             None => &kept[..],
             Some(batch) => {
@@ -150,8 +173,19 @@ impl Energies {
                 solved.split_off(..bodies.len()).expect("one for each body"),
                 pressed.split_off(..contacts.len()).expect("one for each contact"),
             );
-            let Some(part) = part(bodies, solved, solver) else { continue };
-            let blend = |from: f32, to: f32| from + part * (to - from);
+            let mut given = [0.0; 2];
+            for ((&contact, from), drives) in contacts.iter().zip(pressed).zip(&driven[cluster.contacts.clone()]) {
+                let Some(drives) = drives else { continue };
+                let (_, _, totals, lane) = lanes[contact as usize].totals_mut(columns);
+                for ((totals, from), drive) in totals.iter().zip(from).zip(drives) {
+                    let (from, to) = (from.totals.map(f64::from), totals.of(lane).map(f64::from));
+                    given[0] += drive.given(from);
+                    given[1] += drive.given([to[0] - from[0], to[1] - from[1]]);
+                }
+            }
+            let Some(part) = part(bodies, solved, solver, given) else { continue };
+            // What bounced beyond all bounds did not.
+            let blend = |from: f32, to: f32| if part > 0.0 { from + part * (to - from) } else { from };
             for (body, from) in bodies.iter().zip(solved) {
                 let to = &mut solver.velocity[body.place as usize];
                 (0..3).for_each(|k| to[k] = blend(from[k], to[k]));
@@ -174,8 +208,8 @@ impl Energies {
 }
 
 /// How far bodies may go from where the solver left them to where they bounced to; none if all of the way. They have what they had as the step
-/// began, and what gravity has done since.
-fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies) -> Option<f32> {
+/// began, what gravity has done since, and what statics gave: in J, before they bounced, and as much more as they go of the way.
+fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies, given: [f64; 2]) -> Option<f32> {
     let (mut most, mut before, mut after, mut along, mut change) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (body, &from) in bodies.iter().zip(solved) {
         let (to, moved) = (solver.velocity[body.place as usize], solver.pose[body.place as usize]);
@@ -187,24 +221,58 @@ fn part(bodies: &[Body], solved: &[Quad], solver: &SolverBodies) -> Option<f32> 
         along += product(from, way);
         change += twice_energy(way);
     }
-    let most = f64::max(most, before) * (1.0 + ROUNDING);
-    if after <= most || change == 0.0 {
+    let [given, more] = given.map(|energy| 2.0 * energy);
+    let most = f64::max(most + given, before) * (1.0 + ROUNDING);
+    if after <= most + more || change == 0.0 {
         return None;
     }
-    // Of a square whose ends are below and above it.
+    if !after.is_finite() {
+        return Some(0.0);
+    }
+    // Of a square whose ends are below and above what may be.
+    let along = along - 0.5 * more;
     let root = (along * along + change * (most - before)).max(0.0).sqrt();
     Some(((root - along) / change).clamp(0.0, 1.0) as f32)
 }
 
 impl Source<'_> {
+    /// Whether something may give a contact's bodies energy of which nothing is known here: a force, or what a ghost meets elsewhere.
+    fn has_strangers(self, contact: usize) -> bool {
+        let tile = self.tile;
+        let ghosts = tile.owned..tile.owned + tile.ghosts();
+        let mut bodies = self.contacts.bodies[contact].into_iter().map(|body| body as usize);
+        bodies.any(|body| ghosts.contains(&body) || tile.gain(body).is_some())
+    }
+
+    /// How the static of a contact moves, if there is one that does.
+    fn drives_of(self, contact: usize) -> Option<[Drive; 2]> {
+        let tile = self.tile;
+        let [a, b] = self.contacts.bodies[contact].map(|body| body as usize);
+        // Impulses are those upon B.
+        let (body, sign) = if self.drives(a) { (a, 1.0) } else { (b, -1.0) };
+        if !self.drives(body) {
+            return None;
+        }
+        let Contact { normal, offset, points, .. } = &tile.contacts.contacts[contact];
+        let (tangent, center) = (right_perp(*normal), if body == a { Vec2::ZERO } else { *offset });
+        let belt = tangent * (sign * self.setup.kind(tile.bodies.kind[body]).material.surface_speed);
+        let substeps = self.setup.params.integrations() as f32;
+        let faster = f64::from(self.bodies.static_gain_in(contact as u32).length() * substeps);
+        Some(points.map(|point| {
+            let turns = turn(tile.bodies.angular_velocity[body], point.anchor - center);
+            let velocity = tile.bodies.velocity[body] + turns + belt;
+            Drive { speeds: [*normal, tangent].map(|axis| f64::from(sign * dot(velocity, axis))), faster }
+        }))
+    }
+
     /// Whether something gives a contact's bodies energy from outside: a static that moves, a force, or what a ghost meets elsewhere.
     pub(super) fn is_driven(self, contact: usize) -> bool {
-        let tile = self.tile;
-        let statics = tile.owned + tile.ghosts();
-        self.contacts.bodies[contact].into_iter().map(|body| body as usize).any(|body| {
-            let is_driven_static = body >= statics && self.setup.drives(tile.bodies.kind[body]);
-            (tile.owned..statics).contains(&body) || is_driven_static || tile.gain(body).is_some()
-        })
+        let mut bodies = self.contacts.bodies[contact].into_iter();
+        self.has_strangers(contact) || bodies.any(|body| self.drives(body as usize))
+    }
+
+    fn drives(self, body: usize) -> bool {
+        body >= self.tile.owned + self.tile.ghosts() && self.setup.drives(self.tile.bodies.kind[body])
     }
 
     fn body(self, body: usize) -> Body {
