@@ -14,5 +14,5 @@ pub(crate) use answer::{Answer, Part};
 pub use rehearsal::rehearse;
 pub(crate) use script::Script;
 pub use script::ScriptError;
-pub(crate) use state::State;
+pub(crate) use state::{Since, State};
 pub(crate) use text::{Action, Event, Line, NO_UNTIL, NewBody, Question, Word, named, word};

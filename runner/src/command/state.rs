@@ -34,6 +34,27 @@ pub(crate) struct State {
     /// Whether bodies that enter and leave sensors are told.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     tells_sensors: bool,
+    /// What commands have done to contacts since the last step, as far as it is to be told after the next.
+    #[serde(default, skip_serializing_if = "Since::is_nothing")]
+    contacts_since: Since,
+    /// The same of who is inside sensors.
+    #[serde(default, skip_serializing_if = "Since::is_nothing")]
+    insides_since: Since,
+}
+
+/// Pairs that came and went since the last step, ascending.
+#[derive(Clone, PartialEq, Default, Debug, Serialize, Deserialize)]
+pub(crate) struct Since {
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) came: Vec<[u64; 2]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) went: Vec<[u64; 2]>,
+}
+
+impl Since {
+    fn is_nothing(&self) -> bool {
+        self.came.is_empty() && self.went.is_empty()
+    }
 }
 
 fn is_none(count: &u64) -> bool {
@@ -71,6 +92,14 @@ impl State {
         }
     }
 
+    /// What came and went of the pairs that some events are about.
+    pub(crate) fn since(&mut self, event: Event) -> &mut Since {
+        match event {
+            Event::Contacts => &mut self.contacts_since,
+            Event::Sensors => &mut self.insides_since,
+        }
+    }
+
     /// Counts a line that is done.
     pub(crate) fn count_line(&mut self) {
         self.done += 1;
@@ -101,6 +130,7 @@ impl State {
     /// Forgets what was of the steps before `step` alone, which are made.
     pub(crate) fn pass(&mut self, step: u64) {
         self.done = 0;
+        (self.contacts_since, self.insides_since) = Default::default();
         self.forces.retain(|push| push.until > step);
     }
 

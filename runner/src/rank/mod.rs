@@ -212,7 +212,8 @@ fn run<T: Transport>(
         if let Some(recorder) = &mut recorder {
             recorder.write_due(&world, commander.state(), last.stopped);
         }
-        if !last.stopped {
+        // Of the last step all is answered, whoever asks the run to stop meanwhile.
+        if !last.stopped || *complete == steps {
             commander.take_turn(&mut world, &mut halo, observer)?;
         }
         observer.show(rank, &world);
@@ -237,6 +238,7 @@ fn run<T: Transport>(
     let interrupted = (last.stopped || commander.is_over() && *complete > 0) && *complete < steps;
     let mut output_time = match recorder {
         Some(recorder) => {
+            commander.pause(&world, halo.transport())?;
             end::finish(recorder, (&world, commander.state()), interrupted, plan, observer, halo.transport())?
         }
         None => end::finish_log(log.as_ref(), log_failure, *complete, plan, halo.transport())?,

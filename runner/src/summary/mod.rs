@@ -84,18 +84,19 @@ pub struct Summary {
     pub contacts: u64,
     /// The part of them between bodies of two tiles, 0 to 1.
     pub border_contact_fraction: f64,
-    /// Copies of bodies held by tiles other than their owner's, in the last step.
-    pub ghosts: u64,
+    /// Copies of bodies held by tiles other than their owner's, in the last step; none, as all that is of that step, where the run went on
+    /// from a snapshot and made no step.
+    pub ghosts: Option<u64>,
     /// Changes of owner, in the whole run.
     pub migrations: u64,
     /// Groups of bodies in contact in the last step, each tile's counted apart.
-    pub islands: u64,
+    pub islands: Option<u64>,
     /// Bodies in the largest of them.
-    pub largest_island: u64,
+    pub largest_island: Option<u64>,
     /// Bodies whose islands sleep after the last step.
-    pub asleep: u64,
+    pub asleep: Option<u64>,
     /// Colors of the contacts of one tile in the last step, at most; zero where they are not colored.
-    pub colors: u64,
+    pub colors: Option<u64>,
     /// Bytes sent from rank to rank by steps.
     pub bytes_sent: u64,
     /// Messages sent from rank to rank by steps.
@@ -120,9 +121,9 @@ pub struct Summary {
     /// Mean over overlapping contact points, in m.
     pub mean_penetration: f64,
     /// Mean speed at which contact points still came nearer than they may after the last solve, in m/s.
-    pub constraint_violation: f64,
+    pub constraint_violation: Option<f64>,
     /// The greatest, in m/s.
-    pub max_constraint_violation: f64,
+    pub max_constraint_violation: Option<f64>,
     /// Time of each phase; `wait` is the part of the exchange in which a rank waited for others, `other` what no phase
     /// accounts for, such as threads out of work.
     #[serde(serialize_with = "as_map")]
@@ -144,6 +145,8 @@ impl Summary {
         let facts = Facts::total(tiles);
         let hashes = Hashes::from_words(all.hashes);
         let made = all.steps - all.resumed_at;
+        // A snapshot tells nothing of how the step before it went.
+        let made_any = made > 0 || all.resumed_at == 0;
         let threads = plan.threads;
         let timings: Vec<_> =
             ranks.iter().enumerate().map(|(rank, facts)| RankTimings::new(rank, threads, facts)).collect();
@@ -176,12 +179,12 @@ impl Summary {
             escaped: all.escaped,
             contacts: facts.contacts,
             border_contact_fraction: fraction(facts.border_contacts, facts.contacts),
-            ghosts: all.ghosts,
+            ghosts: made_any.then_some(all.ghosts),
             migrations: all.migrations,
-            islands: all.islands,
-            largest_island: all.largest_island,
-            asleep: all.asleep,
-            colors: all.colors,
+            islands: made_any.then_some(all.islands),
+            largest_island: made_any.then_some(all.largest_island),
+            asleep: made_any.then_some(all.asleep),
+            colors: made_any.then_some(all.colors),
             bytes_sent: all.bytes_sent,
             messages_sent: all.messages_sent,
             imbalance: if all.imbalance > 0 { all.imbalance as f64 * 1e-6 } else { 1.0 },
@@ -193,8 +196,8 @@ impl Summary {
             momentum: facts.momentum,
             max_penetration: facts.max_penetration,
             mean_penetration: facts.mean_penetration,
-            constraint_violation: facts.mean_violation,
-            max_constraint_violation: facts.max_violation,
+            constraint_violation: made_any.then_some(facts.mean_violation),
+            max_constraint_violation: made_any.then_some(facts.max_violation),
             phases: phases(&timings),
             peak_rss_bytes: all.peak_rss_bytes,
             timings,

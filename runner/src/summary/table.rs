@@ -15,14 +15,20 @@ impl fmt::Display for Summary {
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
         let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };
-        let each = self.ms_per_step;
         let after = if self.resumed_at > 0 { format!(" after the first {}", self.resumed_at) } else { String::new() };
         let steps = plural(self.steps - self.resumed_at, "step");
-        writeln!(f, "{steps}{after} in {:.2} s: {each:.3} ms per step, {rate:.1} steps/s{early}", self.wall_s)?;
+        write!(f, "{steps}{after} in {:.2} s", self.wall_s)?;
+        if self.steps > self.resumed_at {
+            write!(f, ": {:.3} ms per step, {rate:.1} steps/s", self.ms_per_step)?;
+        }
+        writeln!(f, "{early}")?;
         self.write_phases(f)?;
         self.write_facts(f)
     }
 }
+
+/// Of the last step, where the run went on from a snapshot and made none.
+const NOT_KNOWN: &str = "not known, as no step was made since the snapshot";
 
 impl Summary {
     fn write_phases(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -46,22 +52,33 @@ impl Summary {
         row(f, "contacts", format_args!("{} near or touching, {border:.2} % across tiles", self.contacts))?;
         let [mean, most] = [self.mean_penetration, self.max_penetration].map(Figure);
         row(f, "overlap", format_args!("{mean:.5} m on the average, {most:.5} m at most"))?;
-        let [mean, most] = [self.constraint_violation, self.max_constraint_violation].map(Figure);
-        row(f, "violation", format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most"))?;
-        let (islands, largest) = (self.islands, plural(self.largest_island, "body"));
-        let colors = plural(self.colors, "color");
-        let asleep = if self.asleep > 0 { format!(", {} asleep", plural(self.asleep, "body")) } else { String::new() };
+        match (self.constraint_violation, self.max_constraint_violation) {
+            (Some(mean), Some(most)) => {
+                let [mean, most] = [mean, most].map(Figure);
+                let what = format_args!("{mean:.5} m/s on the average after the last solve, {most:.5} m/s at most");
+                row(f, "violation", what)?;
+            }
+            _ => row(f, "violation", format_args!("{NOT_KNOWN}"))?,
+        }
         // One over a border is counted in each of its tiles.
         let within = if self.tile_count > 1 { " within tiles" } else { "" };
-        row(f, "islands", format_args!("{islands}{within}, the largest of {largest}{asleep}; {colors}"))?;
+        match (self.islands, self.largest_island, self.colors) {
+            (Some(islands), Some(largest), Some(colors)) => {
+                let (largest, colors) = (plural(largest, "body"), plural(colors, "color"));
+                let asleep = self.asleep.filter(|&asleep| asleep > 0);
+                let asleep = asleep.map_or(String::new(), |asleep| format!(", {} asleep", plural(asleep, "body")));
+                row(f, "islands", format_args!("{islands}{within}, the largest of {largest}{asleep}; {colors}"))?;
+            }
+            _ => row(f, "islands", format_args!("{NOT_KNOWN}"))?,
+        }
         let [half_v2, spin2] = [self.mean_half_v2, self.mean_spin2].map(Figure);
         row(f, "motion", format_args!("mean v^2/2 {half_v2:.6} m^2/s^2, mean spin^2 {spin2:.6} rad^2/s^2"))?;
         let [x, y] = self.momentum;
         row(f, "energy", format_args!("{:.6e} J of motion, momentum ({x:.6e}, {y:.6e}) kg m/s", self.kinetic_energy))?;
         // Of those before no snapshot tells.
         let since = if self.resumed_at > 0 { format!("since step {}", self.resumed_at) } else { "in all".to_owned() };
-        let (ghosts, migrations) = (self.ghosts, self.migrations);
-        row(f, "tiles", format_args!("{ghosts} ghosts in the last step, {migrations} migrations {since}"))?;
+        let ghosts = self.ghosts.map_or(String::new(), |ghosts| format!("{ghosts} ghosts in the last step, "));
+        row(f, "tiles", format_args!("{ghosts}{} migrations {since}", self.migrations))?;
         let sent = self.bytes_sent as f64 * mega;
         row(f, "sent", format_args!("{sent:.1} MB between ranks in {} messages", self.messages_sent))?;
         if self.ranks > 1 {

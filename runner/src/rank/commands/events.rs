@@ -1,7 +1,7 @@
 //! Contacts that begin and end, and bodies that enter and leave sensors, of which each rank tells for its bodies.
 
 use super::super::{RankError, records};
-use crate::command::Event;
+use crate::command::{Event, Since};
 use atoll_core::{Body, World};
 use atoll_transport::{Collective, Rank, Transport};
 
@@ -30,6 +30,32 @@ impl Followed {
         let pairs = if is_told { Some(now(event, world, transport)?) } else { None };
         *self.of(event) = pairs;
         Ok(())
+    }
+
+    /// Where those are not the pairs that there are now, as commands were done since the last step: what came and went, of all ranks.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn since(
+        &mut self,
+        event: Event,
+        world: &World,
+        transport: &mut impl Transport,
+    ) -> Result<Since, RankError> {
+        let Some(before) = self.of(event).as_deref() else { return Ok(Since::default()) };
+        let pairs = now(event, world, transport)?;
+        let [came, went] = [not_in(&pairs, before), not_in(before, &pairs)];
+        Ok(Since { came: gather_all(transport, &came)?, went: gather_all(transport, &went)? })
+    }
+
+    /// Goes back to the pairs after the last step, from those that there are now: who went is told of by one rank.
+    pub(super) fn go_back(&mut self, event: Event, Since { came, went }: &Since, rank: Rank) {
+        let Some(pairs) = self.of(event) else { return };
+        *pairs = not_in(pairs, came);
+        if rank == Rank(0) {
+            pairs.extend(went);
+            pairs.sort_unstable();
+        }
     }
 
     fn of(&mut self, event: Event) -> &mut Option<Vec<Pair>> {
@@ -96,7 +122,15 @@ fn not_in(all: &[Pair], others: &[Pair]) -> Vec<Pair> {
     all.iter().filter(is_new).copied().collect()
 }
 
-/// What all ranks have to say, ascending, on rank 0.
+/// What all ranks have to say, ascending.
+fn gather_all(transport: &mut impl Transport, pairs: &[Pair]) -> Result<Vec<Pair>, RankError> {
+    let parts = transport.all_gather(bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?;
+    let mut pairs: Vec<Pair> = records(&parts).map_err(RankError::Transport)?;
+    pairs.sort_unstable();
+    Ok(pairs)
+}
+
+/// The same on rank 0.
 fn gather(transport: &mut impl Transport, pairs: &[Pair]) -> Result<Option<Vec<Pair>>, RankError> {
     let parts = transport.gather(Rank(0), bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?;
     let Some(parts) = parts else { return Ok(None) };

@@ -152,6 +152,7 @@ impl Commander {
         }
         for event in Event::ALL {
             commander.followed.set(event, commander.state.tells(event), world, transport)?;
+            commander.followed.go_back(event, commander.state.since(event), rank);
         }
         Ok(commander)
     }
@@ -206,6 +207,19 @@ impl Commander {
         let Some(output) = &plan.output else { return Ok(()) };
         let written = output.folder.write_commands(&plan.commands.record(from, self.done_before));
         written.map_err(|error| not_written(&output.folder.commands(), &error))
+    }
+
+    /// Before a snapshot in the midst of what is done before a step: notes which events are not told yet.
+    ///
+    /// # Errors
+    /// If a rank is lost.
+    pub(super) fn pause(&mut self, world: &World, transport: &mut impl Transport) -> Result<(), RankError> {
+        if self.state.done > 0 {
+            for event in Event::ALL {
+                *self.state.since(event) = self.followed.since(event, world, transport)?;
+            }
+        }
+        Ok(())
     }
 
     /// What a snapshot is to tell of it, if there is anything.
