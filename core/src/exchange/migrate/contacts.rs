@@ -13,8 +13,8 @@ use crate::tiling::tile::Tile;
 const AHEAD: usize = 8;
 
 /// Sums unseen impulses, finds the contacts of departing bodies, and copies those that cannot be found by slot any more to the
-/// strays.
-pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
+/// strays. Has other tiles be told of those that they are to solve for others, unless they did so in the last step as well.
+pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, borders_moved: bool) {
     tile.strays.clear();
     tile.sleep.forget_leaning();
     find_concerned(tile, work);
@@ -58,10 +58,13 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             SlotKind::Ghost(_) => Outline::of(tile, tile.index(slot), setup).is_near(target, setup),
             SlotKind::Static(_) => true,
         };
-        let is_new = |slot: Slot, target| match slot.kind() {
-            SlotKind::Static(_) => false,
-            _ => !Outline::was_near(&tile.bodies.get(tile.index(slot)), target, setup),
+        let was_near = |slot: Slot, target| match slot.kind() {
+            SlotKind::Static(_) => true,
+            _ => Outline::was_near(&tile.bodies.get(tile.index(slot)), target, setup),
         };
+        // A tile that shows nothing of itself may have owned nothing, and so solved nothing.
+        let is_shown = |target| tile.ghost_owners.binary_search(&target).is_ok();
+        let was_solved = |target| !borders_moved && is_shown(target) && was_near(low, target) && was_near(high, target);
         let with_ghost = high.is_ghost();
         let low_is_a = tile.bodies.id[low_index] == pair.0;
         let record = |standing| ContactRecord { low: pair.0, high: pair.1, standing, contact: *contact };
@@ -93,8 +96,8 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
             let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
                 send.near && send.target != tile.id && owner_of_high != Some(send.target) && is_near(high, send.target)
             });
-            let new = others.filter(|send| send.is_new || is_new(high, send.target));
-            contacts.extend(new.map(|send| (send.target, record(ContactRecord::LENT))));
+            let new = others.map(|send| send.target).filter(|&target| !was_solved(target));
+            contacts.extend(new.map(|target| (target, record(ContactRecord::LENT))));
         }
         if stray {
             tile.strays.push(Stray { pair, authority: Authority::Own, contact: *contact });

@@ -60,8 +60,6 @@ struct Send {
     target: TileId,
     /// Whether it is near enough to the target that its contacts with others that are so are solved there as well.
     near: bool,
-    /// Whether it may be that it was not in the last step.
-    is_new: bool,
     unseen: Unseen,
 }
 
@@ -104,8 +102,8 @@ impl Parcel {
 /// the others; of its contacts those serve on that are between owned bodies that stay, and of those and statics. Whether borders
 /// of tiles have moved since the last step must be told.
 pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, setup: &Setup, borders_moved: bool) {
-    find_border(tile, work, setup, borders_moved);
-    contacts::sort_out(tile, work, setup);
+    find_border(tile, work, setup);
+    contacts::sort_out(tile, work, setup, borders_moved);
     let MigrateWork { border, sends, contacts, parcels, .. } = work;
     tile.counts.ghosts = sends.len() as u64;
     parcels.extend((Parcel::GHOST..).zip(&*sends).map(|(what, send)| Parcel::new(send.target, what)));
@@ -139,7 +137,7 @@ pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, s
 }
 
 /// Finds the bodies near or beyond the tile's border, their owners, and who needs a ghost of them.
-fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, borders_moved: bool) {
+fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     work.mark.clear();
     work.mark.resize(tile.owned + 1, 0);
     Rim::find(tile, setup);
@@ -155,10 +153,7 @@ fn find_border(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, borders_m
         let first_send = work.sends.len() as u32;
         for target in outline.reached(setup, &work.around).filter(|&target| target != owner) {
             let near = outline.is_near(target, setup);
-            // A tile that shows nothing of itself may have owned nothing, and so solved nothing.
-            let is_shown = || tile.ghost_owners.binary_search(&target).is_ok();
-            let is_new = near && (borders_moved || !is_shown() || !Outline::was_near(&rim.body, target, setup));
-            work.sends.push(Send { rim: place, target, near, is_new, unseen: Unseen::default() });
+            work.sends.push(Send { rim: place, target, near, unseen: Unseen::default() });
         }
         let end_send = work.sends.len() as u32;
         if owner != tile.id || end_send > first_send {
