@@ -1,9 +1,10 @@
 //! Contacts of the last step that concern other tiles.
 
-use super::MigrateWork;
+use super::{Border, MigrateWork};
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::ContactRecord;
 use crate::model::contact::{Slot, SlotKind};
+use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
 use crate::parallel::ahead::fetch;
 use crate::tiling::blueprint::Setup;
@@ -19,7 +20,6 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
     tile.sleep.forget_leaning();
     find_concerned(tile, work);
     let MigrateWork { mark, border, sends, concerned, contacts, .. } = work;
-    let border_of = |mark: u32| border.get((mark as usize).checked_sub(1)?);
     for (place, &i) in concerned.iter().enumerate() {
         if let Some(&next) = concerned.get(place + AHEAD) {
             let key = tile.contacts.keys[next as usize];
@@ -38,45 +38,19 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
             let (id, ghost) = (tile.bodies.id[low_index], tile.bodies.id[tile.index(high)]);
             tile.sleep.lean((id, low_index), ghost);
         }
-        let high_mark = if let SlotKind::Owned(index) = high.kind() { mark[index] } else { 0 };
-        // From now on.
-        let owner_of = |slot: Slot| match slot.kind() {
-            SlotKind::Owned(index) => Some(border_of(mark[index]).map_or(tile.id, |border| border.owner)),
-            SlotKind::Ghost(ghost) => {
-                let (position, owner) = (tile.bodies.position[tile.index(slot)], tile.ghost_owners[ghost]);
-                let stays = setup.partition.region(owner).contains(position);
-                Some(if stays { owner } else { setup.partition.locate(position) })
-            }
-            SlotKind::Static(_) => None,
-        };
-        let is_near = |slot: Slot, target| match slot.kind() {
-            // Whoever is no ghost of any tile is near to none.
-            SlotKind::Owned(index) => border_of(mark[index]).is_some_and(|border| {
-                Outline::of_rim(&tile.rim.bodies[border.rim as usize], setup).is_near(target, setup)
-            }),
-            // Judged by where it was: what comes of it is put right with the first refresh.
-            SlotKind::Ghost(_) => Outline::of(tile, tile.index(slot), setup).is_near(target, setup),
-            SlotKind::Static(_) => true,
-        };
-        let was_near = |slot: Slot, target| match slot.kind() {
-            SlotKind::Static(_) => true,
-            _ => Outline::was_near(&tile.bodies.get(tile.index(slot)), target, setup),
-        };
-        // A tile that shows nothing of itself may have owned nothing, and so solved nothing.
-        let is_shown = |target| tile.ghost_owners.binary_search(&target).is_ok();
-        let was_solved = |target| !borders_moved && is_shown(target) && was_near(low, target) && was_near(high, target);
+        let around = Around { tile, mark, border, setup };
         let with_ghost = high.is_ghost();
         let low_is_a = tile.bodies.id[low_index] == pair.0;
         let record = |standing| ContactRecord { low: pair.0, high: pair.1, standing, contact: *contact };
         let tells = low_is_a || !with_ghost;
         let standing = if tells { ContactRecord::OF_OWNER_OF_LOW } else { ContactRecord::OF_OWNER_OF_HIGH };
         let (mut stray, mut heir, mut impulse) = (with_ghost, tile.id, None);
-        let owner_of_high = owner_of(high);
-        let sides = [(mark[low_index], low_is_a, owner_of_high, high), (high_mark, !low_is_a, owner_of(low), low)];
-        for (mark, is_a, owner, partner) in sides {
-            let Some(border) = border_of(mark) else { continue };
+        let owners = [low, high].map(|slot| around.owner_of(slot));
+        let sides = [(low, low_is_a, owners[1], high), (high, !low_is_a, owners[0], low)];
+        for (slot, is_a, owner, partner) in sides {
+            let Some(border) = around.border_of(slot) else { continue };
             for send in &mut sends[border.first_send as usize..border.end_send as usize] {
-                if owner != Some(send.target) && !(send.near && is_near(partner, send.target)) {
+                if owner != Some(send.target) && !(send.near && around.is_near(partner, send.target)) {
                     let (linear, on_a, on_b) = *impulse.get_or_insert_with(|| contact.impulse());
                     if is_a {
                         send.unseen.add(-linear, on_a);
@@ -92,16 +66,70 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
             }
             stray |= border.owner != tile.id;
         }
-        if let Some(border) = border_of(mark[low_index]).filter(|_| tells) {
+        if let Some(border) = around.border_of(low).filter(|_| tells) {
             let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
-                send.near && send.target != tile.id && owner_of_high != Some(send.target) && is_near(high, send.target)
+                let is_its_own = send.target == tile.id || owners[1] == Some(send.target);
+                send.near && !is_its_own && around.is_near(high, send.target)
             });
-            let new = others.map(|send| send.target).filter(|&target| !was_solved(target));
-            contacts.extend(new.map(|target| (target, record(ContactRecord::LENT))));
+            let new = others
+                .filter(|send| borders_moved || ![low, high].iter().all(|&slot| around.was_near(slot, send.target)));
+            contacts.extend(new.map(|send| (send.target, record(ContactRecord::LENT))));
         }
         if stray {
             tile.strays.push(Stray { pair, authority: Authority::Own, contact: *contact });
         }
+    }
+}
+
+/// The bodies of contacts, as those see them that are around the tile.
+struct Around<'a> {
+    tile: &'a Tile,
+    mark: &'a [u32],
+    border: &'a [Border],
+    setup: &'a Setup,
+}
+
+impl<'a> Around<'a> {
+    /// What is known of an owned body that may concern other tiles.
+    fn border_of(&self, slot: Slot) -> Option<&'a Border> {
+        let SlotKind::Owned(index) = slot.kind() else { return None };
+        self.border.get((self.mark[index] as usize).checked_sub(1)?)
+    }
+
+    /// Who owns a body from now on.
+    fn owner_of(&self, slot: Slot) -> Option<TileId> {
+        let Self { tile, setup, .. } = self;
+        match slot.kind() {
+            SlotKind::Owned(_) => Some(self.border_of(slot).map_or(tile.id, |border| border.owner)),
+            // As far as is known here; borders of tiles may have moved.
+            SlotKind::Ghost(ghost) => {
+                let (position, owner) = (tile.bodies.position[tile.index(slot)], tile.ghost_owners[ghost]);
+                let stays = setup.partition.region(owner).contains(position);
+                Some(if stays { owner } else { setup.partition.locate(position) })
+            }
+            SlotKind::Static(_) => None,
+        }
+    }
+
+    /// Whether a body is so near a tile that its contacts with others that are, and with statics, are solved there.
+    fn is_near(&self, slot: Slot, target: TileId) -> bool {
+        match slot.kind() {
+            // Whoever is no ghost of any tile is near to none.
+            SlotKind::Owned(_) => self.border_of(slot).is_some_and(|border| {
+                Outline::of_rim(&self.tile.rim.bodies[border.rim as usize], self.setup).is_near(target, self.setup)
+            }),
+            // Judged by where it was: what comes of it is put right with the first refresh.
+            SlotKind::Ghost(_) => Outline::of(self.tile, self.tile.index(slot), self.setup).is_near(target, self.setup),
+            SlotKind::Static(_) => true,
+        }
+    }
+
+    /// Whether a tile, if its borders were where they are, surely solved contacts of a body for others in the last step as well.
+    fn was_near(&self, slot: Slot, target: TileId) -> bool {
+        // A tile that shows nothing of itself may have owned nothing, and so solved nothing.
+        let is_shown = || self.tile.ghost_owners.binary_search(&target).is_ok();
+        let body = || self.tile.bodies.get(self.tile.index(slot));
+        is_shown() && (matches!(slot.kind(), SlotKind::Static(_)) || Outline::was_near(&body(), target, self.setup))
     }
 }
 
