@@ -104,10 +104,10 @@ fn sleep_has_one_result() {
     for (path, small, steps) in [
         ("configs/stack.toml", &[("tiles", "2x2")][..], "200"),
         ("configs/pyramids.toml", &[("bodies", "550"), ("tiles", "1x1")][..], "150"),
-        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "3x2"), ("seed", "1"), ("sleep_speed", "0.3")][..], "300"),
+        ("configs/pile.toml", &[("bodies", "600"), ("tiles", "3x2"), ("seed", "1"), ("sleep_speed", "0.3")][..], "420"),
     ] {
         let asleep = run((path, small), &[("sleep", "true"), ("steps", steps)]).asleep;
-        assert!(asleep > 0, "{path}: nobody sleeps");
+        assert!(asleep > Some(0), "{path}: nobody sleeps");
         one_result((path, small), &[("sleep", "true"), ("steps", steps)]);
     }
 }

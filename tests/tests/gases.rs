@@ -451,7 +451,7 @@ fn a_crowd_does_not_go_into_itself() {
             for _ in 0..steps {
                 sim.run(1);
                 let energy = sim.kinetic_energy();
-                // Over borders each tile knows a part of who bounces off whom.
+                // Over borders each tile knows a part of who bounces off whom: up to 1.14 with sixteen other crowds, 1.01 on the average.
                 let most = if tiles == (1, 1) { 1.001 } else { 1.2 };
                 assert!(energy < most * least, "restitution {restitution}, {tiles:?}: {energy} J of {least}");
                 least = least.min(energy);
@@ -467,13 +467,18 @@ fn a_crowd_does_not_go_into_itself() {
 /// no longer finite after one step.
 #[test]
 fn who_is_squeezed_by_a_static_that_moves_gets_what_that_gives() {
-    for friction in [0.6, 1.0, 3.0] {
+    // Whichever of two bodies has the lower name, and whether or not the surface runs.
+    for (friction, first_static, belt) in
+        [(0.6, 0_u64, 0.0), (1.0, 0, 0.0), (3.0, 0, 0.0), (1.0, 1000, 0.0), (1.0, 0, 3.0), (1.0, 1000, -3.0)]
+    {
         for start in 0..20 {
             let mut scene = Scene::new(DVec2::ZERO, 0.0);
             scene.half = DVec2::splat(10.0);
             let material = Material { friction, restitution: 0.5, ..Material::default() };
-            let disc =
-                |id, radius, place| StaticBody::new(GlobalId(id), Kind::new(Shape::circle(radius), material), place);
+            let disc = |id: u64, radius, place| {
+                let material = Material { surface_speed: belt, ..material };
+                StaticBody::new(GlobalId(first_static + id), Kind::new(Shape::circle(radius), material), place)
+            };
             let travel = Travel::Circle { radius: 0.42, period: -0.5565, phase: 0.0546 };
             let path = Some(Path { travel, turning: 0.0 });
             scene.statics.push(StaticBody { path, ..disc(0, 0.85, DVec2::new(0.0, 1.38)) });

@@ -147,7 +147,9 @@ fn same_bits(a: &Summary, b: &Summary) -> Result<(), &'static str> {
 
 fn table(scene: &Scene, rows: &[Row], facts: &Summary, repeats: u64) {
     let Scene { name, bodies, steps, .. } = scene;
-    let Summary { islands, largest_island, colors, contacts, .. } = facts;
+    let [islands, largest_island, colors] =
+        [facts.islands, facts.largest_island, facts.colors].map(|of_step| of_step.expect("steps were made"));
+    let contacts = facts.contacts;
     eprintln!("{name}: {bodies} bodies in one tile, {steps} steps, median of {repeats}");
     eprintln!(
         "at the end: contacts {contacts}, islands {islands}, bodies in the largest {largest_island}, colors {colors}"

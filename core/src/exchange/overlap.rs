@@ -35,9 +35,6 @@ pub(crate) fn depth(params: &Params) -> Option<f64> {
     }
 }
 
-/// What a body may move in a step that is not told by its velocity, in m.
-const CREEP: f32 = 0.001;
-
 /// A body's place and the half extents of its grown AABB.
 #[derive(Clone, Copy)]
 pub(crate) struct Outline {
@@ -67,14 +64,19 @@ impl Outline {
         setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, self.place, self.half, depth))
     }
 
-    /// Whether a body was so near to a tile in the last step as well, if that had the same region then; it may have been where this says no.
+    /// Whether a body was so near to a tile in the last step as well, if that had the same region then and the body came as its velocity
+    /// tells; it may have been where this says no.
     pub(crate) fn was_near(body: &Body, tile: TileId, setup: &Setup) -> bool {
-        let kind = setup.kind(body.kind);
-        // It was as far outside as it can have come in, and as small as it may have been.
-        let turned = setup.params.dt * kind.not_round * kind.bounding_radius * body.angular_velocity.abs();
-        let half = kind.half_extents(body.rotation) + (setup.params.margin_floor - turned - CREEP);
-        let half = half - body.velocity.abs() * setup.params.dt;
+        // It was as far outside as it can have come in, and as small as it may have been: its margin, which is not counted here, is more than
+        // what it is pushed in a step.
+        let half = setup.kind(body.kind).half_extents(body.rotation) - setup.way_of(body);
         setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, body.position, half, depth))
+    }
+
+    /// Whether a ghost, of which it is known where it was as the last step began, may be so near to a tile now.
+    pub(crate) fn may_come_near(ghost: &Body, tile: TileId, setup: &Setup) -> bool {
+        let half = setup.grown_half_extents(ghost) + setup.way_of(ghost);
+        setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, ghost.position, half, depth))
     }
 
     /// Whether a tile that does not own it has it as a ghost.

@@ -369,9 +369,19 @@ impl Setup {
     /// Half extents of a dynamic body's AABB, grown by how its turning may change it within a step and by its margin. In meters.
     #[inline(always)]
     pub(crate) fn grown_half_extents(&self, body: &Body) -> Vec2 {
+        self.kind(body.kind).swept_half_extents(body.rotation, self.sweep_of(body)) + self.margin(body.velocity)
+    }
+
+    /// How far turning brings its surface in a step, at most, in meters.
+    #[inline(always)]
+    fn sweep_of(&self, body: &Body) -> f32 {
         let kind = self.kind(body.kind);
-        let sweep = kind.not_round * (kind.bounding_radius * body.angular_velocity.abs()) * self.params.dt;
-        kind.swept_half_extents(body.rotation, sweep) + self.margin(body.velocity)
+        kind.not_round * (kind.bounding_radius * body.angular_velocity.abs()) * self.params.dt
+    }
+
+    /// How far its surface goes in a step at most, along x and y, in meters.
+    pub(crate) fn way_of(&self, body: &Body) -> Vec2 {
+        body.velocity.abs() * self.params.dt + self.sweep_of(body)
     }
 
     /// The statics that a tile may have to know: those that reach its region grown by the halo of the largest; where it solves contacts of

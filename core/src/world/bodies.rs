@@ -159,9 +159,11 @@ impl World {
         if !std::mem::take(&mut self.is_unsettled) {
             return;
         }
+        for (place, _) in self.tiles.iter().enumerate().filter(|(_, tile)| tile.changes.is_some()) {
+            self.places.forget_tile(place);
+        }
         self.tiles.par_iter_mut().for_each(Tile::settle);
         self.changed = true;
-        self.places.forget();
     }
 
     /// The tile that owns a body, and its place there, if it is one of this world's and was there in the last step.

@@ -92,11 +92,13 @@ impl World {
         self.verdict = self.verdict.merge(Verdict { failure: verdict.failure, ..Verdict::default() });
     }
 
-    /// Forgets that a step has failed, what it had to say, what the next one is asked for, and what pushes at bodies.
+    /// Forgets that a step has failed, what it had to say, what the next one is asked for, what pushes at bodies, and where all are: statics
+    /// move as another step has it.
     pub(crate) fn begin_anew(&mut self) {
         (self.halfway, self.verdict, self.next_partition) = (None, Verdict::default(), None);
         (self.measures, self.takes_figures) = (false, false);
         self.forces.clear();
+        self.places.forget();
         self.outbox.bags.clear();
         for hand in &mut self.hands {
             let hand = hand.get_mut().expect("no stage panicked");

@@ -25,7 +25,7 @@ use bytemuck::{Pod, cast_slice};
 mod tests;
 
 /// The version of the frame; grows with every change of any record.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 
 #[derive(Encode, Decode)]
 struct Header {

@@ -69,7 +69,7 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
         if let Some(border) = around.border_of(low).filter(|_| tells) {
             let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
                 let is_its_own = send.target == tile.id || owners[1] == Some(send.target);
-                send.near && !is_its_own && around.is_near(high, send.target)
+                send.near && !is_its_own && around.may_be_near(high, send.target)
             });
             let new = others
                 .filter(|send| borders_moved || ![low, high].iter().all(|&slot| around.was_near(slot, send.target)));
@@ -122,6 +122,12 @@ impl<'a> Around<'a> {
             SlotKind::Ghost(_) => Outline::of(self.tile, self.tile.index(slot), self.setup).is_near(target, self.setup),
             SlotKind::Static(_) => true,
         }
+    }
+
+    /// Whether a body may be so near: too much that is told does no harm.
+    fn may_be_near(&self, slot: Slot, target: TileId) -> bool {
+        let body = || self.tile.bodies.get(self.tile.index(slot));
+        self.is_near(slot, target) || slot.is_ghost() && Outline::may_come_near(&body(), target, self.setup)
     }
 
     /// Whether a tile, if its borders were where they are, surely solved contacts of a body for others in the last step as well.

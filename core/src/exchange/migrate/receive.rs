@@ -32,9 +32,9 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
     for message in mail.messages() {
         for record in message.contacts {
             let authority = match record.standing {
-                ContactRecord::LENT => Authority::Lent,
+                ContactRecord::OF_OWNER_OF_LOW => Authority::ForeignOwner,
                 ContactRecord::OF_OWNER_OF_HIGH => Authority::Foreign,
-                _ => Authority::ForeignOwner,
+                _ => Authority::Lent,
             };
             tile.strays.push(Stray { pair: (record.low, record.high), authority, contact: record.contact });
         }

@@ -93,16 +93,18 @@ impl World {
 
     /// The tiles, by where their bodies are.
     fn around(&self) -> &Tree {
-        self.places.around.get_or_init(|| {
-            let around = |tile: &Tile| {
-                let each = tile.present().map(|(_, body)| bounds(&body, &self.setup));
-                each.fold(Bounds::NONE, Bounds::join)
-            };
-            let known = self.tile_places().par_iter().zip(self.tile_states()).zip(0..self.tile_states().len() as u32);
-            let all = known.map(|((places, tile), number)| (number, *places.bounds.get_or_init(|| around(tile))));
-            let used: Vec<(u32, Bounds)> = all.filter(|(_, bounds)| bounds.low.x <= bounds.high.x).collect();
-            Tree::new(&used)
-        })
+        if let Some(around) = self.places.around.get() {
+            return around;
+        }
+        let around = |tile: &Tile| {
+            let each = tile.present().map(|(_, body)| bounds(&body, &self.setup));
+            each.fold(Bounds::NONE, Bounds::join)
+        };
+        // By all threads, and not while others may wait for what comes of it: one that asks itself would wait for itself.
+        let known = self.tile_places().par_iter().zip(self.tile_states()).zip(0..self.tile_states().len() as u32);
+        let all = known.map(|((places, tile), number)| (number, *places.bounds.get_or_init(|| around(tile))));
+        let used: Vec<(u32, Bounds)> = all.filter(|(_, bounds)| bounds.low.x <= bounds.high.x).collect();
+        self.places.around.get_or_init(|| Tree::new(&used))
     }
 
     /// The bodies of a tile, by their places in it.

@@ -6,6 +6,7 @@ use crate::model::id::KindId;
 use crate::model::kind::{Kind, KindRow};
 use crate::model::math::Rot;
 use crate::model::params::Params;
+use crate::model::path::{Path, Travel};
 use crate::model::shape::{Part, Shape};
 use crate::step::step;
 use crate::testing::{any_convex, any_rotation, cases, circle, rectangle};
@@ -22,7 +23,11 @@ fn blueprint(columns: u32, rows: u32, far: DVec2) -> Blueprint {
         StaticBody { rotation: Rot::from_angle(0.1 * id as f32), ..upright }
     };
     let kinds = vec![circle(0.25), rectangle(0.5, 0.3), rectangle(0.1, 3.0), circle(2.0)];
-    Blueprint { params: Params::default(), partition, kinds, statics: vec![wall(0, 1.0), wall(1, 30.0)] }
+    let lift = StaticBody {
+        path: Some(Path { travel: Travel::Line { velocity: DVec2::new(6.0, 2.0) }, turning: 2.0 }),
+        ..StaticBody::new(GlobalId(2), rectangle(3.0, 1.0), far + DVec2::new(25.0, 16.0))
+    };
+    Blueprint { params: Params::default(), partition, kinds, statics: vec![wall(0, 1.0), wall(1, 30.0), lift] }
 }
 
 /// Numbers from 0 to 1 that look random.
@@ -51,7 +56,7 @@ fn fill(world: &mut World, any: &mut Any, far: DVec2) {
 
 /// All that there is to be met, one by one.
 fn outlines(world: &World) -> Vec<Outline<'_>> {
-    let all = world.bodies().chain(world.setup.statics.iter().copied());
+    let all = world.bodies().chain(world.setup.statics_at(world.step));
     all.map(|body| world.outline(&body)).collect()
 }
 
@@ -62,7 +67,7 @@ fn answers_are_those_of_looking_at_each_body() {
         let mut world = World::whole(&blueprint(4, 3, far)).unwrap();
         fill(&mut world, &mut any, far);
         let (mut hits, mut found) = (0, 0);
-        for round in 0..7 {
+        for round in 0..8 {
             let all = outlines(&world);
             for number in 0..3400 {
                 let (from, mut to) = (far + any.place(), far + any.place());
@@ -97,6 +102,8 @@ fn answers_are_those_of_looking_at_each_body() {
                     world.add(Body::at_rest(GlobalId(5000), KindId(3), place)).unwrap();
                     assert!(world.at_point(place).contains(&GlobalId(5000)));
                 }
+                // What moves is elsewhere then.
+                5 => world.resume_at(world.step_count() + 40),
                 // Rows of statics' kinds move on.
                 4 => drop(world.add_kind(&circle(0.2)).unwrap()),
                 _ => drop(world.command(&Command::SetKind { id: GlobalId(700), kind: KindId(3) }).unwrap()),

@@ -44,8 +44,10 @@ impl Followed {
     ) -> Result<Since, RankError> {
         let Some(before) = self.of(event).as_deref() else { return Ok(Since::default()) };
         let pairs = now(event, world, transport)?;
-        let [came, went] = [not_in(&pairs, before), not_in(before, &pairs)];
-        Ok(Since { came: gather_all(transport, &came)?, went: gather_all(transport, &went)? })
+        let came = gather_all(transport, &not_in(&pairs, before))?;
+        let went = gather_all(transport, &not_in(before, &pairs))?;
+        // Of a pair that another rank tells of from now on both are said.
+        Ok(Since { came: not_in(&came, &went), went: not_in(&went, &came) })
     }
 
     /// Goes back to the pairs after the last step, from those that there are now: who went is told of by one rank.
@@ -55,6 +57,7 @@ impl Followed {
         if rank == Rank(0) {
             pairs.extend(went);
             pairs.sort_unstable();
+            pairs.dedup();
         }
     }
 

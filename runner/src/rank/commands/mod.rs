@@ -213,11 +213,14 @@ impl Commander {
     ///
     /// # Errors
     /// If a rank is lost.
-    pub(super) fn pause(&mut self, world: &World, transport: &mut impl Transport) -> Result<(), RankError> {
+    pub(super) fn pause<T: Transport>(&mut self, world: &World, transport: &mut Counting<T>) -> Result<(), RankError> {
         if self.state.done > 0 {
+            let (begun, sent) = (Instant::now(), transport.stats());
             for event in Event::ALL {
                 *self.state.since(event) = self.followed.since(event, world, transport)?;
             }
+            self.time += begun.elapsed();
+            self.sent += transport.stats().since(&sent);
         }
         Ok(())
     }
