@@ -46,9 +46,9 @@ impl World {
     /// The first body or static on the straight way from one point to another, in m; none if one of these is not finite. One around the
     /// first point is met at once.
     ///
-    /// The first question after a step takes the time of looking at where each body is, and each tile that it comes near that of sorting
-    /// its bodies by place, once until they move; all others, time that grows with the logarithm of their number, and with how much
-    /// lies near the way.
+    /// The first question after a step takes the time of looking at where each body is, and the first few that come near a tile that of
+    /// looking at each of its bodies. Where there are more, these are sorted by place; each one after that takes time that grows with the
+    /// logarithm of their number, and with how much lies near the way.
     pub fn cast_ray(&self, from: DVec2, to: DVec2) -> Option<RayHit> {
         (from.is_finite() && (to - from).is_finite()).then(|| self.first_hit((from, to)))?
     }

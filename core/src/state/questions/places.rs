@@ -10,6 +10,7 @@ use crate::world::World;
 use glam::DVec2;
 use rayon::prelude::*;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// What is known of where all are, until they are elsewhere.
 #[derive(Default, Debug)]
@@ -29,9 +30,14 @@ pub(crate) struct Places {
 struct TilePlaces {
     /// Around all of them.
     bounds: OnceLock<Bounds>,
-    /// Them, by their places in the tile, once a question came near.
+    /// How many questions came near.
+    asked: AtomicU32,
+    /// Them, by their places in the tile, once there were too many questions to look at all of them for each.
     bodies: OnceLock<Tree>,
 }
+
+/// Sorting the bodies of a tile takes as long as looking at all of them for about so many questions.
+const FEW: u32 = 6;
 
 impl Places {
     /// All may be elsewhere, and of other tiles.
@@ -58,8 +64,15 @@ pub(super) fn bounds(body: &Body, setup: &Setup) -> Bounds {
 impl World {
     /// Visits the bodies whose rectangles meet another, and maybe a few more.
     pub(super) fn visit_bodies(&self, bounds: Bounds, mut visitor: impl FnMut(&Body)) {
-        self.around().visit(bounds, |tile| {
-            self.places_in(tile).visit(bounds, |at| visitor(&self.tile_states()[tile as usize].at(at)));
+        self.around().visit(bounds, |number| {
+            let tile = &self.tile_states()[number as usize];
+            match self.sorted(number) {
+                Some(bodies) => bodies.visit(bounds, |at| visitor(&tile.at(at))),
+                None => {
+                    let is_near = |body: &Body| self::bounds(body, &self.setup).meets(bounds);
+                    tile.present().filter(|(_, body)| is_near(body)).for_each(|(_, body)| visitor(&body));
+                }
+            }
         });
     }
 
@@ -81,10 +94,29 @@ impl World {
         for rows in self.statics() {
             rows.cast_ray(ray, &mut best, |row, best| ask(&self.setup.static_at(row, self.step), best));
         }
-        self.around().cast_ray(ray, &mut best, |tile, best| {
-            self.places_in(tile).cast_ray(ray, best, |at, best| ask(&self.tile_states()[tile as usize].at(at), best));
+        let is_near = self.near_ray(ray);
+        self.around().cast_ray(ray, &mut best, |number, best| {
+            let tile = &self.tile_states()[number as usize];
+            match self.sorted(number) {
+                Some(bodies) => bodies.cast_ray(ray, best, |at, best| ask(&tile.at(at), best)),
+                None => tile.present().filter(|(_, body)| is_near(body)).for_each(|(_, body)| ask(&body, best)),
+            }
         });
         best
+    }
+
+    /// Tells of a body whether its bounding circle comes to a ray, and maybe of a few more.
+    fn near_ray(&self, (from, to): (DVec2, DVec2)) -> impl Fn(&Body) -> bool {
+        let way = to - from;
+        let per_length = 1.0 / way.length_squared().max(f64::MIN_POSITIVE);
+        move |body| {
+            let nearest = from + way * ((body.position - from).dot(way) * per_length).clamp(0.0, 1.0);
+            let radius = f64::from(self.setup.kind(body.kind).bounding_radius) * (1.0 + 1e-6);
+            let radius = radius + 1e-14 * body.position.abs().max_element();
+            let square = (nearest - body.position).length_squared();
+            // Where numbers overflow everybody is.
+            square <= radius * radius || square.is_nan()
+        }
     }
 
     pub(super) fn outline(&self, body: &Body) -> Outline<'_> {
@@ -107,14 +139,16 @@ impl World {
         self.places.around.get_or_init(|| Tree::new(&used))
     }
 
-    /// The bodies of a tile, by their places in it.
-    fn places_in(&self, tile: u32) -> &Tree {
-        self.tile_places()[tile as usize].bodies.get_or_init(|| {
-            let tile = &self.tile_states()[tile as usize];
+    /// The bodies of a tile, by their places in it, if there are many questions.
+    fn sorted(&self, number: u32) -> Option<&Tree> {
+        let places = &self.tile_places()[number as usize];
+        let sort = || {
+            let tile = &self.tile_states()[number as usize];
             let mut all = Vec::with_capacity(tile.count());
             tile.present().for_each(|(at, body)| all.push((at, bounds(&body, &self.setup))));
             Tree::new(&all)
-        })
+        };
+        (places.asked.fetch_add(1, Relaxed) >= FEW).then(|| places.bodies.get_or_init(sort))
     }
 
     fn tile_places(&self) -> &[TilePlaces] {

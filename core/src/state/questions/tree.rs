@@ -20,6 +20,11 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
+    /// Whether the two have a point in common.
+    pub(super) fn meets(self, other: Self) -> bool {
+        (self.low.cmple(other.high) & other.low.cmple(self.high)).all()
+    }
+
     fn center(self) -> DVec2 {
         (self.low + self.high) * 0.5
     }
