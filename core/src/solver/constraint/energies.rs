@@ -13,7 +13,7 @@ use super::restitution::join_all;
 use super::rows::Source;
 use crate::islands::union_find::root_of;
 use crate::model::contact::Contact;
-use crate::model::math::{dot, right_perp, turn};
+use crate::model::math::{dot, right_perp};
 use crate::parallel::lanes::Quad;
 use crate::solver::batches::Batch;
 use crate::solver::bodies::SolverBodies;
@@ -255,12 +255,10 @@ impl Source<'_> {
         }
         let Contact { normal, offset, points, .. } = &tile.contacts.contacts[contact];
         let (tangent, center) = (right_perp(*normal), if body == a { Vec2::ZERO } else { *offset });
-        let belt = tangent * (sign * self.setup.kind(tile.bodies.kind[body]).material.surface_speed);
         let substeps = self.setup.params.integrations() as f32;
         let faster = f64::from(self.bodies.static_gain_in(contact as u32).length() * substeps);
         Some(points.map(|point| {
-            let turns = turn(tile.bodies.angular_velocity[body], point.anchor - center);
-            let velocity = tile.bodies.velocity[body] + turns + belt;
+            let velocity = self.surface_velocity(body, point.anchor - center, tangent * sign);
             Drive { speeds: [*normal, tangent].map(|axis| f64::from(sign * dot(velocity, axis))), faster }
         }))
     }

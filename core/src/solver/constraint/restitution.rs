@@ -378,6 +378,13 @@ impl<'a> Source<'a> {
         approach.of_oscillating(axes.map(|axis| dot(gain, axis)), slip, self.setup)
     }
 
+    /// How a body's surface moves as the step begins, so far from its center, where a belt runs along this direction.
+    pub(super) fn surface_velocity(self, body: usize, arm: Vec2, along: Vec2) -> Vec2 {
+        let (bodies, setup) = (&self.tile.bodies, self.setup);
+        let belt = along * setup.kind(bodies.kind[body]).material.surface_speed;
+        bodies.velocity[body] + turn(bodies.angular_velocity[body], arm) + belt
+    }
+
     /// How a point's surfaces come nearer, how fast they slide along each other, and normal and tangent.
     pub(super) fn approach(self, contact: usize, point: usize) -> (Approach, f32, [Vec2; 2]) {
         let (bodies, setup, [a, b]) = (&self.tile.bodies, self.setup, self.contacts.bodies[contact]);
@@ -389,8 +396,7 @@ impl<'a> Source<'a> {
             let kind = setup.kind(bodies.kind[i]);
             let falls = kind.inv_mass > 0.0;
             let gravity = if falls { setup.params.gravity * kind.dynamics.gravity_scale } else { Vec2::ZERO };
-            let belt = tangent * (runs * kind.material.surface_speed);
-            (bodies.velocity[i] + turn(bodies.angular_velocity[i], arm) + belt, gravity)
+            (self.surface_velocity(i, arm, tangent * runs), gravity)
         };
         let ((velocity_a, gravity_a), (velocity_b, gravity_b)) =
             (motion(a, anchor, 1.0), motion(b, anchor - offset, -1.0));

@@ -127,17 +127,17 @@ fn not_in(all: &[Pair], others: &[Pair]) -> Vec<Pair> {
 
 /// What all ranks have to say, ascending.
 fn gather_all(transport: &mut impl Transport, pairs: &[Pair]) -> Result<Vec<Pair>, RankError> {
-    let parts = transport.all_gather(bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?;
-    let mut pairs: Vec<Pair> = records(&parts).map_err(RankError::Transport)?;
-    pairs.sort_unstable();
-    Ok(pairs)
+    joined(&transport.all_gather(bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?)
 }
 
 /// The same on rank 0.
 fn gather(transport: &mut impl Transport, pairs: &[Pair]) -> Result<Option<Vec<Pair>>, RankError> {
     let parts = transport.gather(Rank(0), bytemuck::cast_slice(pairs)).map_err(RankError::Transport)?;
-    let Some(parts) = parts else { return Ok(None) };
-    let mut pairs: Vec<Pair> = records(&parts).map_err(RankError::Transport)?;
+    parts.map(|parts| joined(&parts)).transpose()
+}
+
+fn joined(parts: &[Vec<u8>]) -> Result<Vec<Pair>, RankError> {
+    let mut pairs: Vec<Pair> = records(parts).map_err(RankError::Transport)?;
     pairs.sort_unstable();
-    Ok(Some(pairs))
+    Ok(pairs)
 }
