@@ -82,21 +82,23 @@ impl<V: Wide> Shapes<V> for Boxes {
         let t = Vectors::new(by_x.if_positive(zero, negated(side)), by_x.if_positive(side, zero));
         let height = by_x.if_positive(reference.x, reference.y);
         let width = by_x.if_positive(reference.y, reference.x);
-        let face = by_x.if_positive(zero, V::splat(16.0)).add(side.if_positive(zero, V::splat(8.0)));
+        let face = by_x.if_positive(zero, V::splat(2.0)).add(side.if_positive(zero, one));
         // The incident edge: of the face that looks most against `n`, its ends in the order of `t`.
         let seen = turn.unrotate(n);
         let by_x = less(absolute(seen.y), absolute(seen.x));
         let side = negated(sign(by_x.if_positive(seen.x, seen.y)));
         let middle =
             Vectors::new(by_x.if_positive(side.mul(incident.x), zero), by_x.if_positive(zero, side.mul(incident.y)));
-        let edge = Vectors::new(
+        let along_edge = Vectors::new(
             by_x.if_positive(zero, negated(side).mul(incident.x)),
             by_x.if_positive(side.mul(incident.y), zero),
         );
-        let face = face.add(by_x.if_positive(zero, V::splat(4.0))).add(side.if_positive(zero, V::splat(2.0)));
-        let features = face.add(from_b.if_positive(V::splat(32.0), zero));
-        let (middle, edge) = (center.plus(turn.rotate(middle)), turn.rotate(edge));
-        let ends = [middle.plus(edge), middle.minus(edge)];
+        let edge = by_x.if_positive(zero, V::splat(2.0)).add(side.if_positive(zero, one));
+        let [of_a, of_b] = [from_b.if_positive(edge, face), from_b.if_positive(face, edge)];
+        let features = of_a.mul(V::splat(8.0)).add(of_b.mul(V::splat(2.0)));
+        let first = from_b.if_positive(one, zero);
+        let (middle, along_edge) = (center.plus(turn.rotate(middle)), turn.rotate(along_edge));
+        let ends = [middle.plus(along_edge), middle.minus(along_edge)];
         let place = [ends[0].dot(t), ends[1].dot(t)];
         let rise = [ends[0].dot(n).sub(height), ends[1].dot(n).sub(height)];
         // Where no face opposes the edge it is the corner that counts, on one side or the other.
@@ -114,7 +116,7 @@ impl<V: Wide> Shapes<V> for Boxes {
             normal: n,
             anchor: [offset; 2],
             separation: [zero; 2],
-            feature: [features, features.add(one)],
+            feature: [features.add(first), features.add(one.sub(first))],
         };
         let (mut clipped, mut gaps, mut parts, mut distances) = ([zero; 2], [offset; 2], [zero; 2], [zero; 2]);
         for end in 0..2 {
@@ -137,8 +139,8 @@ impl<V: Wide> Shapes<V> for Boxes {
         at.normal = Vectors::pick(corner, away, n);
         at.anchor[0] = Vectors::pick(corner, point.plus(gap.scaled(half)), at.anchor[0]);
         at.separation[0] = corner.if_positive(distance, at.separation[0]);
-        let second = less(part, half).if_positive(zero, one);
-        at.feature[0] = corner.if_positive(features.add(second), features);
+        let end = less(part, half).if_positive(first, one.sub(first));
+        at.feature[0] = corner.if_positive(features.add(end), at.feature[0]);
         // Back to the frame of the world, and of body A.
         let back = Vectors::pick(from_b, rotation[1], rotation[0]);
         let normal = back.rotate(at.normal);

@@ -285,8 +285,10 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
             let [in_a, in_b] = [a.face(number, against), b.face(number, against)];
             edge = Face::pick(against.sub(edge.figure), &Face::pick(from_b, &in_a, &in_b), &edge);
         }
-        let features = from_b.if_positive(V::splat(128.0), zero);
-        let features = features.add(reference.number.mul(V::splat(16.0))).add(edge.number.mul(V::splat(2.0)));
+        let of_a = from_b.if_positive(edge.number, reference.number);
+        let of_b = from_b.if_positive(reference.number, edge.number);
+        let features = of_a.mul(V::splat(16.0)).add(of_b.mul(V::splat(2.0)));
+        let first = from_b.if_positive(one, zero);
         let radius = from_b.if_positive(pairs.radius[1], pairs.radius[0]);
         let other_radius = from_b.if_positive(pairs.radius[0], pairs.radius[1]);
         // Clipped to the face.
@@ -309,7 +311,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
             normal: n,
             anchor: [offset; 2],
             separation: [zero; 2],
-            feature: [features, features.add(one)],
+            feature: [features.add(first), features.add(one.sub(first))],
         };
         let mut none = width.if_positive(beside, one);
         for end in 0..2 {

@@ -5,8 +5,9 @@
 //! others' bodies as well, where both are near it: an overlapping domain decomposition (H. A. Schwarz, 1870; in the form in
 //! which each part solves a little beyond its border and keeps what is its own: X.-C. Cai, M. Sarkis, "A restricted additive
 //! Schwarz preconditioner for general sparse linear systems", 1999). Of such a contact only what it does to bodies within the
-//! step is used; it is scratch otherwise, and remembered for the next step's scratch alone. What a tile cannot remember, as it did not
-//! solve it in the step before, it is told by an owner: begun without impulses, it would give way.
+//! step is used; it is scratch otherwise. An owner tells how each of them pressed, in every step: begun without impulses it would give way,
+//! and begun with those of scratch, each tile would come to press in its own way what may be pressed in many ways, as heaps of boxes
+//! are, and what the tiles' mean leaves unbalanced would creep for ever.
 //!
 //! Who is near follows from bit-exact copies, so that who sends knows what who receives solves.
 
@@ -62,15 +63,6 @@ impl Outline {
     #[inline]
     pub(crate) fn is_near(&self, tile: TileId, setup: &Setup) -> bool {
         setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, self.place, self.half, depth))
-    }
-
-    /// Whether a body was so near to a tile in the last step as well, if that had the same region then and the body came as its velocity
-    /// tells; it may have been where this says no.
-    pub(crate) fn was_near(body: &Body, tile: TileId, setup: &Setup) -> bool {
-        // It was as far outside as it can have come in, and as small as it may have been: its margin, which is not counted here, is more than
-        // what it is pushed in a step.
-        let half = setup.kind(body.kind).half_extents(body.rotation) - setup.way_of(body);
-        setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, body.position, half, depth))
     }
 
     /// Whether a ghost, of which it is known where it was as the last step began, may be so near to a tile now.

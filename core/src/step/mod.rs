@@ -162,10 +162,8 @@ fn close(world: &mut World, halo: &mut Carry<'_>) -> Result<Vec<TileFacts>, Step
 /// The first sync point: migrants, then ghosts; and another where bodies go far. What all ranks together have to say comes back.
 fn migrate(world: &mut World, halo: &mut Carry<'_>) -> Result<Verdict, StepError<NotCarried>> {
     if !world.has_failed() {
-        let borders_moved = world.borders_moved();
         world.each_tile(|bench| {
-            let send = |b: &mut Bench<'_>| migrate::send(b.tile, b.outgoing, b.migrate, b.setup, borders_moved);
-            bench.stage(Phase::Migrate, send);
+            bench.stage(Phase::Migrate, |b| migrate::send(b.tile, b.outgoing, b.migrate, b.setup));
         });
         world.tell_of_far_bodies();
     }

@@ -113,11 +113,6 @@ impl World {
         self.verdict.failure.is_some() || self.halfway.is_some()
     }
 
-    /// Whether borders of tiles have moved with the step under way.
-    pub(crate) fn borders_moved(&self) -> bool {
-        self.borders_moved
-    }
-
     /// Lets all ranks hear with the next sync point whether a body of a tile that had something to do goes far.
     pub(crate) fn tell_of_far_bodies(&mut self) {
         self.verdict.far = self.busy.iter().any(|&place| self.tiles[place as usize].counts.far);

@@ -37,14 +37,14 @@ pub(super) fn collide(half_a: Vec2, rot_a: Rot, half_b: Vec2, rot_b: Rot, offset
     }
     if most_b > most_a + PREFERENCE {
         let back = Rot { c: turn.c, s: -turn.s };
-        let mut manifold = against_face(half_b, half_a, back, -in_b, along_b, 1 << 5);
+        let mut manifold = against_face(half_b, half_a, back, -in_b, along_b, true);
         manifold.normal = -rot_b.rotate(manifold.normal);
         for point in &mut manifold.points {
             point.anchor = offset + rot_b.rotate(point.anchor);
         }
         manifold
     } else {
-        let mut manifold = against_face(half_a, half_b, turn, in_a, along_a, 0);
+        let mut manifold = against_face(half_a, half_b, turn, in_a, along_a, false);
         manifold.normal = rot_a.rotate(manifold.normal);
         for point in &mut manifold.points {
             point.anchor = rot_a.rotate(point.anchor);
@@ -53,8 +53,8 @@ pub(super) fn collide(half_a: Vec2, rot_a: Rot, half_b: Vec2, rot_b: Rot, offset
     }
 }
 
-/// The manifold of the reference box, at the origin and unturned, with an incident box.
-fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2, reference: u32) -> Manifold {
+/// The manifold of the reference box, which `is_b` or A, at the origin and unturned, with an incident box.
+fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2, is_b: bool) -> Manifold {
     // The reference face, and a frame of normal `n` and tangent `t`, both along the axes.
     let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
     let (n, t, height, width, face) = if along.x > along.y {
@@ -77,7 +77,7 @@ fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2
     let along_edge = turn.rotate(along_edge);
     // The edge's ends, counter-clockwise in the incident box, run against `t`.
     let ends = [middle + along_edge, middle - along_edge];
-    let features = reference | face << 3 | edge << 1;
+    let features = if is_b { edge << 3 | face << 1 | 1 } else { face << 3 | edge << 1 };
     let place = ends.map(|end| (dot(end, t), dot(end, n) - height));
 
     if place[1].0 < -width || place[0].0 > width {
@@ -97,7 +97,7 @@ fn against_face(half: Vec2, incident: Vec2, turn: Rot, offset: Vec2, along: Vec2
             separation = min(dot(gap, gap).sqrt(), separation);
         }
         let anchor = t * clipped + n * (height + 0.5 * separation);
-        manifold.push(ManifoldPoint { anchor, separation, feature: features | end });
+        manifold.push(ManifoldPoint { anchor, separation, feature: features ^ end });
     }
     manifold
 }
@@ -107,7 +107,7 @@ fn corner_to_edge(corner: Vec2, ends: [Vec2; 2], n: Vec2, features: u32) -> Mani
     let (gap, part) = nearest(corner, ends);
     let distance = dot(gap, gap).sqrt();
     let normal = if distance > 0.0 { gap / distance } else { n };
-    let feature = features | u32::from(part >= 0.5);
+    let feature = features ^ u32::from(part >= 0.5);
     Manifold::single(normal, corner + gap * 0.5, distance, feature)
 }
 

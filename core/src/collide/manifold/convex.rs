@@ -67,9 +67,9 @@ fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) 
         return Manifold::EMPTY;
     }
     let found = if most_b > most_a + PREFERENCE {
-        against_face(b, face_b, a, most_b, [radius_b, radius_a], 1 << 7).map(Manifold::turned_round)
+        against_face(b, face_b, a, most_b, [radius_b, radius_a], true).map(Manifold::turned_round)
     } else {
-        against_face(a, face_a, b, most_a, [radius_a, radius_b], 0)
+        against_face(a, face_a, b, most_a, [radius_a, radius_b], false)
     };
     found.unwrap_or_else(|| corners(a, b, [radius_a, radius_b]))
 }
@@ -87,10 +87,10 @@ fn against_face(
     other: &Convex,
     height: f32,
     radii: [f32; 2],
-    features: u32,
+    is_b: bool,
 ) -> Option<Manifold> {
     let edge = other.against(reference.normal(face));
-    let features = features | (face as u32) << 4 | (edge as u32) << 1;
+    let features = if is_b { edge << 4 | face << 1 | 1 } else { face << 4 | edge << 1 } as u32;
     let manifold = clip(reference.edge(face), reference.normal(face), other.edge(edge), radii, features);
     // An end of a line has no width: those that overlap part there nevertheless.
     if manifold.is_none() && height <= 0.0 {
@@ -136,7 +136,7 @@ pub(super) fn clip(
         }
         let separation = height - radius - other_radius;
         let anchor = from + t * clipped + n * (radius + 0.5 * separation);
-        manifold.push(ManifoldPoint { anchor, separation, feature: features | end });
+        manifold.push(ManifoldPoint { anchor, separation, feature: features ^ end });
         if span <= 0.0 {
             break;
         }

@@ -225,6 +225,30 @@ fn a_box_stands_upon_a_box_on_two_points() {
     assert_eq!(places, [1.75, 2.0]);
 }
 
+/// Defect: where a box tilted a little and its own face was the one to measure from, the points had other names, and what rested on
+/// it was not held up for a step.
+#[test]
+fn points_keep_their_names_whichever_face_they_are_measured_from() {
+    let mut upon = two(rectangle(1.0, 1.0), rectangle(1.0, 1.0), 0.0, 0.99);
+    for measure in [Two::manifold, Two::of_pieces] {
+        let mut measured_from_a = [false; 2];
+        let mut names = [[-0.05, -0.3], [-0.05, 0.3], [0.05, -0.3], [0.05, 0.3]].map(|[tilt, beside]| {
+            (upon.rot_b, upon.offset.x) = (Rot::from_angle(tilt), beside);
+            let manifold = measure(&upon);
+            measured_from_a[usize::from(manifold.normal == Vec2::Y)] = true;
+            let [mut left, mut right] = manifold.points;
+            if left.anchor.x > right.anchor.x {
+                std::mem::swap(&mut left, &mut right);
+            }
+            [left.feature, right.feature]
+        });
+        assert_eq!(measured_from_a, [true; 2]);
+        assert_ne!(names[0][0], names[0][1]);
+        names.sort_unstable();
+        assert_eq!(names[0], names[3]);
+    }
+}
+
 #[test]
 fn circles_meet_on_the_line_of_their_centers() {
     let manifold = two(circle(1.0), circle(0.5), 3.0, 4.0).manifold();

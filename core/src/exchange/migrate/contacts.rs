@@ -14,8 +14,8 @@ use crate::tiling::tile::Tile;
 const AHEAD: usize = 8;
 
 /// Sums unseen impulses, finds the contacts of departing bodies, and copies those that cannot be found by slot any more to the
-/// strays. Has other tiles be told of those that they are to solve for others, unless they did so in the last step as well.
-pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, borders_moved: bool) {
+/// strays. Has other tiles be told of those that press and that they are to solve for others.
+pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
     tile.strays.clear();
     tile.sleep.forget_leaning();
     find_concerned(tile, work);
@@ -29,11 +29,7 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
         }
         let (key, contact) = (tile.contacts.keys[i as usize], &tile.contacts.contacts[i as usize]);
         let (low, high, pair) = (key.low(), key.high(), tile.pair_of(key));
-        let SlotKind::Owned(low_index) = low.kind() else {
-            // Of others; they tell each other. Here it serves those who solve it with them.
-            tile.strays.push(Stray { pair, authority: Authority::Overlap, contact: *contact });
-            continue;
-        };
+        let SlotKind::Owned(low_index) = low.kind() else { unreachable!("its own contacts have a body of its own") };
         if high.is_ghost() && tile.rests(low_index, setup) {
             let (id, ghost) = (tile.bodies.id[low_index], tile.bodies.id[tile.index(high)]);
             tile.sleep.lean((id, low_index), ghost);
@@ -66,14 +62,12 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup, b
             }
             stray |= border.owner != tile.id;
         }
-        if let Some(border) = around.border_of(low).filter(|_| tells) {
+        if let Some(border) = around.border_of(low).filter(|_| tells && contact.presses()) {
             let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
                 let is_its_own = send.target == tile.id || owners[1] == Some(send.target);
                 send.near && !is_its_own && around.may_be_near(high, send.target)
             });
-            let new = others
-                .filter(|send| borders_moved || ![low, high].iter().all(|&slot| around.was_near(slot, send.target)));
-            contacts.extend(new.map(|send| (send.target, record(ContactRecord::LENT))));
+            contacts.extend(others.map(|send| (send.target, record(ContactRecord::LENT))));
         }
         if stray {
             tile.strays.push(Stray { pair, authority: Authority::Own, contact: *contact });
@@ -129,24 +123,17 @@ impl<'a> Around<'a> {
         let body = || self.tile.bodies.get(self.tile.index(slot));
         self.is_near(slot, target) || slot.is_ghost() && Outline::may_come_near(&body(), target, self.setup)
     }
-
-    /// Whether a tile, if its borders were where they are, surely solved contacts of a body for others in the last step as well.
-    fn was_near(&self, slot: Slot, target: TileId) -> bool {
-        // A tile that shows nothing of itself may have owned nothing, and so solved nothing.
-        let is_shown = || self.tile.ghost_owners.binary_search(&target).is_ok();
-        let body = || self.tile.bodies.get(self.tile.index(slot));
-        is_shown() && (matches!(slot.kind(), SlotKind::Static(_)) || Outline::was_near(&body(), target, self.setup))
-    }
 }
 
-/// Lists the contacts that have a ghost, or a body near the border. Every one is written down, and counted or not.
+/// Lists the tile's own contacts that have a ghost, or a body near the border. Every one is written down, and counted or not.
 fn find_concerned(tile: &Tile, MigrateWork { mark, concerned, .. }: &mut MigrateWork) {
     let mark_of = |slot: Slot| mark[slot.index(tile.owned, 0).min(tile.owned)];
     let is_concerned = |low: Slot, high: Slot| low.is_ghost() | high.is_ghost() | (mark_of(low) | mark_of(high) != 0);
     concerned.clear();
-    concerned.resize(tile.contacts.len(), 0);
+    let own = &tile.contacts.keys[..tile.contacts.own()];
+    concerned.resize(own.len(), 0);
     let mut count = 0;
-    for (i, key) in (0..).zip(&tile.contacts.keys) {
+    for (i, key) in (0..).zip(own) {
         concerned[count] = i;
         count += usize::from(is_concerned(key.low(), key.high()));
     }

@@ -99,11 +99,10 @@ impl Parcel {
 }
 
 /// Writes everything other tiles must hear from this one. What is no longer owned here leaves a gap, until the tile has heard of
-/// the others; of its contacts those serve on that are between owned bodies that stay, and of those and statics. Whether borders
-/// of tiles have moved since the last step must be told.
-pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, setup: &Setup, borders_moved: bool) {
+/// the others; of its contacts those serve on that are between owned bodies that stay, and of those and statics.
+pub(crate) fn send(tile: &mut Tile, bag: &mut Mailbag, work: &mut MigrateWork, setup: &Setup) {
     find_border(tile, work, setup);
-    contacts::sort_out(tile, work, setup, borders_moved);
+    contacts::sort_out(tile, work, setup);
     let MigrateWork { border, sends, contacts, parcels, .. } = work;
     tile.counts.ghosts = sends.len() as u64;
     parcels.extend((Parcel::GHOST..).zip(&*sends).map(|(what, send)| Parcel::new(send.target, what)));

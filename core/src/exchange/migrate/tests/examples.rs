@@ -111,7 +111,7 @@ fn exchange_by_hand(moves: [f64; 2], marks: [f32; 2]) -> [Option<f32>; 2] {
     let mut inbox = Inbox::new([TileId(0), TileId(1)].into_iter(), 2, 1);
     let mut work = MigrateWork::default();
     for (tile, bag) in tiles.iter_mut().zip(&mut outbox.bags) {
-        send(tile, bag, &mut work, &setup, false);
+        send(tile, bag, &mut work, &setup);
     }
     assert_eq!(outbox.deliver(&mut inbox), None);
     inbox.end(&mut outbox);
