@@ -414,7 +414,7 @@ fn bodies_of_a_pile_over_borders_turn_as_they_spin() {
     let dt = f64::from(scene.params.dt);
     let unlike = |tiles| {
         let mut sim = scene.start_on(tiles, Exchange::Substep);
-        sim.run(400);
+        sim.run(600);
         let mut sum = 0.0;
         for _ in 0..50 {
             let before = sim.bodies();
