@@ -24,6 +24,7 @@ pub(super) struct Meetings<'a> {
     open: Vec<u32>,
     /// The contacts of the last step of a pair.
     known: Vec<&'a Contact>,
+    outlook: PointOutlook<WidePolygons>,
 }
 
 impl<'a> Meetings<'a> {
@@ -31,7 +32,7 @@ impl<'a> Meetings<'a> {
     #[inline(never)]
     pub(super) fn find(&mut self, places: &[u8], named: &[Named<'a>; BLOCK], among: &FindAmong<'a>) {
         let &FindAmong { by_name, boxes, tile, setup, .. } = among;
-        let Self { all, open, known: several } = self;
+        let Self { all, open, known: several, .. } = self;
         all.clear();
         open.clear();
         for &place in places {
@@ -72,8 +73,7 @@ impl Kernel for Look<'_, '_> {
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { meetings: Meetings { all, open, .. }, tile, setup } = self;
-        let mut outlook = PointOutlook::<WidePolygons>::default();
+        let Self { meetings: Meetings { all, open, outlook, .. }, tile, setup } = self;
         for search in [Search::WhereManyNeedIt, Search::Always] {
             let (mut count, mut postponed) = (open.len(), 0);
             // Those that are too few for lanes.
@@ -89,7 +89,7 @@ impl Kernel for Look<'_, '_> {
                 let mut numbers = [open[first]; WIDE];
                 numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
                 for (lane, &number) in numbers.iter().enumerate() {
-                    all[number as usize].1.set(lane, &mut outlook, tile, setup);
+                    all[number as usize].1.set(lane, outlook, tile, setup);
                 }
                 outlook.look::<V::Wide>(search, setup);
                 for (lane, &number) in numbers[..lanes].iter().enumerate() {
@@ -100,7 +100,7 @@ impl Kernel for Look<'_, '_> {
                     } else if outlook.is_unsure(lane) {
                         meeting.touch(tile, setup);
                     } else {
-                        meeting.see(lane, &outlook);
+                        meeting.see(lane, outlook);
                     }
                 }
             }

@@ -25,7 +25,6 @@ use contacts::{Found, Places};
 use meetings::Meetings;
 use names::{Named, Names};
 use sorted::Sorted;
-use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Candidates, and pairs, in a piece of work, at least.
@@ -192,24 +191,21 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             found: [Contact::zeroed(); BLOCK],
             separation: [[0.0; 2]; BLOCK],
         };
-        let mut meetings = Meetings::default();
+        // Once for all blocks: to fill them with zeros takes longer than a few pairs.
+        let (mut round, mut boxes) = (RoundOutlook::default(), PointOutlook::<WideBoxes>::default());
+        let (mut polygons, mut meetings) = (PointOutlook::<WidePolygons>::default(), Meetings::default());
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
             for list in 0..NEW_BOXES {
-                setup.lanes.run(Find::<RoundOutlook>::new(&mut block, lists.get(list), tile, setup));
+                setup.lanes.run(Find { block: &mut block, list: lists.get(list), tile, setup, outlook: &mut round });
             }
             block.keep_known(&mut lists, [KNOWN_BOXES, NEW_BOXES], tile, setup);
             block.keep_known(&mut lists, [KNOWN_POLYGONS, NEW_POLYGONS], tile, setup);
-            setup.lanes.run(Find::<PointOutlook<WideBoxes>>::new(&mut block, lists.get(NEW_BOXES), tile, setup));
-            if !lists.get(NEW_POLYGONS).is_empty() {
-                setup.lanes.run(Find::<PointOutlook<WidePolygons>>::new(
-                    &mut block,
-                    lists.get(NEW_POLYGONS),
-                    tile,
-                    setup,
-                ));
-            }
+            let list = lists.get(NEW_BOXES);
+            setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut boxes });
+            let list = lists.get(NEW_POLYGONS);
+            setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut polygons });
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), found);
             } else {
@@ -227,13 +223,7 @@ struct Find<'b, 'a, O> {
     list: &'b [u8],
     tile: &'b Tile,
     setup: &'b Setup,
-    outlook: PhantomData<O>,
-}
-
-impl<'b, 'a, O: Outlook> Find<'b, 'a, O> {
-    fn new(block: &'b mut Block<'a>, list: &'b [u8], tile: &'b Tile, setup: &'b Setup) -> Self {
-        Self { block, list, tile, setup, outlook: PhantomData }
-    }
+    outlook: &'b mut O,
 }
 
 impl<O: Outlook> Kernel for Find<'_, '_, O> {
@@ -241,7 +231,7 @@ impl<O: Outlook> Kernel for Find<'_, '_, O> {
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        self.block.find::<V, O>(self.list, self.tile, self.setup);
+        self.block.find::<V, O>(self.list, self.outlook, self.tile, self.setup);
     }
 }
 
@@ -285,8 +275,7 @@ impl Block<'_> {
 
     /// Finds the contacts of pairs of one kind.
     #[inline(always)]
-    fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], tile: &Tile, setup: &Setup) {
-        let mut outlook = O::default();
+    fn find<V: Lanes, O: Outlook>(&mut self, list: &[u8], outlook: &mut O, tile: &Tile, setup: &Setup) {
         let (mut left, mut count) = ([0; BLOCK], list.len());
         left[..count].copy_from_slice(list);
         for search in [Search::WhereManyNeedIt, Search::Always] {
