@@ -63,6 +63,11 @@ pub(crate) fn plural(count: u64, word: &str) -> String {
     }
 }
 
+/// So many of something, where that changes.
+pub(crate) fn between(fewest: u64, most: u64, word: &str) -> String {
+    if fewest == most { plural(most, word) } else { format!("{fewest} to {}", plural(most, word)) }
+}
+
 /// A number as TOML has it, with an exponent where it would be long.
 pub(crate) fn exponential(number: f64) -> String {
     let is_long = number.is_finite() && number != 0.0 && !(1e-5..1e9).contains(&number.abs());

@@ -187,7 +187,7 @@ fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
     refused(&recorded, "a.png", &["--every", "4"], "--every 4: a .png is one picture; leave it out, or name a film");
     refused(&recorded, "a.gif", &["--step", "4"], "--step 4: a film shows many steps; leave it out, or name a .png");
     refused(&recorded, "a.png", &["--steps", "4"], "--steps: what is recorded stays as it is; name a configuration");
-    refused(&recorded, "a.png", &["--follow", "0"], "--follow 0: no body moves that one; name a dynamic body");
+    refused(&recorded, "a.png", &["--follow", "0"], "--follow 0: that is a static; name a dynamic body");
     refused(&recorded, "a.png", &["--follow", "99999"], "--follow 99999: there is no body of that name");
     for option in ["--ghosts", "--contacts", "--color=asleep", "--color=contacts"] {
         let named = option.replace('=', " ");

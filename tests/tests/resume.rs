@@ -364,7 +364,7 @@ fn another_run_is_refused_by_the_key_that_differs() {
     };
     let ended = begins("--out");
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
-    assert!(ended.stderr.contains("it holds a run; go on with that with --resume"), "{ended}");
+    assert!(ended.stderr.contains("it holds a run; name another folder, or have `atoll run` go on"), "{ended}");
     // A run is not lost to a world that turns out to be none.
     let world = folder.path().join("world.toml");
     let text = "format = \"atoll-scene/1\"\ndomain = [[-9, -9], [9, 9]]\n[[kinds]]\nbox = [1, 1]\n[bodies]\npath = \"w.csv\"\n";

@@ -248,7 +248,7 @@ fn a_recorded_step_is_the_start_of_another_run() {
     let scene = format!("{exported}/scene.toml");
     let told = atoll(&["scene", "check", &scene]);
     assert!(
-        told.starts_with("file, step 10: 360 bodies, 2 statics\n") && told.contains("ids          10 to 2523"),
+        told.starts_with("world.toml, step 10: 360 bodies, 2 statics\n") && told.contains("ids          10 to 2523"),
         "{told}"
     );
     let (a, b) =
@@ -263,7 +263,7 @@ fn a_recorded_step_is_the_start_of_another_run() {
     // The folder repeats the run, and knows its scene.
     let again = run(&PathBuf::from(format!("{out}/run.toml")), &[]).unwrap();
     assert_eq!(again.state_hash, run(Path::new(path), &[("steps", "20"), ("tiles", "2x1")]).unwrap().state_hash);
-    assert!(atoll(&["info", out]).starts_with("file: 360 bodies"));
+    assert!(atoll(&["info", out]).starts_with("world.toml: 360 bodies"));
 
     refused(&["scene", "export", out, "--step", "10", "--out", exported], "scene.toml is there already; name another");
     refused(&["scene", "export", out, "--step", "11", "--out", "/tmp/none"], "step 11");

@@ -9,6 +9,7 @@ use crate::error::{Exit, RunError};
 use crate::look::recorded::Recorded;
 use crate::look::source::records;
 use crate::look::vtk;
+use crate::wording::between;
 use std::io::{self, IsTerminal};
 
 /// Does it.
@@ -38,10 +39,10 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
     };
     let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
     let records = if steps.len() == 1 { "record" } else { "records" };
-    let bodies = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
     output::show(&format!(
-        "{} {records} of {bodies} bodies, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
+        "{} {records} of {}, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
         steps.len(),
+        between(fewest as u64, most as u64, "body"),
         recorded.setting().statics.len(),
         bytes as f64 * 1e-6,
         collection.display()

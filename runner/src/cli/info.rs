@@ -34,9 +34,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
             of_snapshot(&Snapshot::open(path)?.ok_or_else(nothing)?)?
         }
         _ => {
-            return Err(folder
-                .refusal("is no run, snapshot or recording; name a folder, a .atoll or a .parquet file")
-                .into());
+            let what = if path.exists() { "is no run, snapshot or recording" } else { "there is nothing of that name" };
+            return Err(folder.refusal(format!("{what}; name a folder, a .atoll or a .parquet file")).into());
         }
     };
     output::show(&text)?;
@@ -52,10 +51,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, RunError> {
 fn of_run(folder: &RunFolder, trouble: &mut Vec<String>) -> Result<String, RunError> {
     let config = folder.begun()?;
     let tiles = config.run.tiles.unwrap_or_default();
-    let (kind, bodies, seed) = (config.scene.kind.name(), config.scene.bodies, config.scene.seed);
+    let (title, bodies, seed) = (config.scene.kind.title(), config.scene.bodies, config.scene.seed);
     let tiling = tiles::in_words(tiles, config.run.retiling.map(|retiling| retiling.how));
     let seed = if matches!(config.scene.kind, SceneKind::File(_)) { String::new() } else { format!(", seed {seed}") };
-    let mut text = format!("{kind}: {}{seed}, {tiling}\n", plural(bodies, "body"));
+    let mut text = format!("{}: {}{seed}, {tiling}\n", OneLine(&title), plural(bodies, "body"));
     row(&mut text, "config hash", &config.hash(tiles));
     row(&mut text, "state", &state(folder, config.run.steps));
     let mut told = |what: Result<String, String>| {

@@ -228,7 +228,7 @@ impl Source {
     fn check_followed(&self, id: GlobalId, setting: &Setting, shown: Shown) -> Result<(), RunError> {
         let refused = |reason: &str| Err(unsuitable(format!("--follow {id}"), reason));
         if setting.statics.iter().any(|body| body.id == id) {
-            return refused("no body moves that one; name a dynamic body, or use --view");
+            return refused("that is a static; name a dynamic body, or use --view");
         }
         let mut rows = Vec::new();
         match self {

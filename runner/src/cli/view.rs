@@ -8,6 +8,7 @@ use crate::look::live::{Desk, Player, Server, Viewer};
 use crate::look::recorded::Recorded;
 use crate::plan::Plan;
 use crate::rank::Host;
+use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
 use std::process::Stdio;
@@ -108,7 +109,7 @@ fn name(source: &Path) -> String {
 fn serve(desk: Arc<Desk>, port: Option<u16>, bind: Option<IpAddr>) -> Result<Server, RunError> {
     let address = bind.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST));
     Server::start(address, port.unwrap_or(0), desk).map_err(|error| {
-        let port = port.map(|port| format!("--port {port}"));
+        let port = port.filter(|_| error.kind() != ErrorKind::AddrNotAvailable).map(|port| format!("--port {port}"));
         let option = port.or(bind.map(|bind| format!("--bind {bind}"))).unwrap_or("the page".to_owned());
         RunError::Unsuitable { option, reason: format!("{error}; give another, or none") }
     })

@@ -98,7 +98,7 @@ impl RunFolder {
     /// If it holds anything, unless that is a run and `overwrite` is true, or cannot be looked at.
     pub fn check_free(&self, overwrite: bool) -> Result<(), FolderError> {
         if self.holds_run() {
-            let how = "go on with that with --resume, replace it with --overwrite, or name another folder";
+            let how = "name another folder, or have `atoll run` go on with that (--resume) or replace it (--overwrite)";
             return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
         }
         // Of commands the lock tells whose they are.
@@ -245,7 +245,7 @@ mod tests {
         assert_eq!(refused(&["lock", ".run.toml.123.tmp"], false), None);
         assert_eq!(refused(&["run.toml", "summary.json"], true), None);
         for (files, overwrite, expected) in [
-            (&["run.toml", "lock"][..], false, "it holds a run; go on with that with --resume"),
+            (&["run.toml", "lock"][..], false, "it holds a run; name another folder"),
             (&["commands.jsonl"], true, "it is not empty, and what it holds is no run"),
             (&["lock", "thesis.tex"], true, "it is not empty, and what it holds is no run"),
             (&[".thesis.tex.1.tmp"], true, "it is not empty, and what it holds is no run"),

@@ -5,6 +5,7 @@ use super::yards::Yard;
 use super::{SceneError, compounds, junkyard, rooms, sparse, tumbler, washer};
 use atoll_core::{Exchange, Params};
 use glam::Vec2;
+use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -176,6 +177,14 @@ impl SceneKind {
             Self::Zoo => "zoo",
             Self::Slope { .. } => "slope",
             Self::File(_) => Self::FILE,
+        }
+    }
+
+    /// As people are told of it: of a scene in a file the name of that.
+    pub fn title(&self) -> Cow<'_, str> {
+        match self {
+            Self::File(spec) => Path::new(&spec.path).file_name().unwrap_or(spec.path.as_ref()).to_string_lossy(),
+            _ => self.name().into(),
         }
     }
 

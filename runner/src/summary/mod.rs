@@ -32,6 +32,9 @@ pub struct Summary {
     pub version: &'static str,
     /// Kind of scene.
     pub scene: &'static str,
+    /// As people are told of it.
+    #[serde(skip)]
+    pub(crate) title: String,
     /// Its seed.
     pub seed: u64,
     /// Whether that has a say in it: not where bodies are read from files.
@@ -155,6 +158,7 @@ impl Summary {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             scene: plan.config.scene.kind.name(),
+            title: plan.config.scene.kind.title().into_owned(),
             seed: plan.config.scene.seed,
             is_seeded: plan.scene.file().is_none(),
             config_hash: plan.config.hash(plan.tiles),

@@ -11,7 +11,7 @@ impl fmt::Display for Summary {
         let (ranks, threads) = (plural(self.ranks as u64, "rank"), plural(self.threads as u64, "thread"));
         let tiling = tiles::in_words(self.tiles, self.retile);
         let seed = if self.is_seeded { format!(", seed {}", self.seed) } else { String::new() };
-        writeln!(f, "{}: {}{seed}, {tiling}", self.scene, plural(self.bodies, "body"))?;
+        writeln!(f, "{}: {}{seed}, {tiling}", self.title, plural(self.bodies, "body"))?;
         writeln!(f, "{ranks} ({}), {threads} each; built in {:.2} s", self.transport, self.build_s)?;
         let early = if self.interrupted { ", interrupted" } else { "" };
         let rate = if self.wall_s > 0.0 { (self.steps - self.resumed_at) as f64 / self.wall_s } else { 0.0 };

@@ -67,7 +67,7 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
     let mut frame = Frame::default();
     recorded.read(step, &mut frame)?;
     let (setting, [low, high]) = (recorded.setting(), recorded.recording().facts().domain);
-    let name = format!("{}, step {step}", config.scene.kind.name());
+    let name = format!("{}, step {step}", config.scene.kind.title());
     let statics: Vec<_> = setting.statics.iter().map(|fixed| fixed.begun_at(step, config.params.dt)).collect();
     let world = World {
         name: Some(&name),

@@ -13,6 +13,8 @@ pub struct StepDeviation {
     pub bodies: u64,
     /// Of those, how many differ in any bit.
     pub differing: u64,
+    /// And how many by more than the tolerance, if there is one.
+    pub beyond: Option<u64>,
     /// In m.
     pub position: Deviation,
     /// In rad, the shorter way round.
@@ -114,7 +116,7 @@ pub(super) fn measure<'a>(
     mut b: &'a [Row],
     tolerance: Option<f64>,
 ) -> (StepDeviation, Option<[&'a [Row]; 2]>) {
-    let (mut bodies, mut differing, mut sums) = (0, 0, [Sum::default(); 4]);
+    let (mut bodies, mut differing, mut beyond, mut sums) = (0, 0, 0, [Sum::default(); 4]);
     let (mut missing, mut doubled) = ([Bodies::default(); 2], [Bodies::default(); 2]);
     let (mut other_kind, mut first) = (Bodies::default(), None);
     while let Some(id) = a.first().into_iter().chain(b.first()).map(|row| row.id).min() {
@@ -132,6 +134,7 @@ pub(super) fn measure<'a>(
             } else if tolerance.is_some_and(|most| apart.iter().all(|value| *value <= most)) {
                 continue;
             }
+            beyond += 1;
         }
         for (side, rows) in both.iter().enumerate() {
             match rows.len() {
@@ -148,6 +151,7 @@ pub(super) fn measure<'a>(
         step,
         bodies,
         differing,
+        beyond: tolerance.map(|_| beyond),
         position,
         angle,
         velocity,
@@ -162,7 +166,7 @@ pub(super) fn measure<'a>(
 }
 
 /// How far a body is apart in position, angle, velocity and angular velocity.
-fn apart(a: &Row, b: &Row) -> [f64; 4] {
+pub(super) fn apart(a: &Row, b: &Row) -> [f64; 4] {
     let less = |a: f32, b: f32| f64::from(a) - f64::from(b);
     let turn = less(a.angle, b.angle).abs() % TAU;
     let values = [

@@ -81,7 +81,8 @@ pub struct Difference {
     pub id: u64,
     /// How often each recording has it. Once is right.
     pub times: [usize; 2],
-    /// The columns in which `a` and `b` differ, if both have the body once.
+    /// The columns in which `a` and `b` differ, if both have the body once; of those of a quantity that deviates by more than the tolerance, if
+    /// there is one.
     pub columns: Vec<&'static str>,
     /// The body in the first recording, if it is there; any of them, if it is there more than once.
     pub a: Option<State>,
@@ -141,7 +142,7 @@ pub fn compare(
         let (deviation, first) = deviation::measure(step, &of_a, &of_b, tolerance);
         steps.push(deviation);
         if first_difference.is_none() {
-            first_difference = first.map(|rows| Difference::new(step, rows, [&a, &b]));
+            first_difference = first.map(|rows| Difference::new(step, rows, [&a, &b], tolerance));
         }
         compared(steps.len(), count);
     }
@@ -229,12 +230,14 @@ fn in_letters<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Err
 }
 
 impl Difference {
-    fn new(step: u64, rows: [&[Row]; 2], sides: [&Recording; 2]) -> Self {
+    fn new(step: u64, rows: [&[Row]; 2], sides: [&Recording; 2], tolerance: Option<f64>) -> Self {
         let [a, b] = [0, 1].map(|i| rows[i].first().map(|row| State::new(step, row, sides[i])));
         let id = rows.iter().find_map(|rows| rows.first()).map_or(0, |row| row.id);
         let times = rows.map(<[Row]>::len);
-        let once = a.zip(b).filter(|_| times == [1, 1]);
-        let columns = once.map_or_else(Vec::new, |(a, b)| a.columns_that_differ(&b));
+        let columns = match rows {
+            [[a], [b]] => columns_that_differ(a, b, tolerance),
+            _ => Vec::new(),
+        };
         Self { step, id, times, columns, a, b }
     }
 }
@@ -251,21 +254,23 @@ impl State {
         let kind = recording.stage().map(|_| kind);
         Self { tile, x, y, angle, vx, vy, omega, kind }
     }
+}
 
-    fn columns_that_differ(&self, other: &Self) -> Vec<&'static str> {
-        let columns = |state: &Self| {
-            [
-                ("x", state.x.to_bits()),
-                ("y", state.y.to_bits()),
-                ("angle", state.angle.to_bits().into()),
-                ("vx", state.vx.to_bits().into()),
-                ("vy", state.vy.to_bits().into()),
-                ("omega", state.omega.to_bits().into()),
-            ]
-        };
-        let pairs = columns(self).into_iter().zip(columns(other));
-        let states = pairs.filter(|(ours, theirs)| ours.1 != theirs.1).map(|(ours, _)| ours.0);
-        let kinds = self.kind.zip(other.kind).filter(|(ours, theirs)| ours != theirs).map(|_| "kind");
-        states.chain(kinds).collect()
-    }
+/// The columns in which a body's rows differ, of the quantities that deviate by more than the tolerance.
+fn columns_that_differ(a: &Row, b: &Row, tolerance: Option<f64>) -> Vec<&'static str> {
+    let [position, angle, velocity, spin] =
+        deviation::apart(a, b).map(|value| tolerance.is_none_or(|most| value > most));
+    let columns = |row: &Row| {
+        [
+            ("x", position, row.x.to_bits()),
+            ("y", position, row.y.to_bits()),
+            ("angle", angle, row.angle.to_bits().into()),
+            ("vx", velocity, row.vx.to_bits().into()),
+            ("vy", velocity, row.vy.to_bits().into()),
+            ("omega", spin, row.omega.to_bits().into()),
+            ("kind", true, row.kind.into()),
+        ]
+    };
+    let pairs = columns(a).into_iter().zip(columns(b));
+    pairs.filter(|(ours, theirs)| ours.1 && ours.2 != theirs.2).map(|(ours, _)| ours.0).collect()
 }

@@ -1,7 +1,7 @@
 //! A comparison as people read it.
 
 use super::{Bodies, Comparison, Difference, Side, State, StepDeviation, unlike_ends};
-use crate::wording::{OneLine, plural};
+use crate::wording::{OneLine, between, plural};
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 
@@ -72,13 +72,18 @@ impl Comparison {
         let Some((first, last)) = self.steps.first().zip(self.steps.last()) else {
             return writeln!(f, "{verdict}: no step was recorded by both");
         };
-        let most = self.steps.iter().map(|step| step.bodies).max().unwrap_or(0);
-        let (records, bodies) = (plural(self.steps.len() as u64, "record"), plural(most, "body"));
+        let counts = || self.steps.iter().map(|step| step.bodies);
+        let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+        let (records, bodies) = (plural(self.steps.len() as u64, "record"), between(fewest, most, "body"));
         write!(f, "{verdict}: {records} of {bodies}, steps {} to {}", first.step, last.step)?;
         match self.steps.iter().filter(|step| !step.is_none()).count() {
-            0 => writeln!(f),
-            all if all == self.steps.len() => writeln!(f, ", none of them alike in every bit"),
-            some => writeln!(f, ", {some} of them not alike in every bit"),
+            0 => {}
+            all if all == self.steps.len() => write!(f, ", none of them alike in every bit")?,
+            some => write!(f, ", {some} of them not alike in every bit")?,
+        }
+        match (self.tolerance, self.steps.iter().filter(|step| !step.is_same(self.tolerance)).count()) {
+            (Some(most), some) if some > 0 => writeln!(f, ", {some} not within {most}"),
+            _ => writeln!(f),
         }
     }
 
@@ -135,7 +140,8 @@ impl Comparison {
     /// How the greatest deviations grow.
     fn write_table(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f)?;
-        let heads = ["step", "differing", "position, m", "rms, m", "angle, rad", "velocity, m/s", "omega, rad/s"];
+        let differing = if self.tolerance.is_some() { "beyond" } else { "differing" };
+        let heads = ["step", differing, "position, m", "rms, m", "angle, rad", "velocity, m/s", "omega, rad/s"];
         let row = |f: &mut Formatter<'_>, cells: [String; 7]| {
             let [step, differing, rest @ ..] = cells;
             write!(f, "{step:>10} {differing:>10}")?;
@@ -148,7 +154,7 @@ impl Comparison {
             let StepDeviation { position, angle, velocity, angular_velocity, .. } = step;
             let figures = [position.max, position.rms, angle.max, velocity.max, angular_velocity.max].map(figure);
             let [a, b, c, d, e] = figures;
-            row(f, [step.step.to_string(), step.differing.to_string(), a, b, c, d, e])?;
+            row(f, [step.step.to_string(), step.beyond.unwrap_or(step.differing).to_string(), a, b, c, d, e])?;
         }
         Ok(())
     }

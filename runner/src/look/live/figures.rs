@@ -62,7 +62,7 @@ impl Course {
         let energy: f64 = parts.iter().map(|part| part.kinetic_energy).sum();
         let mut figures = vec![
             ("bodies", grouped(sum(|part| part.bodies))),
-            ("contacts", grouped(sum(|part| part.contacts))),
+            ("contacts solved", grouped(sum(|part| part.contacts))),
             ("kinetic energy", with_prefix(energy, "J")),
         ];
         let (mut phases, mut busy) = (Vec::new(), Vec::new());

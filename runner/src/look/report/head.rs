@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 /// What the page is called.
 pub(super) fn title(sources: &[Source]) -> String {
     let scene =
-        |source: &Source| format!("{}, {} bodies", source.config.scene.kind.name(), Whole(source.config.scene.bodies));
+        |source: &Source| format!("{}, {} bodies", source.config.scene.kind.title(), Whole(source.config.scene.bodies));
     match sources {
         [a, b] if scene(a) == scene(b) => format!("Two runs of {}", scene(a)),
         [a, b] => format!("{} and {}", scene(a), scene(b)),
@@ -144,7 +144,7 @@ fn facts(sources: &[Source]) -> String {
         source.number(key).map(|number| Whole(number as u64).to_string())
     }
     let rows: [(&str, Fact); 21] = [
-        ("Scene", |source| Some(source.config.scene.kind.name().to_owned())),
+        ("Scene", |source| Some(Text(&source.config.scene.kind.title()).to_string())),
         ("Seed", |source| Some(source.config.scene.seed.to_string())),
         ("Bodies", |source| Some(Whole(source.config.scene.bodies).to_string())),
         ("Steps", |source| {
