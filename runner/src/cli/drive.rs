@@ -40,8 +40,8 @@ impl Said {
                 self.until = self.until.max(until);
                 return;
             }
-            // What does not say when is meant for when the run waits next.
-            Ok(Word::Line(line, _)) => line.step,
+            // What does not say when is meant for when the run waits next. What breaks a promise comes too late, however soon it is heard.
+            Ok(Word::Line(line, _)) => line.step.max(self.until),
             // All ranks will say what is wrong with it.
             Err(_) => self.until,
         };
@@ -175,6 +175,9 @@ mod tests {
         assert!(String::from_utf8(rest).unwrap().starts_with("5\t{\"step\":4,"));
         assert!(!driver.calls(100));
         assert_eq!(driver.undone(), None);
+        driver.lock().hear(7, "{\"step\": 2, \"remove\": 3}".to_owned());
+        assert_eq!([2, 3].map(|steps| driver.calls(steps)), [false, true]);
+        driver.lock().lines.clear();
         driver.lock().hear(7, "{\"step\": 50, \"remove\": 3}".to_owned());
         assert_eq!(driver.undone(), Some((1, 50)));
     }
