@@ -332,7 +332,7 @@ fn a_stack_that_is_carried_over_borders_keeps_what_it_presses_with() {
             let off = |body: Body| (body.velocity.y - 0.5).abs();
             most = sim.bodies().into_iter().map(off).fold(most, f32::max);
         }
-        let limit = if exchange == Exchange::Step { 0.3 } else { 0.02 };
+        let limit = if exchange == Exchange::Step { 0.3 } else { 5e-3 };
         assert!(most < limit, "{exchange:?}: {most} m/s off the lift's speed");
         // Along, as far as friction lets them, 64 / (2 * 0.3 * 10) m: as on one tile.
         let slide = stack(Vec2::new(8.0, 0.0), false);
@@ -343,6 +343,40 @@ fn a_stack_that_is_carried_over_borders_keeps_what_it_presses_with() {
         });
         assert!((distances[0] - 64.0 / 6.0).abs() < 0.1, "{exchange:?}: {distances:?} m");
         assert!((distances[0] - distances[1]).abs() < 0.01, "{exchange:?}: {distances:?} m");
+    }
+}
+
+/// What is carried over corners of tiles, and over tiles narrower than their halo, goes as what carries it. Defect: whoever sends a ghost did not
+/// know of all that is solved where it goes, as neighbours had moved on since; each time that what they pressed with was felt twice, or not at all, for a
+/// substep.
+#[test]
+fn what_is_carried_over_corners_is_not_jolted() {
+    let unit = Shape::rectangle(0.5, 0.4);
+    let (column, pyramid) = ((Vec2::new(0.0, 0.3), (1, 20)), (Vec2::new(0.3, 0.1), (2, 2)));
+    for (velocity, grid) in [column, pyramid] {
+        let mut scene = Scene::new(DVec2::new(0.0, 4.0), -10.0);
+        scene.half = DVec2::new(8.0, 8.0);
+        let floor = scene.wall(DVec2::new(-1.0, 1.7), (6.0, 1.0), 0.0, Material::default());
+        scene.statics[floor.0 as usize].path =
+            Some(Path { travel: Travel::Line { velocity: velocity.as_dvec2() }, turning: 0.0 });
+        let kinds = [1.0, 20.0].map(|density| scene.kind(unit.clone(), Material { density, ..Material::default() }));
+        let rows = 5;
+        for row in 0..rows {
+            let width = if velocity.x == 0.0 { 1 } else { rows - row };
+            for k in 0..width {
+                let place = DVec2::new(f64::from(2 * k - width + 1) * 0.26 - 1.0, 2.4 + 0.4 * f64::from(row));
+                scene.body(kinds[usize::from(row + 1 == rows)], place, velocity);
+            }
+        }
+        let mut sim = scene.start_on(grid, Exchange::Substep);
+        sim.run(240);
+        let mut most = 0.0_f32;
+        for _ in 0..480 {
+            sim.run(1);
+            let off = |body: Body| (body.velocity - velocity).length();
+            most = sim.bodies().into_iter().map(off).fold(most, f32::max);
+        }
+        assert!(most < 3e-4, "{grid:?}: {most} m/s off the floor's speed");
     }
 }
 

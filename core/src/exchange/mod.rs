@@ -9,4 +9,5 @@ pub(crate) mod migrate;
 pub(crate) mod overlap;
 pub(crate) mod record;
 pub(crate) mod rim;
+pub(crate) mod unseen;
 pub(crate) mod verdict;

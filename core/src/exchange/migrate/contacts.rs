@@ -3,6 +3,7 @@
 use super::{Border, MigrateWork};
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::ContactRecord;
+use crate::exchange::unseen;
 use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
@@ -46,7 +47,8 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
         for (slot, is_a, owner, partner) in sides {
             let Some(border) = around.border_of(slot) else { continue };
             for send in &mut sends[border.first_send as usize..border.end_send as usize] {
-                if owner != Some(send.target) && !(send.near && around.is_near(partner, send.target)) {
+                let solves = || owner == Some(send.target) || send.near && around.is_near(partner, send.target);
+                if unseen::is_left_out_later(setup) || !solves() {
                     let (linear, on_a, on_b) = *impulse.get_or_insert_with(|| contact.impulse());
                     if is_a {
                         send.unseen.add(-linear, on_a);
