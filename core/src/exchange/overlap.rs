@@ -65,12 +65,6 @@ impl Outline {
         setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, self.place, self.half, depth))
     }
 
-    /// Whether a ghost, of which it is known where it was as the last step began, may be so near to a tile now.
-    pub(crate) fn may_come_near(ghost: &Body, tile: TileId, setup: &Setup) -> bool {
-        let half = setup.grown_half_extents(ghost) + setup.way_of(ghost);
-        setup.overlap.is_some_and(|depth| setup.partition.reaches(tile, ghost.position, half, depth))
-    }
-
     /// Whether a tile that does not own it has it as a ghost.
     pub(crate) fn is_ghost_of(&self, tile: TileId, setup: &Setup) -> bool {
         setup.partition.reaches(tile, self.place, self.half, self.halo)

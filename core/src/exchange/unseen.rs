@@ -5,8 +5,10 @@
 //! pressed alike, and what is solved for others begins as its owner has it. So all that a body's contacts did goes with its ghost, and the
 //! receiver leaves out what it solves. With `"step"` copies differ; there the sender leaves out what it takes the receiver to solve.
 
-use crate::collide::broad_phase::Pair;
+use crate::exchange::overlap::Outline;
+use crate::model::id::GlobalId;
 use crate::model::params::Exchange;
+use crate::model::strays::Stray;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -15,29 +17,38 @@ pub(crate) fn is_left_out_later(setup: &Setup) -> bool {
     setup.params.exchange == Exchange::Substep
 }
 
-/// Leaves out what ghosts felt of contacts that the tile solves: those of pairs whose impulses it knows.
-pub(crate) fn leave_out(tile: &mut Tile, pairs: &[Pair], setup: &Setup) {
+/// Leaves out what ghosts felt of contacts that the tile solves, or would if they still touched: of those it knows what they did.
+pub(crate) fn leave_out(tile: &mut Tile, setup: &Setup) {
     if !is_left_out_later(setup) || tile.ghosts() == 0 {
         return;
     }
-    let Tile { bodies, strays, unseen, owned, .. } = tile;
-    let (owned, dynamic) = (*owned, *owned + unseen.len());
-    let ghost = |body: u32| (owned..dynamic).contains(&(body as usize)).then(|| body as usize - owned);
-    for &[low, high] in pairs {
-        let ghosts = [ghost(low), ghost(high)];
-        if ghosts == [None; 2] {
-            continue;
-        }
-        let ids = [low, high].map(|body| bodies.id[body as usize]);
-        let ([a, b], names) =
-            if ids[0] < ids[1] { (ghosts, (ids[0], ids[1])) } else { ([ghosts[1], ghosts[0]], (ids[1], ids[0])) };
-        for contact in strays.find_all(names, (low as usize) < owned) {
+    let (owned, dynamic) = (tile.owned, tile.owned + tile.ghosts());
+    let mut ghosts: Vec<(GlobalId, u32)> = tile.bodies.id[owned..dynamic].iter().copied().zip(0..).collect();
+    ghosts.sort_unstable();
+    let mut unseen = std::mem::take(&mut tile.unseen);
+    let is_near = |ghost: usize| Outline::of(tile, owned + ghost, setup).is_near(tile.id, setup);
+    let ghost_of = |name: GlobalId| {
+        let place = ghosts.binary_search_by_key(&name, |(id, _)| *id).ok()?;
+        Some(ghosts[place].1 as usize)
+    };
+    for Stray { pair, authority, contact } in tile.strays.known().filter(|stray| stray.contact.presses()) {
+        let [a, b] = [ghost_of(pair.0), ghost_of(pair.1)];
+        let is_solved = match (a, b) {
+            (None, None) => continue,
+            (Some(a), Some(b)) => is_near(a) && is_near(b),
+            (Some(ghost), None) | (None, Some(ghost)) => {
+                let other = if a.is_some() { pair.1 } else { pair.0 };
+                if setup.is_static(other) { is_near(ghost) } else { authority.is_own() }
+            }
+        };
+        if is_solved {
             let (linear, on_a, on_b) = contact.impulse();
-            for (side, linear, angular) in [(a, linear, -on_a), (b, -linear, -on_b)] {
-                if let Some(ghost) = side {
+            for (ghost, linear, angular) in [(a, linear, -on_a), (b, -linear, -on_b)] {
+                if let Some(ghost) = ghost {
                     unseen[ghost].add(linear, angular);
                 }
             }
         }
     }
+    tile.unseen = unseen;
 }

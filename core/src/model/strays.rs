@@ -18,7 +18,7 @@ pub(crate) enum Authority {
 
 impl Authority {
     /// Whether it serves a contact of which one is owned.
-    fn is_own(self) -> bool {
+    pub(crate) fn is_own(self) -> bool {
         self > Self::Lent
     }
 }
@@ -116,9 +116,13 @@ impl Strays {
 
     /// All of which one is owned, once they are in order.
     pub(crate) fn own(&self) -> impl Iterator<Item = (Names, &Contact)> {
-        let is_known =
-            |stray: &&Stray| self.find_all(stray.pair, true).any(|contact| std::ptr::eq(contact, &stray.contact));
-        self.all.iter().filter(is_known).map(|stray| (stray.pair, &stray.contact))
+        self.known().filter(|stray| stray.authority.is_own()).map(|stray| (stray.pair, &stray.contact))
+    }
+
+    /// All that can be found, in an order that follows from what was pushed alone.
+    pub(crate) fn known(&self) -> impl Iterator<Item = &Stray> {
+        let all_of = |first| std::iter::successors(first, |&place| place_of(self.next[place]));
+        self.table.iter().flat_map(move |&first| all_of(place_of(first))).map(|place| &self.all[place])
     }
 
     /// What is remembered of a pair: of which one is owned, or neither. Of circles and boxes there is one contact at most.

@@ -379,11 +379,6 @@ impl Setup {
         kind.not_round * (kind.bounding_radius * body.angular_velocity.abs()) * self.params.dt
     }
 
-    /// How far its surface goes in a step at most, along x and y, in meters.
-    pub(crate) fn way_of(&self, body: &Body) -> Vec2 {
-        body.velocity.abs() * self.params.dt + self.sweep_of(body)
-    }
-
     /// The statics that a tile may have to know: those that reach its region grown by the halo of the largest; where it solves contacts of
     /// ghosts, by three times as much: a ghost is in the halo with one end, and touches statics with the other.
     pub(crate) fn statics_of(&self, tile: TileId) -> Vec<u32> {

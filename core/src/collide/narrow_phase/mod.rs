@@ -15,7 +15,6 @@ use crate::collide::wide_boxes::WideBoxes;
 use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
 use crate::collide::wide_polygons::WidePolygons;
-use crate::exchange::unseen;
 use crate::model::contact::{Contact, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
@@ -56,7 +55,6 @@ impl NarrowPhase {
         contacts: &mut Contacts,
     ) {
         self.sorted.find(tile, proxies, candidates, setup, team);
-        unseen::leave_out(tile, self.sorted.pairs(), setup);
         self.mark_newcomers(tile);
         self.boxes.place(tile, self.sorted.pairs(), setup, team);
         std::mem::swap(&mut contacts.bodies, &mut contacts.before);

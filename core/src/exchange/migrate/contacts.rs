@@ -66,8 +66,13 @@ pub(super) fn sort_out(tile: &mut Tile, work: &mut MigrateWork, setup: &Setup) {
         }
         if let Some(border) = around.border_of(low).filter(|_| tells && contact.presses()) {
             let others = sends[border.first_send as usize..border.end_send as usize].iter().filter(|send| {
-                let is_its_own = send.target == tile.id || owners[1] == Some(send.target);
-                send.near && !is_its_own && around.may_be_near(high, send.target)
+                let is_its_own = match high.kind() {
+                    SlotKind::Ghost(ghost) => tile.ghost_owners[ghost] == send.target,
+                    _ => owners[1] == Some(send.target),
+                };
+                // Where a ghost has gone is not known here: too much that is told does no harm.
+                let may_be_near = || with_ghost || around.is_near(high, send.target);
+                send.near && send.target != tile.id && !is_its_own && may_be_near()
             });
             contacts.extend(others.map(|send| (send.target, record(ContactRecord::LENT))));
         }
@@ -118,12 +123,6 @@ impl<'a> Around<'a> {
             SlotKind::Ghost(_) => Outline::of(self.tile, self.tile.index(slot), self.setup).is_near(target, self.setup),
             SlotKind::Static(_) => true,
         }
-    }
-
-    /// Whether a body may be so near: too much that is told does no harm.
-    fn may_be_near(&self, slot: Slot, target: TileId) -> bool {
-        let body = || self.tile.bodies.get(self.tile.index(slot));
-        self.is_near(slot, target) || slot.is_ghost() && Outline::may_come_near(&body(), target, self.setup)
     }
 }
 

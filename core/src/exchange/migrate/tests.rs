@@ -298,6 +298,13 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             let body = &bodies[id];
             let owner_now = |id: &GlobalId| bodies.get(id).map(|body| world.setup.partition.locate(body.position));
             let of_body = |push: &&Push| push.pair.0 == *id || push.pair.1 == *id;
+            // Of who is gone a tile does not know whether it would have solved what was.
+            let is_here = |id: &GlobalId| tile.bodies.id.contains(id) || world.setup.is_static(*id);
+            let is_told_all = world.setup.params.exchange == Exchange::Substep;
+            let all_here = |push: &Push| [push.pair.0, push.pair.1].iter().all(is_here);
+            if is_told_all && !before.iter().filter(of_body).all(all_here) {
+                continue;
+            }
             // What was only on the way of somebody is told of by another than its owner, as it is.
             let mut owners = before;
             if !needs(world, tile.id, body) {
@@ -320,15 +327,17 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
                 for (me, other) in [(0, 1), (1, 0)] {
                     let names = [push.pair.0, push.pair.1];
                     let name = names[me];
-                    // Its owner knows where its own bodies go.
-                    let is_own = push.owners[other] == Some(push.tile);
+                    // Its owner knows where its own bodies go; a tile that is told of all knows where each is now.
+                    let is_own = is_told_all || push.owners[other] == Some(push.tile);
                     let owner = if is_own { owner_now(&names[other]) } else { push.owners[other] };
-                    let is_seen = owner == Some(tile.id)
-                        || is_near(&bodies[id]) && push.bodies[other].as_ref().is_none_or(is_near);
-                    if name == *id && push.owners[me] == Some(push.tile) && !is_seen {
+                    let partner = if is_told_all { bodies.get(&names[other]).copied() } else { push.bodies[other] };
+                    let is_seen =
+                        owner == Some(tile.id) || is_near(&bodies[id]) && partner.as_ref().is_none_or(is_near);
+                    if name == *id && push.owners[me] == Some(push.tile) {
                         for (sum, value) in wanted.iter_mut().zip(push.upon[me]) {
-                            *sum += value;
-                            size += value.abs();
+                            *sum += if is_seen { 0.0 } else { value };
+                            // What is left out leaves rounding.
+                            size += if is_seen && !is_told_all { 0.0 } else { value.abs() };
                         }
                     }
                 }
