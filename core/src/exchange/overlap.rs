@@ -12,7 +12,6 @@
 //! Who is near follows from bit-exact copies, so that who sends knows what who receives solves.
 
 use crate::exchange::rim::RimBody;
-use crate::model::body::Body;
 use crate::model::id::TileId;
 use crate::model::params::{Exchange, Ghosts, Params};
 use crate::tiling::blueprint::Setup;
