@@ -218,12 +218,13 @@ impl Groups {
         motion
     }
 
-    /// Has a contact's surfaces move as they did, point by point, as far as it may press and rub: sequential impulses. What it presses
+    /// Has a contact's surfaces come that part of the way to how they moved, point by point, as far as it may press and rub: sequential impulses. What it presses
     /// then is noted there, and nowhere else.
     pub(crate) fn restore(
         &self,
         contact: u32,
         ContactMotion { speeds, impulses }: &mut ContactMotion,
+        part: f32,
         bodies: &mut SolverBodies,
     ) {
         let at = self.lanes[contact as usize];
@@ -231,11 +232,11 @@ impl Groups {
         let velocity = at.bodies_mut(&mut bodies.velocity);
         for ((rows, speeds), [normal, tangent]) in points.iter().zip(speeds).zip(impulses) {
             let along = sides.normal_rows(rows, lane, velocity);
-            let wanted = *normal - rows.normal_mass[lane] * (sides.speed(along, lane, velocity) - speeds[0]);
+            let wanted = *normal - part * rows.normal_mass[lane] * (sides.speed(along, lane, velocity) - speeds[0]);
             sides.add_impulse(along, normal, lane, max(wanted, 0.0) - *normal, velocity);
             let across = sides.tangent_rows(rows, lane, velocity);
             let most = sides.friction[lane] * *normal;
-            let wanted = *tangent - rows.tangent_mass[lane] * (sides.speed(across, lane, velocity) - speeds[1]);
+            let wanted = *tangent - part * rows.tangent_mass[lane] * (sides.speed(across, lane, velocity) - speeds[1]);
             sides.add_impulse(across, tangent, lane, clamp(wanted, -most, most) - *tangent, velocity);
         }
     }
