@@ -17,13 +17,17 @@ pub(crate) fn is_left_out_later(setup: &Setup) -> bool {
     setup.params.exchange == Exchange::Substep
 }
 
+/// Names of ghosts, ascending, each with its place.
+pub(crate) type Names = Vec<(GlobalId, u32)>;
+
 /// Leaves out what ghosts felt of contacts that the tile solves, or would if they still touched: of those it knows what they did.
-pub(crate) fn leave_out(tile: &mut Tile, setup: &Setup) {
+pub(crate) fn leave_out(tile: &mut Tile, ghosts: &mut Names, setup: &Setup) {
     if !is_left_out_later(setup) || tile.ghosts() == 0 {
         return;
     }
     let (owned, dynamic) = (tile.owned, tile.owned + tile.ghosts());
-    let mut ghosts: Vec<(GlobalId, u32)> = tile.bodies.id[owned..dynamic].iter().copied().zip(0..).collect();
+    ghosts.clear();
+    ghosts.extend(tile.bodies.id[owned..dynamic].iter().copied().zip(0..));
     ghosts.sort_unstable();
     let mut unseen = std::mem::take(&mut tile.unseen);
     let is_near = |ghost: usize| Outline::of(tile, owned + ghost, setup).is_near(tile.id, setup);

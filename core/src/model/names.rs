@@ -3,6 +3,7 @@
 use crate::model::id::GlobalId;
 use rustc_hash::FxHashSet;
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 /// A set of names: runs of those that came in ascending order, as a scene tells them; of others a bit for each up to some
 /// multiple of how many there are, which is all of them where bodies are numbered through, and a hash table for the rest.
@@ -54,23 +55,26 @@ impl Names {
 /// Names that are noted for the case that somebody asks: only then they are hashed.
 #[derive(Default, Debug)]
 pub(crate) struct Noted {
-    latest: Vec<GlobalId>,
-    hashed: FxHashSet<GlobalId>,
+    /// Until then.
+    unasked: Vec<GlobalId>,
+    hashed: OnceLock<FxHashSet<GlobalId>>,
 }
 
 impl Noted {
     pub(crate) fn push(&mut self, name: GlobalId) {
-        self.latest.push(name);
+        match self.hashed.get_mut() {
+            Some(hashed) => _ = hashed.insert(name),
+            None => self.unasked.push(name),
+        }
     }
 
-    pub(crate) fn contains(&mut self, name: GlobalId) -> bool {
-        self.hashed.extend(self.latest.drain(..));
-        self.hashed.contains(&name)
+    pub(crate) fn contains(&self, name: GlobalId) -> bool {
+        self.hashed.get_or_init(|| self.unasked.iter().copied().collect()).contains(&name)
     }
 
     pub(crate) fn clear(&mut self) {
-        self.latest.clear();
-        self.hashed.clear();
+        self.unasked.clear();
+        self.hashed.take();
     }
 }
 

@@ -193,7 +193,7 @@ fn begin(bench: &mut Bench<'_>) -> bool {
         b.work.outlook = standstill::look(b.tile, asked, b.setup);
         let goes_on = !b.work.outlook.stands_still();
         if goes_on {
-            unseen::leave_out(b.tile, b.setup);
+            unseen::leave_out(b.tile, &mut b.migrate.ghost_names, b.setup);
         }
         goes_on
     })

@@ -94,6 +94,11 @@ impl World {
         true
     }
 
+    /// Whether a body was to be removed since the last step.
+    pub(crate) fn was_removed(&self, id: GlobalId) -> bool {
+        self.removed.contains(id)
+    }
+
     /// Every owned body.
     pub fn bodies(&self) -> impl Iterator<Item = Body> + '_ {
         self.tiles.iter().flat_map(Tile::present).map(|(_, body)| body)

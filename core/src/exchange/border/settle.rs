@@ -3,8 +3,8 @@
 //! Each owner of a border contact has solved it together with its other contacts; moved to the mean, its body comes off what it
 //! rests on. Where contacts press hard that is a kick in every step: discs at the borders of a pile at rest kept 2 rad/s that never
 //! turned them, and no pile over borders fell asleep. So the contacts beside take it up before the step ends, with all border
-//! contacts as agreed: their surfaces come to move as they did before, as far as contacts may press and rub, in sweeps of
-//! sequential impulses. Both bodies of such a contact are the tile's own, or one is a static, so momentum is kept. The impulses that
+//! contacts as agreed: their surfaces come most of the way back to how they moved, as far as contacts may press and rub, in sweeps
+//! of sequential impulses. Both bodies of such a contact are the tile's own, or one is a static, so momentum is kept. The impulses that
 //! the next step starts with stay those of the last substep.
 
 use super::Border;

@@ -89,6 +89,8 @@ impl World {
             }
             None => Vec::new(),
         };
+        // Who was removed since then touches nobody, though he is in the tiles until that is settled, or longer where he is a ghost.
+        found.retain(|contact| !contact.bodies.iter().any(|&body| self.was_removed(body)));
         // Contacts of one pair stay in their order.
         found.sort_by_key(|contact| contact.bodies);
         found

@@ -259,6 +259,13 @@ fn forces_that_are_in_balance_move_nobody() {
         let pressed = world.touching(ids[4]);
         let impulse: f32 = pressed.iter().map(|contact| contact.normal_impulse).sum();
         assert!((impulse - 100.0 * mass / 240.0).abs() < 1e-4, "{impulse}");
+        // Who is removed touches nobody any more, in whichever tile, whether or not that is settled.
+        let touch = |world: &World| world.touching(ids[2]).len();
+        assert_eq!(touch(&world), 1);
+        world.remove(ids[3]);
+        assert_eq!(touch(&world), 0);
+        world.settle();
+        assert_eq!(touch(&world), 0);
     }
 }
 
