@@ -3,7 +3,8 @@
 //! Which contacts a tile solves follows from where bodies are now, and of bodies that are not its own a tile knows where they were a step
 //! before: whoever sends a ghost does not know all that its receiver will solve. With `exchange = "substep"` both copies of a contact have
 //! pressed alike, and what is solved for others begins as its owner has it. So all that a body's contacts did goes with its ghost, and the
-//! receiver leaves out what it solves. With `"step"` copies differ; there the sender leaves out what it takes the receiver to solve.
+//! receiver leaves out what it solves, before any come that are sent on behalf of [far](super::far) bodies. With `"step"` copies differ; there
+//! the sender leaves out what it takes the receiver to solve.
 
 use crate::exchange::overlap::Outline;
 use crate::model::id::GlobalId;

@@ -10,7 +10,7 @@ use crate::collide::proxies::amid;
 use crate::collide::seams;
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
 use crate::exchange::verdict::Verdict;
-use crate::exchange::{far, migrate, unseen};
+use crate::exchange::{far, migrate};
 use crate::model::error::StepError;
 use crate::model::id::GlobalId;
 use crate::model::params::Exchange;
@@ -191,11 +191,7 @@ fn begin(bench: &mut Bench<'_>) -> bool {
     bench.stage(Phase::Flush, |b| {
         let asked = b.measures || b.figures.is_some();
         b.work.outlook = standstill::look(b.tile, asked, b.setup);
-        let goes_on = !b.work.outlook.stands_still();
-        if goes_on {
-            unseen::leave_out(b.tile, &mut b.migrate.ghost_names, b.setup);
-        }
-        goes_on
+        !b.work.outlook.stands_still()
     })
 }
 

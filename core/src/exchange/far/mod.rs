@@ -126,7 +126,7 @@ pub(crate) fn send(tile: &Tile, bag: &mut Mailbag, setup: &Setup) {
     reached.sort_unstable();
     // Who is reached by both kinds counts as reached by a large one.
     reached.dedup_by_key(|body| (body.to, body.row));
-    let unseen = unseen_of(tile, &reached, setup);
+    let unseen = unseen_of(tile, &reached);
     for (Reached { to, row, .. }, unseen) in reached.into_iter().zip(unseen) {
         bag.address(tile.id, to);
         bag.ghosts.push(GhostRecord { body: tile.bodies.get(row), unseen, rested: tile.rested(row) });

@@ -2,10 +2,8 @@
 
 use super::Reached;
 use crate::exchange::record::Unseen;
-use crate::exchange::unseen;
 use crate::model::contact::{Contact, Slot, SlotKind};
 use crate::model::id::{GlobalId, TileId};
-use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
 /// The owned bodies that large ones come to, and what of each is unseen by whom it is sent to.
@@ -14,14 +12,11 @@ struct Sums<'a> {
     unseen: Vec<Unseen>,
     /// Of each that is sent its name, and its place among these, ascending by names.
     by_name: Vec<(GlobalId, usize)>,
-    /// Whether contacts with bodies of that tile count as well, as it leaves them out.
-    all: bool,
 }
 
 /// Adds up the impulses of the last step for bodies that are sent to the tiles of large ones, and to no others: those of all their
-/// contacts, but with bodies of that tile where it does not leave them out. Between the sync points contacts are known by slots where both bodies stayed, and by name.
-pub(super) fn unseen_of(tile: &Tile, reached: &[Reached], setup: &Setup) -> Vec<Unseen> {
-    let all = unseen::is_left_out_later(setup);
+/// contacts but with bodies of that tile. Between the sync points contacts are known by slots where both bodies stayed, and by name.
+pub(super) fn unseen_of(tile: &Tile, reached: &[Reached]) -> Vec<Unseen> {
     let unseen = vec![Unseen::default(); reached.len()];
     let lasting = reached.iter().enumerate().filter(|(_, body)| !body.in_passing);
     let mut by_name: Vec<_> = lasting.map(|(place, body)| (tile.bodies.id[body.row], place)).collect();
@@ -35,7 +30,7 @@ pub(super) fn unseen_of(tile: &Tile, reached: &[Reached], setup: &Setup) -> Vec<
     let owner_of = |name: GlobalId| owners.binary_search_by_key(&name, |(id, _)| *id).ok().map(|place| owners[place].1);
     let mut is_lasting = vec![false; tile.owned];
     by_name.iter().for_each(|&(_, place)| is_lasting[reached[place].row] = true);
-    let (mut sums, stays) = (Sums { reached, unseen, by_name, all }, tile.who_stays());
+    let (mut sums, stays) = (Sums { reached, unseen, by_name }, tile.who_stays());
     let lasts = |slot: Slot| matches!(slot.kind(), SlotKind::Owned(index) if is_lasting[index]);
     for (key, contact) in tile.contacts.iter().filter(|(key, _)| stays(key.low()) && stays(key.high())) {
         if lasts(key.low()) || lasts(key.high()) {
@@ -55,7 +50,7 @@ impl Sums<'_> {
         for (name, partner, linear, angular) in [(a, owner_of_b, -linear, on_a), (b, owner_of_a, linear, on_b)] {
             let first = self.by_name.partition_point(|&(id, _)| id < name);
             for &(_, place) in self.by_name[first..].iter().take_while(|&&(id, _)| id == name) {
-                if self.all || partner != Some(self.reached[place].to) {
+                if partner != Some(self.reached[place].to) {
                     self.unseen[place].add(linear, angular);
                 }
             }

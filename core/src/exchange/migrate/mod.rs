@@ -39,7 +39,7 @@ pub(crate) struct MigrateWork {
     around: Surroundings,
     arrivals: Vec<MigrantRecord>,
     ghosts: receive::Ghosts,
-    pub(crate) ghost_names: Names,
+    ghost_names: Names,
 }
 
 /// An owned body that may concern other tiles.

@@ -3,6 +3,7 @@
 use super::{MigrateWork, place};
 use crate::exchange::mail::Mail;
 use crate::exchange::record::{ContactRecord, GhostRecord, MigrantRecord};
+use crate::exchange::unseen;
 use crate::model::contact::{Slot, SlotKind};
 use crate::model::id::TileId;
 use crate::model::strays::{Authority, Stray};
@@ -50,6 +51,7 @@ pub(crate) fn receive(tile: &mut Tile, mail: Mail<'_>, work: &mut MigrateWork, s
         tile.find_interior(setup);
     }
     take_ghosts(tile, mail, &mut work.ghosts, setup);
+    unseen::leave_out(tile, &mut work.ghost_names, setup);
     tile.meet_statics(Vec::new(), setup);
     tile.push_statics(setup, step);
 }

@@ -300,7 +300,7 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             let of_body = |push: &&Push| push.pair.0 == *id || push.pair.1 == *id;
             // Of who is gone a tile does not know whether it would have solved what was.
             let is_here = |id: &GlobalId| tile.bodies.id.contains(id) || world.setup.is_static(*id);
-            let is_told_all = world.setup.params.exchange == Exchange::Substep;
+            let is_told_all = world.setup.params.exchange == Exchange::Substep && needs(world, tile.id, body);
             let all_here = |push: &Push| [push.pair.0, push.pair.1].iter().all(is_here);
             if is_told_all && !before.iter().filter(of_body).all(all_here) {
                 continue;
