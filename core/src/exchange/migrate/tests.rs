@@ -299,7 +299,8 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             let owner_now = |id: &GlobalId| bodies.get(id).map(|body| world.setup.partition.locate(body.position));
             let of_body = |push: &&Push| push.pair.0 == *id || push.pair.1 == *id;
             // Of who is gone a tile does not know whether it would have solved what was.
-            let is_here = |id: &GlobalId| tile.bodies.id.contains(id) || world.setup.is_static(*id);
+            let comes = |body: &Body| needs(world, tile.id, body) || owner_now(&body.id) == Some(tile.id);
+            let is_here = |id: &GlobalId| world.setup.is_static(*id) || bodies.get(id).is_some_and(comes);
             let is_told_all = world.setup.params.exchange == Exchange::Substep && needs(world, tile.id, body);
             let all_here = |push: &Push| [push.pair.0, push.pair.1].iter().all(is_here);
             if is_told_all && !before.iter().filter(of_body).all(all_here) {
