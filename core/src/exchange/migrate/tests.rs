@@ -303,7 +303,13 @@ fn check_unseen(world: &World, bodies: &BTreeMap<GlobalId, Body>, before: &[Push
             let is_here = |id: &GlobalId| world.setup.is_static(*id) || bodies.get(id).is_some_and(comes);
             let is_told_all = world.setup.params.exchange == Exchange::Substep && needs(world, tile.id, body);
             let all_here = |push: &Push| [push.pair.0, push.pair.1].iter().all(is_here);
-            if is_told_all && !before.iter().filter(of_body).all(all_here) {
+            // Of what goes far others may tell, and tiles may know otherwise.
+            let goes_far = |body: &Body| world.setup.goes_far(body.velocity);
+            let is_slow = |push: &Push| {
+                let now = [push.pair.0, push.pair.1].iter().filter_map(|id| bodies.get(id)).all(|body| !goes_far(body));
+                now && push.bodies.iter().flatten().all(|body| !goes_far(body))
+            };
+            if is_told_all && !before.iter().filter(of_body).all(|push| all_here(push) && is_slow(push)) {
                 continue;
             }
             // What was only on the way of somebody is told of by another than its owner, as it is.
