@@ -19,10 +19,10 @@ pub(crate) fn is_left_out_later(setup: &Setup) -> bool {
 }
 
 /// Names of ghosts, ascending, each with its place.
-pub(crate) type Names = Vec<(GlobalId, u32)>;
+pub(crate) type GhostNames = Vec<(GlobalId, u32)>;
 
 /// Leaves out what ghosts felt of contacts that the tile solves, or would if they still touched: of those it knows what they did.
-pub(crate) fn leave_out(tile: &mut Tile, ghosts: &mut Names, setup: &Setup) {
+pub(crate) fn leave_out(tile: &mut Tile, ghosts: &mut GhostNames, setup: &Setup) {
     if !is_left_out_later(setup) || tile.ghosts() == 0 {
         return;
     }

@@ -119,7 +119,7 @@ impl<'a> Around<'a> {
             SlotKind::Owned(_) => self.border_of(slot).is_some_and(|border| {
                 Outline::of_rim(&self.tile.rim.bodies[border.rim as usize], self.setup).is_near(target, self.setup)
             }),
-            // Judged by where it was: what comes of it is put right with the first refresh.
+            // Judged by where it was: no more is known here.
             SlotKind::Ghost(_) => Outline::of(self.tile, self.tile.index(slot), self.setup).is_near(target, self.setup),
             SlotKind::Static(_) => true,
         }

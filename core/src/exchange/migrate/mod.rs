@@ -16,7 +16,7 @@ use crate::exchange::mail::Mailbag;
 use crate::exchange::overlap::Outline;
 use crate::exchange::record::{ContactRecord, GhostRecord, MigrantRecord, Unseen};
 use crate::exchange::rim::{Rim, RimBody};
-use crate::exchange::unseen::Names;
+use crate::exchange::unseen::GhostNames;
 use crate::model::id::TileId;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::partition::Surroundings;
@@ -39,7 +39,7 @@ pub(crate) struct MigrateWork {
     around: Surroundings,
     arrivals: Vec<MigrantRecord>,
     ghosts: receive::Ghosts,
-    ghost_names: Names,
+    ghost_names: GhostNames,
 }
 
 /// An owned body that may concern other tiles.
