@@ -11,6 +11,8 @@ pub(crate) mod seams;
 mod touch;
 mod wide_boxes;
 mod wide_moments;
+mod wide_outlines;
 mod wide_pairs;
 mod wide_polygons;
+mod wide_segments;
 mod wide_touches;

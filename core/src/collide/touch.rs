@@ -50,8 +50,8 @@ pub(super) fn scale_of<V: Arithmetic>([a, b]: [V; 2]) -> V {
 pub(super) const ROUNDS: usize = 3;
 
 /// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m.
-const MORE_ROUNDS: usize = 12;
-const LEAST_WAY: f32 = 0.002;
+pub(super) const MORE_ROUNDS: usize = 12;
+pub(super) const LEAST_WAY: f32 = 0.002;
 
 /// The cosine between a segment's normal and that of its contact with what lies on it, at least.
 const LIES: f32 = 0.99;
@@ -246,13 +246,11 @@ impl<'a> Approach<'a> {
         self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()))
     }
 
-    /// Whether one of the pieces is a segment, and the other had a contact with it along the normal of its face.
+    /// Whether the second piece is a segment, and the first had a contact with it along the normal of its face.
     fn has_lain(&self, known: Option<&Contact>) -> bool {
-        let (Some([a, b]), Some(known)) = (self.pieces, known) else { return false };
-        [(a, known.rotation_a), (b, known.rotation_b)].into_iter().any(|(piece, rotation)| {
-            let along = || dot(rotation.rotate(piece.outline.normal(0)), known.normal).abs();
-            piece.side.is_some() && along() > LIES
-        })
+        let (Some([_, segment]), Some(known)) = (self.pieces, known) else { return false };
+        let along = dot(known.rotation_b.rotate(segment.outline.normal(0)), known.normal).abs();
+        segment.side.is_some() && along > LIES
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.

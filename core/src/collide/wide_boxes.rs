@@ -113,6 +113,7 @@ impl<V: Wide> Shapes<V> for Boxes {
             turning,
             some: beyond.if_positive(zero, one),
             two: corner.if_positive(zero, one),
+            tells: zero,
             normal: n,
             anchor: [offset; 2],
             separation: [zero; 2],

@@ -5,11 +5,13 @@
 
 use super::broad_phase::Pair;
 use super::cull::passes;
-use super::touch::{CREEPING, DEEP, NEAR, PASSABLE, ROUNDS};
-use super::wide_pairs::{Outlook, Pairs, TOUCHING};
+use super::manifold::chain::Lies;
+use super::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROUNDS};
+use super::wide_pairs::{Outlook, Pairs, TOUCHING, WidePairs};
 use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
+use crate::model::piece::Piece;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
 use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
@@ -27,6 +29,8 @@ pub(super) struct Moments<V> {
     /// Whether there is a point, and whether there is a second.
     pub(super) some: V,
     pub(super) two: V,
+    /// Whether the point only tells [how far they are](crate::collide::manifold::Manifold::is_distance) from each other.
+    pub(super) tells: V,
     pub(super) normal: Vectors<V>,
     pub(super) anchor: [Vectors<V>; 2],
     pub(super) separation: [V; 2],
@@ -35,6 +39,9 @@ pub(super) struct Moments<V> {
 
 /// The shapes of sixteen pairs.
 pub(super) trait Shapes<V> {
+    /// Whether who goes beyond one of them is let through, as by a segment: then no step of a search may bring anybody there.
+    const ARE_LET_THROUGH: bool = false;
+
     /// Their manifolds after some seconds, in which B has come to `offset` from A, and both have turned so. Further ones than `reach`
     /// may give none.
     fn manifolds(
@@ -70,6 +77,18 @@ pub(super) trait Shaped: Default {
     fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
 }
 
+/// Sixteen pairs of pieces of two bodies.
+pub(super) trait WidePieces: Default {
+    /// The bodies.
+    fn pairs(&mut self) -> &mut WidePairs;
+
+    /// Puts two pieces of the bodies of a lane into it. Where the second is a segment, whether the first [lies](Lies) on it.
+    fn set_pieces(&mut self, lane: usize, pieces: [&Piece; 2], lies: Lies);
+
+    /// As [`Shaped::look`].
+    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
+}
+
 /// What can be said of pairs whose contacts have up to two points.
 #[derive(Default, Debug)]
 pub(super) struct PointOutlook<S> {
@@ -92,17 +111,17 @@ impl<S: Shaped> Outlook for PointOutlook<S> {
 
     #[inline(always)]
     fn is_unsure(&self, lane: usize) -> bool {
-        self.points.unsure[lane] > 0.0
+        self.points.is_unsure(lane)
     }
 
     #[inline(always)]
     fn is_postponed(&self, lane: usize) -> bool {
-        self.points.postponed[lane] > 0.0
+        self.points.is_postponed(lane)
     }
 
     #[inline(always)]
     fn meets(&self, lane: usize) -> bool {
-        self.points.holds[0][lane] + self.points.holds[1][lane] > 0.0
+        self.points.meets(lane)
     }
 
     #[inline(always)]
@@ -148,6 +167,7 @@ impl<V: Wide> Moments<V> {
             turning: both(positive, &yes.turning, &no.turning),
             some: positive.if_positive(yes.some, no.some),
             two: positive.if_positive(yes.two, no.two),
+            tells: positive.if_positive(yes.tells, no.tells),
             normal: Vectors::pick(positive, yes.normal, no.normal),
             anchor: both(positive, &yes.anchor, &no.anchor),
             separation: [
@@ -177,9 +197,27 @@ impl<V: Wide> Moments<V> {
 }
 
 impl Points {
+    /// As [`Outlook::is_unsure`].
+    #[inline(always)]
+    pub(super) fn is_unsure(&self, lane: usize) -> bool {
+        self.unsure[lane] > 0.0
+    }
+
+    /// As [`Outlook::is_postponed`].
+    #[inline(always)]
+    pub(super) fn is_postponed(&self, lane: usize) -> bool {
+        self.postponed[lane] > 0.0
+    }
+
+    /// As [`Outlook::meets`].
+    #[inline(always)]
+    pub(super) fn meets(&self, lane: usize) -> bool {
+        self.holds[0][lane] + self.holds[1][lane] > 0.0
+    }
+
     /// Looks at pairs of such shapes.
     #[inline(always)]
-    pub(super) fn look<V: Wide>(&mut self, pairs: &Pairs<V>, shapes: &impl Shapes<V>, search: Search, setup: &Setup) {
+    pub(super) fn look<V: Wide, S: Shapes<V>>(&mut self, pairs: &Pairs<V>, shapes: &S, search: Search, setup: &Setup) {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
         let (dt, speculative) = (pairs.dt, V::splat(setup.params.speculative_distance));
         let far = pairs.far();
@@ -191,6 +229,7 @@ impl Points {
         let scale = pairs.scale();
         let rests = less(separation, scale.mul(V::splat(TOUCHING))).mul(is_slow).mul(pairs.pressed);
         let is_now = less(separation, scale.mul(V::splat(NEAR))).max(rests);
+        let is_now = now.tells.if_positive(zero, is_now);
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let asked = passes.if_positive(zero, now.some);
         let later = is_now.if_positive(zero, asked);
@@ -207,7 +246,7 @@ impl Points {
             (at, found) = pairs.first_moments(shapes, &now, later, reach, within);
             meets = meets.max(found);
         }
-        meets = meets.mul(asked).mul(at.some);
+        meets = at.tells.if_positive(zero, meets.mul(asked).mul(at.some));
         let moved = pairs.between.dot(at.normal).mul(at.time);
         let closing = pairs.closing_of_both(&at);
         for point in 0..2 {
@@ -224,7 +263,7 @@ impl Points {
             at.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
-        let unsure = pairs.run_into_corners(&at, closing[0]);
+        let unsure = if S::ARE_LET_THROUGH { zero } else { pairs.run_into_corners(&at, closing[0]) };
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
@@ -308,31 +347,34 @@ impl<V: Wide> Pairs<V> {
     /// The moments in which those pairs of whom it is asked, apart now, touch, and for whom that is within so many seconds; for the
     /// others the last that was looked at.
     #[inline(always)]
-    fn first_moments(&self, shapes: &impl Shapes<V>, now: &Moments<V>, asked: V, reach: V, dt: V) -> (Moments<V>, V) {
+    fn first_moments<S: Shapes<V>>(&self, shapes: &S, now: &Moments<V>, asked: V, reach: V, dt: V) -> (Moments<V>, V) {
         let zero = V::splat(0.0);
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
         let scale = self.scale();
-        for _ in 0..ROUNDS {
+        for _ in 0..if S::ARE_LET_THROUGH { MORE_ROUNDS } else { ROUNDS } {
             let (anchor, separation) = at.nearest();
             let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
             going = self.come_near(&at, dt).if_positive(going, zero);
             if !going.any_positive() {
                 break;
             }
-            // Half as if the fastest corner led, half as if the nearest point did.
+            // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = self.closing(anchor, at.offset, at.normal).max(zero);
+            let closing = if S::ARE_LET_THROUGH { bound } else { closing };
             let speed = V::splat(0.5).mul(bound.add(closing));
-            let next = self.moments(shapes, at.time.add(separation.div(speed).min(left)), reach);
+            let way = at.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
+            let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);
             at = Moments::pick(going, &next, &at);
             going = going.mul(at.some);
             let (_, separation) = at.nearest();
-            let deep = less(separation, scale.mul(V::splat(DEEP))).mul(going);
-            let near = less(separation, scale.mul(V::splat(NEAR))).mul(going);
+            let touches = at.tells.if_positive(zero, going);
+            let deep = less(separation, scale.mul(V::splat(DEEP))).mul(touches);
+            let near = less(separation, scale.mul(V::splat(NEAR))).mul(touches);
             ending = ending.max(deep);
             found = found.max(deep.if_positive(zero, near));
             going = near.max(deep).if_positive(zero, going);
         }
-        ending = ending.max(going);
+        ending = at.tells.if_positive(zero, ending.max(going));
         // Of two points the further one may be the first to touch.
         let never = V::splat(f32::INFINITY);
         let closing = self.closing_of_both(&at);

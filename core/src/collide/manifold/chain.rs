@@ -13,13 +13,13 @@ use glam::Vec2;
 use std::ops::RangeInclusive;
 
 /// Normals of faces that differ by less count as one.
-const SAME: f32 = 1e-5;
+pub(in crate::collide) const SAME: f32 = 1e-5;
 
 /// What is further makes no contact yet, in m.
-const FAR: f32 = 0.05;
+pub(in crate::collide) const FAR: f32 = 0.05;
 
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
-const BEYOND: f32 = 1e-5;
+pub(in crate::collide) const BEYOND: f32 = 1e-5;
 
 /// How far the whole of a piece may be behind a segment that it lies on, in m; none for one that does not.
 pub(in crate::collide) type Lies = Option<f32>;

@@ -3,9 +3,9 @@
 use super::names::Named;
 use super::{BLOCK, FindAmong};
 use crate::collide::touch::{Meeting, Met, meet};
-use crate::collide::wide_moments::{PointOutlook, Search};
-use crate::collide::wide_pairs::Outlook;
+use crate::collide::wide_moments::{Points, Search, WidePieces};
 use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_segments::WideSegments;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::tiling::blueprint::Setup;
@@ -20,11 +20,19 @@ const FEW: usize = 3;
 pub(super) struct Meetings<'a> {
     /// Each with the place in the block of its pair.
     all: Vec<(u8, Meeting<'a>)>,
-    /// Those of which nothing is known yet.
-    open: Vec<u32>,
+    /// Those of which nothing is known yet: of pieces with faces, and of segments with any.
+    polygons: Open<WidePolygons>,
+    segments: Open<WideSegments>,
     /// The contacts of the last step of a pair.
     known: Vec<&'a Contact>,
-    outlook: PointOutlook<WidePolygons>,
+}
+
+/// Some of all meetings, which are looked at sixteen at a time.
+#[derive(Default)]
+struct Open<S> {
+    numbers: Vec<u32>,
+    pairs: S,
+    points: Points,
 }
 
 impl<'a> Meetings<'a> {
@@ -32,9 +40,8 @@ impl<'a> Meetings<'a> {
     #[inline(never)]
     pub(super) fn find(&mut self, places: &[u8], named: &[Named<'a>; BLOCK], among: &FindAmong<'a>) {
         let &FindAmong { by_name, boxes, tile, setup, .. } = among;
-        let Self { all, open, known: several, .. } = self;
+        let Self { all, polygons, segments, known: several } = self;
         all.clear();
-        open.clear();
         for &place in places {
             let Named { key, bodies, known, old } = named[usize::from(place)];
             several.clear();
@@ -46,12 +53,14 @@ impl<'a> Meetings<'a> {
             }
             meet(tile, bodies, boxes, several, setup, |meeting| {
                 if matches!(meeting.outcome, Met::Open) {
+                    let open = if meeting.is_on_segment() { &mut segments.numbers } else { &mut polygons.numbers };
                     open.push(all.len() as u32);
                 }
                 all.push((place, meeting));
             });
         }
-        setup.lanes.run(Look { meetings: self, tile, setup });
+        setup.lanes.run(Look { all, open: polygons, tile, setup });
+        setup.lanes.run(Look { all, open: segments, tile, setup });
     }
 
     /// All contacts that are found, each with the place of its pair, and the separations of its points now.
@@ -61,19 +70,20 @@ impl<'a> Meetings<'a> {
     }
 }
 
-/// Looks at all that are open.
-struct Look<'m, 'a> {
-    meetings: &'m mut Meetings<'a>,
+/// Looks at all that are open, until none is.
+struct Look<'m, 'a, S> {
+    all: &'m mut [(u8, Meeting<'a>)],
+    open: &'m mut Open<S>,
     tile: &'a Tile,
     setup: &'a Setup,
 }
 
-impl Kernel for Look<'_, '_> {
+impl<S: WidePieces> Kernel for Look<'_, '_, S> {
     type Output = ();
 
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { meetings: Meetings { all, open, outlook, .. }, tile, setup } = self;
+        let Self { all, open: Open { numbers: open, pairs, points }, tile, setup } = self;
         for search in [Search::WhereManyNeedIt, Search::Always] {
             let (mut count, mut postponed) = (open.len(), 0);
             // Those that are too few for lanes.
@@ -89,18 +99,18 @@ impl Kernel for Look<'_, '_> {
                 let mut numbers = [open[first]; WIDE];
                 numbers[..lanes].copy_from_slice(&open[first..][..lanes]);
                 for (lane, &number) in numbers.iter().enumerate() {
-                    all[number as usize].1.set(lane, outlook, tile, setup);
+                    all[number as usize].1.set(lane, pairs, tile, setup);
                 }
-                outlook.look::<V::Wide>(search, setup);
+                pairs.look::<V::Wide>(points, search, setup);
                 for (lane, &number) in numbers[..lanes].iter().enumerate() {
                     let meeting = &mut all[number as usize].1;
-                    if outlook.is_postponed(lane) {
+                    if points.is_postponed(lane) {
                         open[postponed] = number;
                         postponed += 1;
-                    } else if outlook.is_unsure(lane) {
+                    } else if points.is_unsure(lane) {
                         meeting.touch(tile, setup);
                     } else {
-                        meeting.see(lane, outlook);
+                        meeting.see(lane, points);
                     }
                 }
             }

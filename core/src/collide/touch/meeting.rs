@@ -2,10 +2,9 @@
 
 use super::Approach;
 use crate::collide::broad_phase::Pair;
+use crate::collide::manifold::chain::Lies;
 use crate::collide::piece_boxes::PieceBoxes;
-use crate::collide::wide_moments::PointOutlook;
-use crate::collide::wide_pairs::Outlook;
-use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_moments::{Points, WidePieces};
 use crate::model::contact::Contact;
 use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
@@ -18,6 +17,8 @@ pub(in crate::collide) struct Meeting<'a> {
     features: u32,
     /// The contact that they had in the last step.
     known: Option<&'a Contact>,
+    /// Where the second piece is a segment.
+    lies: Lies,
     pub(in crate::collide) outcome: Met,
 }
 
@@ -32,31 +33,31 @@ pub(in crate::collide) enum Met {
 }
 
 impl<'a> Meeting<'a> {
+    /// Whether a piece meets a segment of a chain.
+    pub(in crate::collide) fn is_on_segment(&self) -> bool {
+        self.pieces[1].side.is_some()
+    }
+
     /// Looks again, which only those need that are open.
     pub(in crate::collide) fn touch(&mut self, tile: &Tile, setup: &Setup) {
         let mut pair = Approach::new(tile, self.bodies, setup);
-        (pair.pieces, pair.features) = (Some(self.pieces), self.features);
-        self.outcome = Met::from(pair.touch(self.known, pair.far(setup.params.dt), setup));
+        (pair.pieces, pair.features, pair.lies) = (Some(self.pieces), self.features, self.lies);
+        let found = if pair.pass_by(setup) { None } else { pair.touch(self.known, pair.far(setup.params.dt), setup) };
+        self.outcome = Met::from(found);
     }
 
     /// Puts it into a lane.
     #[inline(always)]
-    pub(in crate::collide) fn set(
-        &self,
-        lane: usize,
-        outlook: &mut PointOutlook<WidePolygons>,
-        tile: &Tile,
-        setup: &Setup,
-    ) {
+    pub(in crate::collide) fn set<S: WidePieces>(&self, lane: usize, to: &mut S, tile: &Tile, setup: &Setup) {
         let pressed = super::pressed(tile, self.bodies, self.known, setup);
-        outlook.pairs.pairs.set(lane, tile, self.bodies, pressed, setup);
-        outlook.pairs.set_pieces(lane, self.pieces);
+        to.pairs().set(lane, tile, self.bodies, pressed, setup);
+        to.set_pieces(lane, self.pieces, self.lies);
     }
 
     /// Takes what was seen of it in a lane.
     #[inline(always)]
-    pub(in crate::collide) fn see(&mut self, lane: usize, outlook: &PointOutlook<WidePolygons>) {
-        let found = outlook.meets(lane).then(|| outlook.points.contact(lane, self.features, self.known));
+    pub(in crate::collide) fn see(&mut self, lane: usize, points: &Points) {
+        let found = points.meets(lane).then(|| points.contact(lane, self.features, self.known));
         self.outcome = Met::from(found);
     }
 
@@ -78,7 +79,7 @@ impl From<Option<(Contact, [f32; 2])>> for Met {
 }
 
 /// Tells which pieces of two bodies may touch: in their order, and what comes of
-/// those that had a contact that still serves, or of which one is a disc or a segment of a chain. `known` are the contacts of the
+/// those that had a contact that still serves, or of which one is a disc and none a segment. `known` are the contacts of the
 /// last step.
 pub(in crate::collide) fn meet<'a>(
     tile: &Tile,
@@ -110,12 +111,13 @@ pub(in crate::collide) fn meet<'a>(
             (Some(separation), _) => Met::Known(separation),
             (None, Some((contact, separation))) => Met::Found(contact, separation),
             _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
-            _ => {
+            _ if pieces[1].side.is_some() => {
                 pair.lies = pair.has_lain(known).then_some(0.5 * setup.params.speculative_distance);
-                Met::from(pair.touch(known, far, setup))
+                Met::Open
             }
+            _ => Met::from(pair.touch(known, far, setup)),
         };
-        met(Meeting { bodies, pieces, features, known, outcome });
+        met(Meeting { bodies, pieces, features, known, lies: pair.lies, outcome });
     };
     if pieces_a.len() * pieces_b.len() == 1 {
         meet(0, 0);

@@ -1,0 +1,532 @@
+//! Segments of chains and convex pieces, sixteen pairs at once: what `manifold/chain.rs` does for one, in the same words and with the same
+//! bits.
+
+use super::manifold::chain::{BEYOND, FAR, Lies, SAME};
+use super::wide_moments::{Moments, Points, Search, Shapes, WidePieces, negated, opposite};
+use super::wide_outlines::{Face, Polygon, WideOutlines, clip};
+use super::wide_pairs::{Pairs, WidePairs};
+use crate::model::piece::{Joint, Piece};
+use crate::parallel::lanes::{Quad, WIDE, Wide};
+use crate::parallel::vectors::{Vectors, less};
+use crate::tiling::blueprint::Setup;
+
+/// A piece of body A of sixteen pairs, and the segment that body B is.
+#[derive(Default, Debug)]
+pub(super) struct WideSegments {
+    pairs: WidePairs,
+    outlines: WideOutlines,
+    /// Center of the piece; one where it [lies](Lies) on the segment, and how far behind it that may be.
+    centers: [Quad; WIDE],
+    /// From where to where the segment leads.
+    ends: [Quad; WIDE],
+    /// Where it starts, and where it ends: see [`joint`].
+    joints: [[Quad; WIDE]; 2],
+}
+
+impl WidePieces for WideSegments {
+    #[inline(always)]
+    fn pairs(&mut self) -> &mut WidePairs {
+        &mut self.pairs
+    }
+
+    #[inline(always)]
+    fn set_pieces(&mut self, lane: usize, [piece, segment]: [&Piece; 2], lies: Lies) {
+        self.outlines.set(lane, piece);
+        let (is_lying, most) = lies.map_or((0.0, 0.0), |most| (1.0, most));
+        self.centers[lane] = [piece.center.x, piece.center.y, is_lying, most];
+        let [to, from] = segment.outline.edge(0);
+        self.ends[lane] = [from.x, from.y, to.x, to.y];
+        let side = segment.side.expect("a segment is solid from one side");
+        (self.joints[0][lane], self.joints[1][lane]) = (joint(side.start), joint(side.end));
+    }
+
+    #[inline(always)]
+    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
+        let pairs = self.pairs.load::<V>(setup);
+        let [center_x, center_y, lies, most_behind] = V::load_quads(&self.centers);
+        let [from_x, from_y, to_x, to_y] = V::load_quads(&self.ends);
+        let ends = [Vectors::new(from_x, from_y), Vectors::new(to_x, to_y)];
+        let along = ends[1].minus(ends[0]);
+        let length = along.dot(along).sqrt();
+        let along = Vectors::new(along.x.div(length), along.y.div(length));
+        let segments = Segments {
+            outline: self.outlines.polygon(self.outlines.most_corners()),
+            radius: self.outlines.radii(),
+            center: Vectors::new(center_x, center_y),
+            lies,
+            most_behind,
+            ends,
+            length,
+            along,
+            n: Vectors::new(negated(along.y), along.x),
+            joints: [Joints::load(&self.joints[0]), Joints::load(&self.joints[1])],
+        };
+        points.look(&pairs, &segments, search, setup);
+    }
+}
+
+/// The last normal that a contact may have there; whether there are any; and whether it juts out, as one that is no joint does not.
+#[inline(always)]
+fn joint(joint: Joint) -> Quad {
+    match joint {
+        Joint::Free(limit) => [limit.x, limit.y, 1.0, 0.0],
+        Joint::Convex { normal, is_end } => [normal.x, normal.y, if is_end { 1.0 } else { 0.0 }, 1.0],
+        Joint::Concave => [0.0; 4],
+    }
+}
+
+/// Ends of sixteen segments: see [`joint`].
+struct Joints<V> {
+    limit: Vectors<V>,
+    touches: V,
+    juts_out: V,
+}
+
+impl<V: Wide> Joints<V> {
+    #[inline(always)]
+    fn load(quads: &[Quad; WIDE]) -> Self {
+        let [x, y, touches, juts_out] = V::load_quads(quads);
+        Self { limit: Vectors::new(x, y), touches, juts_out }
+    }
+}
+
+/// Sixteen segments, in the frames of their bodies, and pieces in those of theirs.
+struct Segments<V> {
+    outline: Polygon<V>,
+    radius: V,
+    center: Vectors<V>,
+    /// One where the piece [lies](Lies) on the segment, else zero; and how far behind that it may be.
+    lies: V,
+    most_behind: V,
+    ends: [Vectors<V>; 2],
+    length: V,
+    along: Vectors<V>,
+    n: Vectors<V>,
+    joints: [Joints<V>; 2],
+}
+
+/// Manifolds of one point or two, seen from the segment.
+#[derive(Clone, Copy)]
+struct Found<V> {
+    some: V,
+    two: V,
+    normal: Vectors<V>,
+    anchor: [Vectors<V>; 2],
+    separation: [V; 2],
+    feature: [V; 2],
+}
+
+impl<V: Wide> Found<V> {
+    /// Those at a corner, with a radius around it, so high over a segment.
+    #[inline(always)]
+    fn of_corner(some: V, corner: Vectors<V>, height: V, n: Vectors<V>, radius: V, feature: V) -> Self {
+        let separation = height.sub(radius);
+        let anchor = corner.minus(n.scaled(height.sub(V::splat(0.5).mul(separation))));
+        Self::single(some, n, anchor, separation, feature)
+    }
+
+    #[inline(always)]
+    fn single(some: V, normal: Vectors<V>, anchor: Vectors<V>, separation: V, feature: V) -> Self {
+        let (two, anchor, separation) = (V::splat(0.0), [anchor; 2], [separation; 2]);
+        Self { some, two, normal, anchor, separation, feature: [feature; 2] }
+    }
+
+    /// `yes` where a number is positive, else `no`.
+    #[inline(always)]
+    fn pick(positive: V, yes: &Self, no: &Self) -> Self {
+        Self {
+            some: positive.if_positive(yes.some, no.some),
+            two: positive.if_positive(yes.two, no.two),
+            normal: Vectors::pick(positive, yes.normal, no.normal),
+            anchor: [
+                Vectors::pick(positive, yes.anchor[0], no.anchor[0]),
+                Vectors::pick(positive, yes.anchor[1], no.anchor[1]),
+            ],
+            separation: [
+                positive.if_positive(yes.separation[0], no.separation[0]),
+                positive.if_positive(yes.separation[1], no.separation[1]),
+            ],
+            feature: [
+                positive.if_positive(yes.feature[0], no.feature[0]),
+                positive.if_positive(yes.feature[1], no.feature[1]),
+            ],
+        }
+    }
+
+    /// The least separation.
+    #[inline(always)]
+    fn nearest(&self) -> V {
+        self.two.if_positive(self.separation[1].min(self.separation[0]), self.separation[0])
+    }
+
+    /// One where it is further than what makes a contact.
+    #[inline(always)]
+    fn is_far(&self) -> V {
+        less(V::splat(FAR), self.nearest())
+    }
+}
+
+/// Pieces at one end of their segments.
+struct AtEnd<V> {
+    distance: V,
+    found: Found<V>,
+}
+
+impl<V: Wide> AtEnd<V> {
+    /// Nowhere yet.
+    #[inline(always)]
+    fn none() -> Self {
+        let (zero, none) = (V::splat(0.0), Vectors::new(V::splat(0.0), V::splat(0.0)));
+        Self { distance: V::splat(f32::INFINITY), found: Found::single(zero, none, none, zero, zero) }
+    }
+
+    /// Takes another where it is asked to, and that is nearer.
+    #[inline(always)]
+    fn take(&mut self, asked: V, distance: V, found: &Found<V>) {
+        let nearer = less(distance, self.distance).mul(asked);
+        self.distance = nearer.if_positive(distance, self.distance);
+        self.found = Found::pick(nearer, found, &self.found);
+    }
+}
+
+#[inline(always)]
+fn not<V: Wide>(positive: V) -> V {
+    positive.if_positive(V::splat(0.0), V::splat(1.0))
+}
+
+/// One where `a >= b`, else zero.
+#[inline(always)]
+fn at_least<V: Wide>(a: V, b: V) -> V {
+    not(less(a, b))
+}
+
+/// How far a unit vector is turned from one to another: the sine of that angle.
+#[inline(always)]
+fn turned<V: Wide>(from: Vectors<V>, v: Vectors<V>, to: Vectors<V>) -> V {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    less(from.cross(to), zero).if_positive(zero.sub(one), one).mul(from.cross(v))
+}
+
+impl<V: Wide> Segments<V> {
+    /// One where a place along the segment is between its ends.
+    #[inline(always)]
+    fn is_over(&self, place: V) -> V {
+        at_least(place, V::splat(0.0)).mul(at_least(self.length, place))
+    }
+
+    /// Along the segment's own normal, as far as the piece, of which some are but a corner, is over it.
+    #[inline(always)]
+    fn against_face(&self, other: &Polygon<V>, single: V) -> Found<V> {
+        let Self { n, radius, .. } = *self;
+        let (one, zero) = (V::splat(1.0), V::splat(0.0));
+        let [from, to] = self.ends;
+        let mut edge = Face::none();
+        for number in 0..other.most {
+            let against = zero.sub(other.normals[number].dot(n));
+            edge = Face::pick(against.sub(edge.figure), &other.face(number, against), &edge);
+        }
+        let clipped = clip([to, from], n, edge.ends, [zero, radius]);
+        let feature = edge.number.add(edge.number);
+        let over = Found {
+            some: not(clipped.none),
+            two: clipped.two,
+            normal: n,
+            anchor: clipped.anchor,
+            separation: clipped.separation,
+            feature: [feature, feature.add(one)],
+        };
+        let point = other.corners[0];
+        let way = to.minus(from);
+        let (along, height, square) = (point.minus(from).dot(way), point.minus(from).dot(n), way.dot(way));
+        let beyond = V::splat(BEYOND);
+        let is_over = at_least(along, zero.sub(beyond).mul(square)).mul(at_least(one.add(beyond).mul(square), along));
+        Found::pick(single, &Found::of_corner(is_over, point, height, n, radius, zero), &over)
+    }
+
+    /// One where corners and edges of the piece come between the ends of the segment, or within a radius of these, at one of some heights.
+    #[inline(always)]
+    fn comes_to(&self, other: &Polygon<V>, [lowest, highest]: [V; 2]) -> V {
+        let Self { along, n, .. } = *self;
+        let (mut low, mut high) = (V::splat(f32::INFINITY), V::splat(f32::NEG_INFINITY));
+        for number in 0..other.most {
+            let ends = other.face(number, low).ends;
+            let (here, there) = (ends[0].minus(self.ends[0]), ends[1].minus(self.ends[0]));
+            let (first, last) = (here.dot(n), there.dot(n));
+            let (lower, upper) = (first.min(last).max(lowest), first.max(last).min(highest));
+            let (fall, comes) = (first.sub(last), at_least(upper, lower));
+            let is_level = not(fall.max(last.sub(first)));
+            for (height, part) in [(lower, V::splat(0.0)), (upper, V::splat(1.0))] {
+                let part = is_level.if_positive(part, first.sub(height).div(fall));
+                let place = here.plus(there.minus(here).scaled(part)).dot(along);
+                low = comes.if_positive(low.min(place), low);
+                high = comes.if_positive(high.max(place), high);
+            }
+        }
+        at_least(self.length.add(self.radius), low).mul(at_least(high, V::splat(0.0).sub(self.radius)))
+    }
+
+    /// What is between each segment and a piece, seen from the segment, and one where that only tells how far they are from each other.
+    #[inline(always)]
+    fn collide(&self, other: &Polygon<V>, center: Vectors<V>, reach: V) -> (Found<V>, V) {
+        let Self { radius, length, along, n, .. } = *self;
+        let zero = V::splat(0.0);
+        let from = self.ends[0];
+        let single = less(other.count, V::splat(2.0));
+        let (mut lowest, mut corner, mut number) = (V::splat(f32::INFINITY), other.corners[0], zero);
+        let mut highest = V::splat(f32::NEG_INFINITY);
+        let (mut first, mut last) = (lowest, highest);
+        for (i, &at) in other.corners[..other.most].iter().enumerate() {
+            let (height, place) = (at.minus(from).dot(n), at.minus(from).dot(along));
+            let lower = less(height, lowest);
+            corner = Vectors::pick(lower, at, corner);
+            number = lower.if_positive(V::splat(i as f32), number);
+            lowest = lower.if_positive(height, lowest);
+            (highest, first, last) = (height.max(highest), place.min(first), place.max(last));
+        }
+        let far = reach.add(radius);
+        let beyond = less(far, lowest).max(less(highest, zero.sub(far)));
+        let beyond = beyond.max(less(length.add(far), first)).max(less(last, zero.sub(far)));
+        let is_over = self.is_over(corner.minus(from).dot(along));
+        let from_center = center.minus(from);
+        let is_pressed = at_least(highest.add(radius), zero.sub(self.most_behind)).mul(self.lies);
+        let is_pressed = is_pressed.mul(self.is_over(from_center.dot(along)));
+        let is_before = is_pressed.max(at_least(from_center.dot(n), zero));
+        let against = self.against_face(other, single);
+        // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
+        let of_lowest = Found::of_corner(is_over, corner, lowest, n, radius, V::splat(512.0).add(number));
+        let mut over = Found::pick(against.some, &against, &of_lowest);
+        over.some = over.some.mul(is_before);
+        // What is between the ends has nothing to do with these.
+        let margin = V::splat(BEYOND).mul(length);
+        let is_within = at_least(first, margin).mul(at_least(length.sub(margin), last));
+        let behind = zero.sub(radius.add(self.most_behind));
+        let mut done = over.some.mul(is_within).mul(at_least(highest, behind)).max(beyond);
+        // What has come behind the segment around an end of it is not pressed into its face.
+        let doubtful = done.if_positive(zero, less(over.nearest(), zero).mul(over.some));
+        if doubtful.any_positive() {
+            // Its lowest corner may be above the surface by no more than rounding then.
+            let comes = self.comes_to(other, [behind, radius.max(lowest)]);
+            over.some = doubtful.if_positive(comes, over.some);
+        }
+        // What lies over the segment with its nearest point is nearest there.
+        done = done.max(over.some.mul(less(zero, lowest)).mul(is_over));
+        let (mut found, mut tells) = (over, zero);
+        if not(done).any_positive() {
+            let (at_end, is_distance) = self.at_ends(other, center, [single, is_before], &over, lowest);
+            found = Found::pick(done, &over, &at_end);
+            tells = done.if_positive(zero, is_distance);
+        }
+        found.some = beyond.if_positive(zero, found.some);
+        (found, tells)
+    }
+
+    /// The same of those whose ends count, `over` being what is along the normal.
+    #[inline(always)]
+    fn at_ends(
+        &self,
+        other: &Polygon<V>,
+        center: Vectors<V>,
+        [single, is_before]: [V; 2],
+        over: &Found<V>,
+        lowest: V,
+    ) -> (Found<V>, V) {
+        let n = self.n;
+        let (zero, half) = (V::splat(0.0), V::splat(0.5));
+        let (mut touched, mut nearest) = (AtEnd::none(), AtEnd::none());
+        // How far from a joint what comes out there rather along the normal of the next segment.
+        let mut beyond = V::splat(f32::NEG_INFINITY);
+        let far = single.if_positive(zero, V::splat(SAME));
+        for (number, (&end, joint)) in self.ends.iter().zip(&self.joints).enumerate() {
+            let (outward, distance) = nearest_of(other, end, single);
+            let normal = opposite(outward);
+            let limit = joint.limit;
+            let from_n = turned(n, normal, limit);
+            let goes_on = at_least(from_n, far).mul(at_least(normal.dot(limit), normal.dot(n)));
+            beyond = goes_on.mul(joint.juts_out).if_positive(beyond.max(distance), beyond);
+            let is_out = is_before.max(at_least(center.minus(end).dot(limit), zero));
+            let from_limit = joint.juts_out.if_positive(far, zero.sub(far));
+            let is_between = at_least(from_n, far).mul(at_least(turned(limit, normal, n), from_limit));
+            let may = is_between.mul(joint.touches).mul(is_out);
+            let separation = distance.sub(self.radius);
+            let anchor = end.plus(normal.scaled(half.mul(separation)));
+            let feature = single.if_positive(zero, V::splat(256.0 + number as f32));
+            let found = Found::single(V::splat(1.0), normal, anchor, separation, feature);
+            touched.take(may, distance, &found);
+            // Whoever is on the solid side, but for a joint, is let through.
+            nearest.take(is_before, distance, &found);
+        }
+        let (has_over, has_nearest) = (over.some, nearest.found.some);
+        let is_touched = touched.found.some.mul(not(touched.found.is_far()));
+        let is_deep = at_least(zero, lowest);
+        // What lies over an edge is deep in the wall below it, and touches what is before the edge; and along the segment's normal what
+        // reaches beyond it may be nearer than what is over it.
+        let is_below = is_deep.mul(less(lowest, beyond));
+        let is_nearer = over.is_far().mul(nearest.found.is_far());
+        let only_nearest = not(is_touched).mul(has_nearest);
+        let tells = only_nearest.mul(has_over.if_positive(is_below.max(is_nearer), V::splat(1.0)));
+        // Both are ways out.
+        let is_way_out = has_over.mul(is_deep).mul(at_least(lowest, touched.distance));
+        let takes_over = has_over.mul(not(is_touched).max(is_way_out));
+        let found = Found::pick(takes_over, over, &touched.found);
+        (Found::pick(tells, &nearest.found, &found), tells)
+    }
+}
+
+/// As [`Convex::nearest`](crate::model::convex::Convex::nearest), where some are but a corner: direction and distance.
+#[inline(always)]
+fn nearest_of<V: Wide>(other: &Polygon<V>, point: Vectors<V>, single: V) -> (Vectors<V>, V) {
+    let (one, zero) = (V::splat(1.0), V::splat(0.0));
+    let (normal, height, _) = other.nearest(point);
+    let away = point.minus(other.corners[0]);
+    let distance = away.dot(away).sqrt();
+    let direction = Vectors::new(away.x.div(distance), away.y.div(distance));
+    let direction = Vectors::pick(distance, direction, Vectors::new(zero, one));
+    (Vectors::pick(single, direction, normal), single.if_positive(distance, height))
+}
+
+impl<V: Wide> Shapes<V> for Segments<V> {
+    const ARE_LET_THROUGH: bool = true;
+
+    #[inline(always)]
+    fn manifolds(
+        &self,
+        pairs: &Pairs<V>,
+        time: V,
+        offset: Vectors<V>,
+        turning: [Vectors<V>; 2],
+        reach: V,
+    ) -> Moments<V> {
+        let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
+        let (turn, seen) = (rotation[1].to(rotation[0]), rotation[1].unrotate(opposite(offset)));
+        let other = self.outline.seen(turn, seen, self.outline.most);
+        let center = turn.rotate(self.center).plus(seen);
+        let (found, tells) = self.collide(&other, center, reach);
+        // Back to the frame of the world, and of body A.
+        Moments {
+            time,
+            offset,
+            turning,
+            some: found.some,
+            two: found.two,
+            tells,
+            normal: opposite(rotation[1].rotate(found.normal)),
+            anchor: [
+                rotation[1].rotate(found.anchor[0]).plus(offset),
+                rotation[1].rotate(found.anchor[1]).plus(offset),
+            ],
+            separation: found.separation,
+            feature: found.feature,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::piece_boxes::PieceBoxes;
+    use crate::collide::touch::{Meeting, Met, meet};
+    use crate::model::body::Body;
+    use crate::model::contact::{Contact, ContactPoint};
+    use crate::model::id::{GlobalId, KindId, TileId};
+    use crate::model::kind::{Kind, KindRow, Material};
+    use crate::model::math::Rot;
+    use crate::model::params::{Instructions, Params};
+    use crate::model::shape::{Segment, Shape};
+    use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
+    use crate::testing::{any_convex, any_rotation, cases};
+    use crate::tiling::blueprint::Blueprint;
+    use crate::tiling::partition::Partition;
+    use crate::tiling::tile::Tile;
+    use bytemuck::Zeroable;
+    use glam::{DVec2, Vec2};
+    use proptest::prelude::*;
+
+    /// The lane that is looked at.
+    const LANE: usize = 5;
+
+    /// Looks at a meeting in each of sixteen lanes.
+    struct Look<'a, 'm>(&'a mut Meeting<'m>, &'a Tile, &'a Setup);
+
+    impl Kernel for Look<'_, '_> {
+        type Output = ();
+        fn run<V: Lanes>(self) {
+            let Self(meeting, tile, setup) = self;
+            let (mut pairs, mut points) = (WideSegments::default(), Points::default());
+            (0..WIDE).for_each(|lane| meeting.set(lane, &mut pairs, tile, setup));
+            pairs.look::<V::Wide>(&mut points, Search::WhereManyNeedIt, setup);
+            assert!(!points.is_postponed(LANE), "all sixteen need it, or none");
+            if points.is_unsure(LANE) {
+                meeting.touch(tile, setup);
+            } else {
+                meeting.see(LANE, &points);
+            }
+        }
+    }
+
+    /// One of a few directions, so that neighbours often go straight on.
+    fn any_turn() -> impl Strategy<Value = Option<f32>> {
+        prop_oneof![Just(None), Just(Some(0.0)), (-3.0_f32..3.0).prop_map(Some)]
+    }
+
+    proptest! {
+        #![proptest_config(cases(16384))]
+
+        /// Every bit of one contact, whoever looks for it.
+        #[test]
+        fn sixteen_meet_segments_as_one_does(
+            kind in any_convex(0.05, 2.0), length in 0.02_f32..4.0, joints in [any_turn(), any_turn()],
+            (along, height) in (-3.0_f64..3.0, -0.6_f64..2.0), closeness in 0_u32..3,
+            (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
+            (spin, turns) in (prop_oneof![Just(0.0_f32), -40.0_f32..40.0], prop_oneof![Just(0.0_f32), -2.0_f32..2.0]),
+            rotations in [any_rotation(), any_rotation()], lay: bool,
+        ) {
+            let ends = [Vec2::new(-0.5 * length, 0.0), Vec2::new(0.5 * length, 0.0)];
+            let beside = |end: Vec2, way: f32, turn: f32| end + Rot::from_angle(turn).rotate(Vec2::new(way, 0.0));
+            let (before, after) = (joints[0].map(|turn| beside(ends[0], -1.0, turn)), joints[1].map(|turn| beside(ends[1], 1.0, turn)));
+            let (segment, _) = Segment::new(before, ends[0], ends[1], after).unwrap();
+            let kinds = vec![kind, Kind::new(Shape::Segment(segment), Material::default())];
+            let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
+            let blueprint = Blueprint { params: Params::default(), partition, kinds: kinds[..1].to_vec(), statics: Vec::new() };
+            let mut setup = Setup::new(&blueprint).unwrap();
+            let fixed = KindRow::fixed(&kinds[1]).unwrap();
+            setup.kinds.push(fixed);
+            let mut tile = Tile::new(TileId(0), &setup);
+            let round = setup.kinds[0].bounding_radius;
+            // Most often as near as what lies on it.
+            let near = DVec2::new(along, height * 0.3_f64.powi(closeness as i32)) + DVec2::Y * f64::from(round) * f64::from(closeness.min(1));
+            let (c, s) = (f64::from(rotations[1].c), f64::from(rotations[1].s));
+            let position = DVec2::splat(10.0) + DVec2::new(c * near.x - s * near.y, s * near.x + c * near.y);
+            let bodies = [
+                (position, rotations[0], Vec2::new(vx, vy) * 0.1_f32.powi(slowness as i32), spin),
+                (DVec2::splat(10.0), rotations[1], Vec2::ZERO, turns),
+            ];
+            for (k, (position, rotation, velocity, angular_velocity)) in bodies.into_iter().enumerate() {
+                let (id, kind) = (GlobalId(k as u64), KindId(k as u32));
+                tile.bodies.push(Body { id, kind, position, rotation, velocity, angular_velocity });
+            }
+            // Who lay on its face pressed there at another point.
+            let point = ContactPoint { normal_impulse: 1.0, feature: ContactPoint::ABSENT - 1, ..ContactPoint::NONE };
+            let normal = -(rotations[1].rotate(Vec2::Y));
+            let known = Contact { normal, rotation_b: rotations[1], points: [point, ContactPoint::NONE], ..Contact::zeroed() };
+            let known: Vec<&Contact> = Some(&known).filter(|_| lay).into_iter().collect();
+            let meeting = || {
+                let mut found = None;
+                meet(&tile, [0, 1], &PieceBoxes::default(), &known, &setup, |meeting| found = Some(meeting));
+                found.filter(|meeting| matches!(meeting.outcome, Met::Open))
+            };
+            let Some(mut expected) = meeting() else { return Ok(()) };
+            expected.touch(&tile, &setup);
+            for instructions in [Instructions::Auto, Instructions::Portable] {
+                let mut found = meeting().unwrap();
+                LaneSet::of(instructions).unwrap().run(Look(&mut found, &tile, &setup));
+                prop_assert_eq!(found.contact().is_some(), expected.contact().is_some());
+                if let (Some((contact, separation)), Some((expected, now))) = (found.contact(), expected.contact()) {
+                    prop_assert_eq!(bytemuck::bytes_of(contact), bytemuck::bytes_of(expected));
+                    for point in 0..expected.points().len() {
+                        prop_assert_eq!(separation[point].to_bits(), now[point].to_bits());
+                    }
+                }
+            }
+        }
+    }
+}
