@@ -163,8 +163,23 @@ pub(super) fn is_slow(tile: &Tile, pair: Pair, setup: &Setup) -> bool {
 /// it the compiler would take many minutes over them.
 #[inline(never)]
 pub(super) fn touch(tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-    let pair = Approach::of_pieces(tile, pair, [0, 0], setup);
-    if pair.pass_by(setup) { None } else { pair.touch(known, pair.far(setup.params.dt), setup) }
+    let mut pair = Approach::of_pieces(tile, pair, [0, 0], setup);
+    if let Some(pieces) = pair.pieces {
+        pair.lies = lies(pieces, known, setup);
+    }
+    pair.touch_unless_passing(known, setup)
+}
+
+/// Where one of two pieces is a segment, and the other had a contact with it along the normal of its face: how far behind it that may be.
+#[inline(always)]
+pub(super) fn lies(pieces: [&Piece; 2], known: Option<&Contact>, setup: &Setup) -> Lies {
+    let known = known?;
+    let has_lain = |(piece, rotation): (&Piece, Rot)| {
+        piece.side.is_some() && dot(rotation.rotate(piece.outline.normal(0)), known.normal).abs() > LIES
+    };
+    let [a, b] = pieces;
+    let lies = has_lain((a, known.rotation_a)) || has_lain((b, known.rotation_b));
+    lies.then_some(0.5 * setup.params.speculative_distance)
 }
 
 impl<'a> Approach<'a> {
@@ -185,6 +200,18 @@ impl<'a> Approach<'a> {
             pair.features = Contact::features_of(a as u32, b as u32);
         }
         pair
+    }
+
+    /// The contact of two pieces, or of bodies of one piece each, if there is one: also that of a disc that [rolls](Self::roll) on a segment.
+    fn touch_unless_passing(&self, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
+        if self.pass_by(setup) {
+            return None;
+        }
+        let far = self.far(setup.params.dt);
+        let may_roll =
+            far < setup.params.speculative_distance && !self.is_solid() && (self.a.is_round() || self.b.is_round());
+        let rolls = known.filter(|_| may_roll).and_then(|known| self.roll(known, setup));
+        rolls.or_else(|| self.touch(known, far, setup))
     }
 
     /// The contact, if there is one, of bodies whose surfaces can move so [`far`](Self::far).
@@ -244,13 +271,6 @@ impl<'a> Approach<'a> {
     #[inline(always)]
     fn is_solid(&self) -> bool {
         self.pieces.is_none_or(|pieces| pieces.iter().all(|piece| piece.side.is_none()))
-    }
-
-    /// Whether the second piece is a segment, and the first had a contact with it along the normal of its face.
-    fn has_lain(&self, known: Option<&Contact>) -> bool {
-        let (Some([_, segment]), Some(known)) = (self.pieces, known) else { return false };
-        let along = dot(known.rotation_b.rotate(segment.outline.normal(0)), known.normal).abs();
-        segment.side.is_some() && along > LIES
     }
 
     /// Whether they stay apart by where their centers are nearest within the step, as most do that are fast.

@@ -4,6 +4,7 @@ use super::broad_phase::Pair;
 use super::manifold::box_box::PREFERENCE;
 use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, negated, opposite};
 use super::wide_pairs::{Pairs, WidePairs};
+use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less};
 use crate::tiling::blueprint::Setup;
@@ -15,8 +16,8 @@ pub(super) struct WideBoxes(WidePairs);
 
 impl Shaped for WideBoxes {
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
-        self.0.set(lane, tile, bodies, pressed, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup) {
+        self.0.set(lane, tile, bodies, known, setup);
     }
 
     #[inline(always)]

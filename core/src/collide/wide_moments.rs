@@ -7,7 +7,7 @@ use super::broad_phase::Pair;
 use super::cull::passes;
 use super::manifold::chain::Lies;
 use super::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROUNDS};
-use super::wide_pairs::{Outlook, Pairs, TOUCHING, WidePairs};
+use super::wide_pairs::{Outlook, Pairs, ROLLING, TOUCHING, WidePairs};
 use super::wide_touches::both;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
@@ -39,8 +39,9 @@ pub(super) struct Moments<V> {
 
 /// The shapes of sixteen pairs.
 pub(super) trait Shapes<V> {
-    /// Whether who goes beyond one of them is let through, as by a segment: then no step of a search may bring anybody there.
-    const ARE_LET_THROUGH: bool = false;
+    /// Whether one of each two is a segment of a chain: who goes beyond that is let through, so that no step of a search may bring him
+    /// there; and discs roll on it.
+    const OF_SEGMENTS: bool = false;
 
     /// Their manifolds after some seconds, in which B has come to `offset` from A, and both have turned so. Further ones than `reach`
     /// may give none.
@@ -71,22 +72,19 @@ pub(super) trait Shaped: Default {
     const NEED_REGISTERS: bool = false;
 
     /// As [`Outlook::set`].
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup);
 
     /// Looks at all lanes.
     fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
 }
 
 /// Sixteen pairs of pieces of two bodies.
-pub(super) trait WidePieces: Default {
+pub(super) trait WidePieces: Shaped {
     /// The bodies.
     fn pairs(&mut self) -> &mut WidePairs;
 
-    /// Puts two pieces of the bodies of a lane into it. Where the second is a segment, whether the first [lies](Lies) on it.
+    /// Puts two pieces of the bodies of a lane into it. Where one is a segment, whether the other [lies](Lies) on it.
     fn set_pieces(&mut self, lane: usize, pieces: [&Piece; 2], lies: Lies);
-
-    /// As [`Shaped::look`].
-    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup);
 }
 
 /// What can be said of pairs whose contacts have up to two points.
@@ -100,8 +98,8 @@ impl<S: Shaped> Outlook for PointOutlook<S> {
     const NEEDS_REGISTERS: bool = S::NEED_REGISTERS;
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, pressed, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, known, setup);
     }
 
     #[inline(always)]
@@ -231,8 +229,15 @@ impl Points {
         let is_now = less(separation, scale.mul(V::splat(NEAR))).max(rests);
         let is_now = now.tells.if_positive(zero, is_now);
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
-        let asked = passes.if_positive(zero, now.some);
-        let later = is_now.if_positive(zero, asked);
+        let mut asked = passes.if_positive(zero, now.some);
+        let (mut rolling, mut rolls) = (now, zero);
+        let may_roll = pairs.is_round().mul(pairs.pressed).mul(passes.if_positive(zero, is_slow));
+        if S::OF_SEGMENTS && may_roll.any_positive() {
+            (rolling, rolls) = pairs.roll_on(shapes, setup);
+            rolls = rolls.mul(may_roll);
+        }
+        asked = asked.max(rolls);
+        let later = is_now.max(rolls).if_positive(zero, asked);
         let near = less(separation, speculative);
         let within = pairs.ahead(near, setup);
         let later = pairs.come_near(&now, within).if_positive(later, zero);
@@ -246,6 +251,7 @@ impl Points {
             (at, found) = pairs.first_moments(shapes, &now, later, reach, within);
             meets = meets.max(found);
         }
+        (at, meets) = (Moments::pick(rolls, &rolling, &at), meets.max(rolls));
         meets = at.tells.if_positive(zero, meets.mul(asked).mul(at.some));
         let moved = pairs.between.dot(at.normal).mul(at.time);
         let closing = pairs.closing_of_both(&at);
@@ -263,7 +269,7 @@ impl Points {
             at.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
-        let unsure = if S::ARE_LET_THROUGH { zero } else { pairs.run_into_corners(&at, closing[0]) };
+        let unsure = if S::OF_SEGMENTS { zero } else { pairs.run_into_corners(&at, closing[0]) };
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
@@ -311,6 +317,36 @@ impl<V: Wide> Pairs<V> {
         shapes.manifolds(self, time, offset, turning, reach)
     }
 
+    /// One where a body is round.
+    #[inline(always)]
+    fn is_round(&self) -> V {
+        let (one, zero) = (V::splat(1.0), V::splat(0.0));
+        self.half[0].x.if_positive(self.half[1].x.if_positive(zero, one), one)
+    }
+
+    /// Round bodies that roll on segments, as they are in the middle of the step, and one where they do: see `roll` of `touch/kept.rs`.
+    #[inline(always)]
+    fn roll_on<S: Shapes<V>>(&self, shapes: &S, setup: &Setup) -> (Moments<V>, V) {
+        let (zero, half) = (V::splat(0.0), V::splat(0.5));
+        let time = half.mul(self.dt);
+        let mut then = self.moments(shapes, time, V::splat(f32::INFINITY));
+        let (anchor, separation) = then.nearest();
+        let normal = then.normal;
+        let on_a = self.swing(0, then.turning[0], anchor, normal);
+        let on_b = self.swing(1, then.turning[1], anchor.minus(then.offset), normal);
+        let nearer = self.between.dot(normal).mul(time).add(on_b.sub(on_a));
+        let now = separation.sub(nearer);
+        let (scale, speculative) = (self.scale(), V::splat(setup.params.speculative_distance));
+        let most = scale.mul(V::splat(TOUCHING)).min(speculative);
+        let rolls = less(absolute(nearer), scale.mul(V::splat(ROLLING))).mul(less(now, most));
+        let rolls = then.tells.if_positive(zero, rolls.mul(then.some));
+        // As if they had come so near at once, along the normal.
+        then.anchor[0] = anchor.minus(normal.scaled(half.mul(nearer)));
+        then.offset = then.offset.minus(normal.scaled(nearer));
+        (then.separation[0], then.time, then.two) = (now, zero, zero);
+        (then, rolls)
+    }
+
     /// The greatest speed at which anything of B comes nearer to anything of A along a normal, in m/s.
     #[inline(always)]
     fn bound_along(&self, normal: Vectors<V>) -> V {
@@ -351,7 +387,7 @@ impl<V: Wide> Pairs<V> {
         let zero = V::splat(0.0);
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
         let scale = self.scale();
-        for _ in 0..if S::ARE_LET_THROUGH { MORE_ROUNDS } else { ROUNDS } {
+        for _ in 0..if S::OF_SEGMENTS { MORE_ROUNDS } else { ROUNDS } {
             let (anchor, separation) = at.nearest();
             let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
             going = self.come_near(&at, dt).if_positive(going, zero);
@@ -360,7 +396,7 @@ impl<V: Wide> Pairs<V> {
             }
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = self.closing(anchor, at.offset, at.normal).max(zero);
-            let closing = if S::ARE_LET_THROUGH { bound } else { closing };
+            let closing = if S::OF_SEGMENTS { bound } else { closing };
             let speed = V::splat(0.5).mul(bound.add(closing));
             let way = at.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
             let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);

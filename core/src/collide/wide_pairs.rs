@@ -2,7 +2,7 @@
 //! touches within the step (`wide_touches.rs`).
 
 use crate::collide::broad_phase::Pair;
-use crate::collide::touch::scale_of;
+use crate::collide::touch::{pressed, scale_of};
 use crate::collide::wide_moments::Search;
 use crate::collide::wide_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
@@ -41,8 +41,8 @@ pub(super) trait Outlook: Default {
     /// Whether it takes longer than one pair after another where lanes are no registers.
     const NEEDS_REGISTERS: bool = false;
 
-    /// Puts a pair into a lane, and whether they pressed at each other in the last step.
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup);
+    /// Puts a pair into a lane, and the contact that they had in the last step.
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup);
 
     /// Tells of all lanes, also of those that were not set.
     fn look<V: Wide>(&mut self, search: Search, setup: &Setup);
@@ -76,8 +76,8 @@ pub(super) struct RoundOutlook {
 
 impl WidePairs {
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, tile: &Tile, [a, b]: Pair, pressed: bool, setup: &Setup) {
-        let (bodies, a, b) = (&tile.bodies, a as usize, b as usize);
+    pub(super) fn set(&mut self, lane: usize, tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) {
+        let (bodies, [a, b]) = (&tile.bodies, pair.map(|body| body as usize));
         let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
         self.a[lane] = moves(a);
@@ -85,7 +85,7 @@ impl WidePairs {
         self.between[lane] = [offset.x, offset.y, bodies.angular_velocity[a], bodies.angular_velocity[b]];
         let (kind_a, kind_b) = (setup.kind(bodies.kind[a]), setup.kind(bodies.kind[b]));
         (self.kind_a[lane], self.kind_b[lane]) = (kind_a.outline(), kind_b.outline());
-        self.pressed[lane] = if pressed { 1.0 } else { 0.0 };
+        self.pressed[lane] = if pressed(tile, pair, known, setup) { 1.0 } else { 0.0 };
         self.fixed[lane] = if kind_a.inv_mass * kind_b.inv_mass == 0.0 { 1.0 } else { 0.0 };
     }
 
@@ -210,8 +210,8 @@ impl<V: Wide> Pairs<V> {
 
 impl Outlook for RoundOutlook {
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
-        self.pairs.set(lane, tile, bodies, pressed, setup);
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup) {
+        self.pairs.set(lane, tile, bodies, known, setup);
     }
 
     #[inline(always)]
@@ -323,7 +323,7 @@ mod tests {
         setup: &Setup,
     ) -> Option<Option<(Contact, [f32; 2])>> {
         let mut outlook = O::default();
-        (0..WIDE).for_each(|lane| outlook.set(lane, tile, [0, 1], known.is_some(), setup));
+        (0..WIDE).for_each(|lane| outlook.set(lane, tile, [0, 1], known, setup));
         outlook.look::<V>(Search::WhereManyNeedIt, setup);
         assert!(!outlook.is_postponed(LANE), "all sixteen need it, or none");
         (!outlook.is_unsure(LANE)).then(|| outlook.meets(LANE).then(|| outlook.contact(LANE, known)))

@@ -6,6 +6,7 @@ use super::manifold::chain::Lies;
 use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, WidePieces, opposite};
 use super::wide_outlines::{Face, Polygon, WideOutlines, clip};
 use super::wide_pairs::{Pairs, WidePairs};
+use crate::model::contact::Contact;
 use crate::model::piece::Piece;
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less};
@@ -23,15 +24,19 @@ impl Shaped for WidePolygons {
     const NEED_REGISTERS: bool = true;
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, pressed: bool, setup: &Setup) {
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup) {
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
-        self.pairs.set(lane, tile, bodies, pressed, setup);
+        self.pairs.set(lane, tile, bodies, known, setup);
         self.set_pieces(lane, [&kinds[0].pieces[0], &kinds[1].pieces[0]], None);
     }
 
     #[inline(always)]
     fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
-        WidePieces::look::<V>(self, points, search, setup);
+        let mut pairs = self.pairs.load::<V>(setup);
+        let [a, b] = &self.outlines;
+        pairs.radius = [a.radii(), b.radii()];
+        let most = a.most_corners().max(b.most_corners());
+        points.look(&pairs, &Polygons([a.polygon(most), b.polygon(most)]), search, setup);
     }
 }
 
@@ -44,15 +49,6 @@ impl WidePieces for WidePolygons {
     #[inline(always)]
     fn set_pieces(&mut self, lane: usize, pieces: [&Piece; 2], _: Lies) {
         self.outlines.iter_mut().zip(pieces).for_each(|(outlines, piece)| outlines.set(lane, piece));
-    }
-
-    #[inline(always)]
-    fn look<V: Wide>(&self, points: &mut Points, search: Search, setup: &Setup) {
-        let mut pairs = self.pairs.load::<V>(setup);
-        let [a, b] = &self.outlines;
-        pairs.radius = [a.radii(), b.radii()];
-        let most = a.most_corners().max(b.most_corners());
-        points.look(&pairs, &Polygons([a.polygon(most), b.polygon(most)]), search, setup);
     }
 }
 

@@ -1,16 +1,20 @@
 //! Segments of chains and convex pieces, sixteen pairs at once: what `manifold/chain.rs` does for one, in the same words and with the same
 //! bits.
 
+use super::broad_phase::Pair;
 use super::manifold::chain::{BEYOND, FAR, Lies, SAME};
-use super::wide_moments::{Moments, Points, Search, Shapes, WidePieces, negated, opposite};
+use super::touch::lies;
+use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, WidePieces, negated, opposite};
 use super::wide_outlines::{Face, Polygon, WideOutlines, clip};
 use super::wide_pairs::{Pairs, WidePairs};
+use crate::model::contact::Contact;
 use crate::model::piece::{Joint, Piece};
-use crate::parallel::lanes::{Quad, WIDE, Wide};
+use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
 use crate::parallel::vectors::{Vectors, less};
 use crate::tiling::blueprint::Setup;
+use crate::tiling::tile::Tile;
 
-/// A piece of body A of sixteen pairs, and the segment that body B is.
+/// A piece of one body of sixteen pairs, and the segment that the other is.
 #[derive(Default, Debug)]
 pub(super) struct WideSegments {
     pairs: WidePairs,
@@ -21,23 +25,19 @@ pub(super) struct WideSegments {
     ends: [Quad; WIDE],
     /// Where it starts, and where it ends: see [`joint`].
     joints: [[Quad; WIDE]; 2],
+    /// One where the segment is body A, else zero.
+    are_first: WideRow,
 }
 
-impl WidePieces for WideSegments {
-    #[inline(always)]
-    fn pairs(&mut self) -> &mut WidePairs {
-        &mut self.pairs
-    }
+impl Shaped for WideSegments {
+    const NEED_REGISTERS: bool = true;
 
     #[inline(always)]
-    fn set_pieces(&mut self, lane: usize, [piece, segment]: [&Piece; 2], lies: Lies) {
-        self.outlines.set(lane, piece);
-        let (is_lying, most) = lies.map_or((0.0, 0.0), |most| (1.0, most));
-        self.centers[lane] = [piece.center.x, piece.center.y, is_lying, most];
-        let [to, from] = segment.outline.edge(0);
-        self.ends[lane] = [from.x, from.y, to.x, to.y];
-        let side = segment.side.expect("a segment is solid from one side");
-        (self.joints[0][lane], self.joints[1][lane]) = (joint(side.start), joint(side.end));
+    fn set(&mut self, lane: usize, tile: &Tile, bodies: Pair, known: Option<&Contact>, setup: &Setup) {
+        let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
+        let pieces = [&kinds[0].pieces[0], &kinds[1].pieces[0]];
+        self.pairs.set(lane, tile, bodies, known, setup);
+        self.set_pieces(lane, pieces, lies(pieces, known, setup));
     }
 
     #[inline(always)]
@@ -60,8 +60,29 @@ impl WidePieces for WideSegments {
             along,
             n: Vectors::new(negated(along.y), along.x),
             joints: [Joints::load(&self.joints[0]), Joints::load(&self.joints[1])],
+            are_first: V::load(&self.are_first),
         };
         points.look(&pairs, &segments, search, setup);
+    }
+}
+
+impl WidePieces for WideSegments {
+    #[inline(always)]
+    fn pairs(&mut self) -> &mut WidePairs {
+        &mut self.pairs
+    }
+
+    #[inline(always)]
+    fn set_pieces(&mut self, lane: usize, [a, b]: [&Piece; 2], lies: Lies) {
+        let ([piece, segment], is_first) = if a.side.is_some() { ([b, a], 1.0) } else { ([a, b], 0.0) };
+        self.are_first[lane] = is_first;
+        self.outlines.set(lane, piece);
+        let (is_lying, most) = lies.map_or((0.0, 0.0), |most| (1.0, most));
+        self.centers[lane] = [piece.center.x, piece.center.y, is_lying, most];
+        let [to, from] = segment.outline.edge(0);
+        self.ends[lane] = [from.x, from.y, to.x, to.y];
+        let side = segment.side.expect("a segment is solid from one side");
+        (self.joints[0][lane], self.joints[1][lane]) = (joint(side.start), joint(side.end));
     }
 }
 
@@ -103,6 +124,8 @@ struct Segments<V> {
     along: Vectors<V>,
     n: Vectors<V>,
     joints: [Joints<V>; 2],
+    /// One where it is of body A, else zero.
+    are_first: V,
 }
 
 /// Manifolds of one point or two, seen from the segment.
@@ -385,7 +408,7 @@ fn nearest_of<V: Wide>(other: &Polygon<V>, point: Vectors<V>, single: V) -> (Vec
 }
 
 impl<V: Wide> Shapes<V> for Segments<V> {
-    const ARE_LET_THROUGH: bool = true;
+    const OF_SEGMENTS: bool = true;
 
     #[inline(always)]
     fn manifolds(
@@ -397,11 +420,18 @@ impl<V: Wide> Shapes<V> for Segments<V> {
         reach: V,
     ) -> Moments<V> {
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
-        let (turn, seen) = (rotation[1].to(rotation[0]), rotation[1].unrotate(opposite(offset)));
+        let way = Vectors::pick(self.are_first, offset, opposite(offset));
+        let own = Vectors::pick(self.are_first, rotation[0], rotation[1]);
+        let (turn, seen) = (own.to(Vectors::pick(self.are_first, rotation[1], rotation[0])), own.unrotate(way));
         let other = self.outline.seen(turn, seen, self.outline.most);
         let center = turn.rotate(self.center).plus(seen);
         let (found, tells) = self.collide(&other, center, reach);
         // Back to the frame of the world, and of body A.
+        let (normal, mut anchor) = (own.rotate(found.normal), found.anchor);
+        for anchor in &mut anchor {
+            let from_center = own.rotate(*anchor);
+            *anchor = Vectors::pick(self.are_first, from_center, from_center.plus(offset));
+        }
         Moments {
             time,
             offset,
@@ -409,11 +439,8 @@ impl<V: Wide> Shapes<V> for Segments<V> {
             some: found.some,
             two: found.two,
             tells,
-            normal: opposite(rotation[1].rotate(found.normal)),
-            anchor: [
-                rotation[1].rotate(found.anchor[0]).plus(offset),
-                rotation[1].rotate(found.anchor[1]).plus(offset),
-            ],
+            normal: Vectors::pick(self.are_first, normal, opposite(normal)),
+            anchor,
             separation: found.separation,
             feature: found.feature,
         }
@@ -478,7 +505,7 @@ mod tests {
             (along, height) in (-3.0_f64..3.0, -0.6_f64..2.0), closeness in 0_u32..3,
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
             (spin, turns) in (prop_oneof![Just(0.0_f32), -40.0_f32..40.0], prop_oneof![Just(0.0_f32), -2.0_f32..2.0]),
-            rotations in [any_rotation(), any_rotation()], lay: bool,
+            rotations in [any_rotation(), any_rotation()], lay: bool, is_first: bool,
         ) {
             let ends = [Vec2::new(-0.5 * length, 0.0), Vec2::new(0.5 * length, 0.0)];
             let beside = |end: Vec2, way: f32, turn: f32| end + Rot::from_angle(turn).rotate(Vec2::new(way, 0.0));
@@ -506,12 +533,13 @@ mod tests {
             }
             // Who lay on its face pressed there at another point.
             let point = ContactPoint { normal_impulse: 1.0, feature: ContactPoint::ABSENT - 1, ..ContactPoint::NONE };
-            let normal = -(rotations[1].rotate(Vec2::Y));
-            let known = Contact { normal, rotation_b: rotations[1], points: [point, ContactPoint::NONE], ..Contact::zeroed() };
+            let (normal, points) = (rotations[1].rotate(Vec2::Y), [point, ContactPoint::NONE]);
+            let [rotation_a, rotation_b] = if is_first { [rotations[1], rotations[0]] } else { rotations };
+            let known = Contact { normal, rotation_a, rotation_b, points, ..Contact::zeroed() };
             let known: Vec<&Contact> = Some(&known).filter(|_| lay).into_iter().collect();
             let meeting = || {
                 let mut found = None;
-                meet(&tile, [0, 1], &PieceBoxes::default(), &known, &setup, |meeting| found = Some(meeting));
+                meet(&tile, if is_first { [1, 0] } else { [0, 1] }, &PieceBoxes::default(), &known, &setup, |meeting| found = Some(meeting));
                 found.filter(|meeting| matches!(meeting.outcome, Met::Open))
             };
             let Some(mut expected) = meeting() else { return Ok(()) };

@@ -188,7 +188,7 @@ impl<V: Wide> Pairs<V> {
 
     /// How far a body's surface, at a point, comes along a normal as it turns so.
     #[inline(always)]
-    fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
+    pub(super) fn swing(&self, side: usize, turning: Vectors<V>, arm: Vectors<V>, normal: Vectors<V>) -> V {
         let way = turning.x.sub(V::splat(1.0)).mul(arm.dot(normal)).add(turning.y.mul(arm.cross(normal)));
         self.not_round(side).mul(way)
     }

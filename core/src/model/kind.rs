@@ -141,8 +141,10 @@ pub(crate) enum Form {
     Box = 1,
     /// As those of the one convex piece that it is, which has faces and is solid from all sides.
     Polygon = 2,
+    /// As those of a segment of a chain.
+    Segment = 3,
     /// As those of the convex pieces that it is made of.
-    Pieces = 3,
+    Pieces = 4,
 }
 
 impl Form {
@@ -253,7 +255,11 @@ impl KindRow {
             Shape::Circle { radius } => (Form::Round, Vec2::ZERO, *radius),
             Shape::Box { half } => (Form::Box, *half, 0.0),
             _ => {
-                let form = if matches!(&pieces[..], [only] if only.has_faces()) { Form::Polygon } else { Form::Pieces };
+                let form = match &pieces[..] {
+                    [only] if only.side.is_some() => Form::Segment,
+                    [only] if only.has_faces() => Form::Polygon,
+                    _ => Form::Pieces,
+                };
                 (form, extent(&pieces, bounding_radius), 0.0)
             }
         };

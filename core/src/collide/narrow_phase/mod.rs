@@ -10,11 +10,12 @@ pub(crate) use contacts::Contacts;
 use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
-use crate::collide::touch::{is_slow, pressed, recycle, touch};
+use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::WideBoxes;
 use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
 use crate::collide::wide_polygons::WidePolygons;
+use crate::collide::wide_segments::WideSegments;
 use crate::model::contact::{Contact, PairKey};
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::parallel::team::Team;
@@ -102,8 +103,8 @@ struct FindAmong<'a> {
 /// So many pairs are sorted by kinds at a time.
 const BLOCK: usize = 256;
 
-/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another. Of each kind there are
-/// two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
+/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another, of a segment and any of
+/// these. Of each kind there are two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
 /// do. And a last one of pairs with other shapes.
 struct Lists {
     /// Places in the block.
@@ -111,7 +112,7 @@ struct Lists {
     count: [usize; LISTS],
 }
 
-const LISTS: usize = 9;
+const LISTS: usize = 11;
 
 /// Of boxes.
 const NEW_BOXES: usize = 4;
@@ -121,15 +122,20 @@ const KNOWN_BOXES: usize = 5;
 const NEW_POLYGONS: usize = 6;
 const KNOWN_POLYGONS: usize = 7;
 
+/// Of segments.
+const NEW_ON_SEGMENTS: usize = 8;
+const KNOWN_ON_SEGMENTS: usize = 9;
+
 /// Of bodies one of which is made of pieces, or is round and meets a polygon.
-const OF_PIECES: usize = 8;
+const OF_PIECES: usize = 10;
 
 /// The first list of two [`Form`](crate::model::kind::Form)s.
-const LIST_OF: [[usize; 4]; 4] = [
-    [0, 2, OF_PIECES, OF_PIECES],
-    [2, NEW_BOXES, NEW_POLYGONS, OF_PIECES],
-    [OF_PIECES, NEW_POLYGONS, NEW_POLYGONS, OF_PIECES],
-    [OF_PIECES; 4],
+const LIST_OF: [[usize; 5]; 5] = [
+    [0, 2, OF_PIECES, NEW_ON_SEGMENTS, OF_PIECES],
+    [2, NEW_BOXES, NEW_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
+    [OF_PIECES, NEW_POLYGONS, NEW_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
+    [NEW_ON_SEGMENTS, NEW_ON_SEGMENTS, NEW_ON_SEGMENTS, OF_PIECES, OF_PIECES],
+    [OF_PIECES; 5],
 ];
 
 impl Lists {
@@ -193,7 +199,9 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
         };
         // Once for all blocks: to fill them with zeros takes longer than a few pairs.
         let (mut round, mut boxes) = (RoundOutlook::default(), PointOutlook::<WideBoxes>::default());
-        let (mut polygons, mut meetings) = (PointOutlook::<WidePolygons>::default(), Meetings::default());
+        let (mut polygons, mut segments) =
+            (PointOutlook::<WidePolygons>::default(), PointOutlook::<WideSegments>::default());
+        let mut meetings = Meetings::default();
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
@@ -202,10 +210,13 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             }
             block.keep_known(&mut lists, [KNOWN_BOXES, NEW_BOXES], tile, setup);
             block.keep_known(&mut lists, [KNOWN_POLYGONS, NEW_POLYGONS], tile, setup);
+            block.keep_known(&mut lists, [KNOWN_ON_SEGMENTS, NEW_ON_SEGMENTS], tile, setup);
             let list = lists.get(NEW_BOXES);
             setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut boxes });
             let list = lists.get(NEW_POLYGONS);
             setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut polygons });
+            let list = lists.get(NEW_ON_SEGMENTS);
+            setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut segments });
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), found);
             } else {
@@ -289,7 +300,7 @@ impl Block<'_> {
                 if in_lanes {
                     for (lane, &place) in places.iter().enumerate() {
                         let Named { bodies, known, .. } = self.named[usize::from(place)];
-                        outlook.set(lane, tile, bodies, pressed(tile, bodies, known, setup), setup);
+                        outlook.set(lane, tile, bodies, known, setup);
                     }
                     outlook.look::<V::Wide>(search, setup);
                 }

@@ -95,7 +95,10 @@ impl Approach<'_> {
         let on_b = self.b.swing(then.turning_b, point.anchor - then.offset, normal);
         let nearer = dot(self.between, normal) * then.time + (on_b - on_a);
         let now = point.separation - nearer;
-        if nearer.abs() >= scale * ROLLING || now >= scale * TOUCHING || then.manifold.is_distance() {
+        if nearer.abs() >= scale * ROLLING
+            || now >= min(scale * TOUCHING, setup.params.speculative_distance)
+            || then.manifold.is_distance()
+        {
             return None;
         }
         // As if they had come so near at once, along the normal.

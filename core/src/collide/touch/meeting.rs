@@ -17,7 +17,7 @@ pub(in crate::collide) struct Meeting<'a> {
     features: u32,
     /// The contact that they had in the last step.
     known: Option<&'a Contact>,
-    /// Where the second piece is a segment.
+    /// Where one of them is a segment.
     lies: Lies,
     pub(in crate::collide) outcome: Met,
 }
@@ -35,22 +35,20 @@ pub(in crate::collide) enum Met {
 impl<'a> Meeting<'a> {
     /// Whether a piece meets a segment of a chain.
     pub(in crate::collide) fn is_on_segment(&self) -> bool {
-        self.pieces[1].side.is_some()
+        self.pieces.iter().any(|piece| piece.side.is_some())
     }
 
     /// Looks again, which only those need that are open.
     pub(in crate::collide) fn touch(&mut self, tile: &Tile, setup: &Setup) {
         let mut pair = Approach::new(tile, self.bodies, setup);
         (pair.pieces, pair.features, pair.lies) = (Some(self.pieces), self.features, self.lies);
-        let found = if pair.pass_by(setup) { None } else { pair.touch(self.known, pair.far(setup.params.dt), setup) };
-        self.outcome = Met::from(found);
+        self.outcome = Met::from(pair.touch_unless_passing(self.known, setup));
     }
 
     /// Puts it into a lane.
     #[inline(always)]
     pub(in crate::collide) fn set<S: WidePieces>(&self, lane: usize, to: &mut S, tile: &Tile, setup: &Setup) {
-        let pressed = super::pressed(tile, self.bodies, self.known, setup);
-        to.pairs().set(lane, tile, self.bodies, pressed, setup);
+        to.pairs().set(lane, tile, self.bodies, self.known, setup);
         to.set_pieces(lane, self.pieces, self.lies);
     }
 
@@ -104,20 +102,20 @@ pub(in crate::collide) fn meet<'a>(
             ([&pieces_a[number_a], &pieces_b[number_b]], Contact::features_of(number_a as u32, number_b as u32));
         (pair.pieces, pair.features) = (Some(pieces), features);
         let known = known.iter().copied().find(|known| known.pieces() == features);
-        pair.lies = None;
-        let rolled = known.filter(|_| is_slow && rolls).and_then(|known| pair.roll(known, setup));
+        let mut lies = None;
+        let rolled = known.filter(|_| is_slow && rolls && pair.is_solid()).and_then(|known| pair.roll(known, setup));
         let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
         let outcome = match (kept, rolled) {
             (Some(separation), _) => Met::Known(separation),
             (None, Some((contact, separation))) => Met::Found(contact, separation),
             _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
-            _ if pieces[1].side.is_some() => {
-                pair.lies = pair.has_lain(known).then_some(0.5 * setup.params.speculative_distance);
+            _ if !pair.is_solid() => {
+                lies = super::lies(pieces, known, setup);
                 Met::Open
             }
             _ => Met::from(pair.touch(known, far, setup)),
         };
-        met(Meeting { bodies, pieces, features, known, lies: pair.lies, outcome });
+        met(Meeting { bodies, pieces, features, known, lies, outcome });
     };
     if pieces_a.len() * pieces_b.len() == 1 {
         meet(0, 0);

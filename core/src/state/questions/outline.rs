@@ -29,7 +29,7 @@ impl<'a> Outline<'a> {
         let figure = match kind.form {
             Form::Round => Figure::Circle { radius: kind.radius },
             Form::Box => Figure::Box { half: kind.extent },
-            Form::Polygon | Form::Pieces => Figure::Pieces(&kind.pieces),
+            Form::Polygon | Form::Segment | Form::Pieces => Figure::Pieces(&kind.pieces),
         };
         Self { id: body.id, center: body.position, rotation: body.rotation, figure }
     }
