@@ -1,6 +1,7 @@
 //! What this crate's own tests share.
 
-use crate::model::kind::{Kind, Material};
+use crate::collide::manifold::nearest;
+use crate::model::kind::{Kind, KindRow, Material};
 use crate::model::math::Rot;
 use crate::model::shape::Shape;
 use glam::{DVec2, Vec2};
@@ -56,6 +57,19 @@ pub(crate) fn any_rotation() -> impl Strategy<Value = Rot> {
         1 => Just(Rot { c: 0.0, s: -1.0 }),
         4 => (-3.2_f32..3.2).prop_map(Rot::from_angle),
     ]
+}
+
+/// How far surfaces are to be from each other, in m: where some number is named, about touching.
+pub(crate) fn any_gap() -> impl Strategy<Value = Option<f32>> {
+    prop_oneof![Just(None), (-0.004_f32..0.004).prop_map(Some)]
+}
+
+/// Where the second body is to be, seen from the first, if its surface is to be so far from that: moved there straight from an offset.
+pub(crate) fn at_gap(gap: Option<f32>, [a, b]: [&KindRow; 2], rotations: [Rot; 2], offset: DVec2) -> DVec2 {
+    let Some(gap) = gap else { return offset };
+    let manifold = nearest(a, rotations[0], b, rotations[1], offset.as_vec2(), f32::INFINITY);
+    let separation = manifold.nearest().map_or(gap, |point| point.separation);
+    offset + (manifold.normal * (gap - separation)).as_dvec2()
 }
 
 /// The outline of a convex shape in double precision: corners, and how far around them it reaches.

@@ -10,6 +10,7 @@ pub(crate) mod proxies;
 pub(crate) mod seams;
 mod touch;
 mod wide_boxes;
+mod wide_discs;
 mod wide_moments;
 mod wide_outlines;
 mod wide_pairs;

@@ -202,14 +202,14 @@ impl<'a> Approach<'a> {
         pair
     }
 
-    /// The contact of two pieces, or of bodies of one piece each, if there is one: also that of a disc that [rolls](Self::roll) on a segment.
+    /// The contact of two pieces, or of bodies of one piece each, if there is one: also that of a disc that [rolls](Self::roll) on another.
     fn touch_unless_passing(&self, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         if self.pass_by(setup) {
             return None;
         }
         let far = self.far(setup.params.dt);
-        let may_roll =
-            far < setup.params.speculative_distance && !self.is_solid() && (self.a.is_round() || self.b.is_round());
+        let has_round = self.pieces.is_some() && (self.a.is_round() || self.b.is_round());
+        let may_roll = has_round && far < setup.params.speculative_distance;
         let rolls = known.filter(|_| may_roll).and_then(|known| self.roll(known, setup));
         rolls.or_else(|| self.touch(known, far, setup))
     }

@@ -40,8 +40,11 @@ pub(super) struct Moments<V> {
 /// The shapes of sixteen pairs.
 pub(super) trait Shapes<V> {
     /// Whether one of each two is a segment of a chain: who goes beyond that is let through, so that no step of a search may bring him
-    /// there; and discs roll on it.
+    /// there.
     const OF_SEGMENTS: bool = false;
+
+    /// Whether one of each two may be a disc, which rolls.
+    const WITH_DISCS: bool = false;
 
     /// Their manifolds after some seconds, in which B has come to `offset` from A, and both have turned so. Further ones than `reach`
     /// may give none.
@@ -226,13 +229,16 @@ impl Points {
         let is_slow = less(far, speculative);
         let scale = pairs.scale();
         let rests = less(separation, scale.mul(V::splat(TOUCHING))).mul(is_slow).mul(pairs.pressed);
-        let is_now = less(separation, scale.mul(V::splat(NEAR))).max(rests);
+        // Discs that come straight touch in a moment that is known exactly.
+        let has_straight = S::WITH_DISCS && !S::OF_SEGMENTS;
+        let straight = if has_straight { pairs.is_straight() } else { zero };
+        let is_now = less(separation, straight.if_positive(zero, scale.mul(V::splat(NEAR)))).max(rests);
         let is_now = now.tells.if_positive(zero, is_now);
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
         let mut asked = passes.if_positive(zero, now.some);
         let (mut rolling, mut rolls) = (now, zero);
         let may_roll = pairs.is_round().mul(pairs.pressed).mul(passes.if_positive(zero, is_slow));
-        if S::OF_SEGMENTS && may_roll.any_positive() {
+        if S::WITH_DISCS && may_roll.any_positive() {
             (rolling, rolls) = pairs.roll_on(shapes, setup);
             rolls = rolls.mul(may_roll);
         }
@@ -241,6 +247,7 @@ impl Points {
         let near = less(separation, speculative);
         let within = pairs.ahead(near, setup);
         let later = pairs.come_near(&now, within).if_positive(later, zero);
+        let (straight, later) = (straight.mul(later), straight.if_positive(zero, later));
         later.store(&mut self.postponed);
         let count = self.postponed.iter().fold(0, |count, &later| count + usize::from(later > 0.0));
         let mut at = now;
@@ -268,8 +275,8 @@ impl Points {
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
             at.feature[point].store(&mut self.feature[point]);
         }
-        // Speeds that overflow tell of no other moment; and who may pass over a corner is looked at alone.
-        let unsure = if S::OF_SEGMENTS { zero } else { pairs.run_into_corners(&at, closing[0]) };
+        // Speeds that overflow tell of no other moment; and who may pass over a corner, or comes straight, is looked at alone.
+        let unsure = if S::WITH_DISCS { straight } else { pairs.run_into_corners(&at, closing[0]) };
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
         V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
@@ -315,6 +322,12 @@ impl<V: Wide> Pairs<V> {
     fn moments(&self, shapes: &impl Shapes<V>, time: V, reach: V) -> Moments<V> {
         let (offset, turning) = self.moved(time);
         shapes.manifolds(self, time, offset, turning, reach)
+    }
+
+    /// One where nothing turns by as much as counts (see `touch/straight.rs`).
+    #[inline(always)]
+    fn is_straight(&self) -> V {
+        less(self.sweep(0).add(self.sweep(1)).mul(self.dt), self.scale().mul(V::splat(NEAR)))
     }
 
     /// One where a body is round.

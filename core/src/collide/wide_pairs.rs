@@ -279,6 +279,7 @@ mod tests {
     use super::*;
     use crate::collide::touch::touch;
     use crate::collide::wide_boxes::WideBoxes;
+    use crate::collide::wide_discs::WideDiscs;
     use crate::collide::wide_moments::PointOutlook;
     use crate::collide::wide_polygons::WidePolygons;
     use crate::model::body::Body;
@@ -286,7 +287,7 @@ mod tests {
     use crate::model::kind::Form;
     use crate::model::params::{Instructions, Params};
     use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
-    use crate::testing::{any_convex, any_rotation, cases};
+    use crate::testing::{any_convex, any_gap, any_rotation, at_gap, cases};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::Partition;
     use bytemuck::Zeroable;
@@ -306,8 +307,9 @@ mod tests {
             let mut forms = [0, 1].map(|body| setup.kind(tile.bodies.kind[body]).form);
             forms.sort_by_key(|&form| form as usize);
             match forms {
-                // Who pressed rolls, where one is round, and does not touch anew.
+                // Who pressed rolls, on what is round or a box, and does not touch anew.
                 [Form::Round, Form::Round | Form::Box] => told::<V::Wide, RoundOutlook>(tile, None, setup),
+                [Form::Round, Form::Polygon] => told::<V::Wide, PointOutlook<WideDiscs>>(tile, known, setup),
                 [Form::Box, Form::Box] => told::<V::Wide, PointOutlook<WideBoxes>>(tile, known, setup),
                 [Form::Box | Form::Polygon, Form::Polygon] => {
                     told::<V::Wide, PointOutlook<WidePolygons>>(tile, known, setup)
@@ -342,7 +344,8 @@ mod tests {
         fn sixteen_touch_as_one_does(
             kinds in [any_convex(0.05, 2.0), any_convex(0.05, 2.0)], (x, y) in (-3.0_f64..3.0, -3.0_f64..3.0),
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
-            spins in [any_spin(), any_spin()], rotations in [any_rotation(), any_rotation()], fixed: bool, presses: bool,
+            spins in [any_spin(), any_spin()], rotations in [any_rotation(), any_rotation()], gap in any_gap(),
+            fixed: bool, presses: bool,
         ) {
             let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
             let (dynamic, statics) = (kinds.to_vec(), Vec::new());
@@ -352,7 +355,8 @@ mod tests {
             }
             let mut tile = Tile::new(TileId(0), &setup);
             let velocities = [Vec2::ZERO, Vec2::new(vx, vy) * 0.1_f32.powi(slowness as i32)];
-            let positions = [DVec2::splat(10.0), DVec2::new(10.0 + x, 10.0 + y)];
+            let offset = at_gap(gap, [&setup.kinds[0], &setup.kinds[1]], rotations, DVec2::new(x, y));
+            let positions = [DVec2::splat(10.0), DVec2::splat(10.0) + offset];
             for k in 0..2 {
                 let (id, kind) = (GlobalId(k as u64), KindId(k as u32));
                 let (position, rotation, velocity, angular_velocity) = (positions[k], rotations[k], velocities[k], spins[k]);
@@ -361,8 +365,8 @@ mod tests {
             // Whoever pressed did so at another point.
             let point = ContactPoint { normal_impulse: 1.0, feature: ContactPoint::ABSENT - 1, ..ContactPoint::NONE };
             let known = Contact { points: [point, ContactPoint::NONE], ..Contact::zeroed() };
-            let is_round = setup.kinds.iter().any(|kind| kind.form == Form::Round);
-            let known = (presses && !is_round).then_some(&known);
+            let has = |form: Form| setup.kinds.iter().any(|kind| kind.form == form);
+            let known = (presses && (has(Form::Polygon) || !has(Form::Round))).then_some(&known);
             let expected = touch(&tile, [0, 1], known, &setup);
             for instructions in [Instructions::Auto, Instructions::Portable] {
                 let Some(found) = LaneSet::of(instructions).unwrap().run(Look(&tile, known, &setup)) else { continue };

@@ -409,6 +409,7 @@ fn nearest_of<V: Wide>(other: &Polygon<V>, point: Vectors<V>, single: V) -> (Vec
 
 impl<V: Wide> Shapes<V> for Segments<V> {
     const OF_SEGMENTS: bool = true;
+    const WITH_DISCS: bool = true;
 
     #[inline(always)]
     fn manifolds(
@@ -460,7 +461,7 @@ mod tests {
     use crate::model::params::{Instructions, Params};
     use crate::model::shape::{Segment, Shape};
     use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
-    use crate::testing::{any_convex, any_rotation, cases};
+    use crate::testing::{any_convex, any_gap, any_rotation, at_gap, cases};
     use crate::tiling::blueprint::Blueprint;
     use crate::tiling::partition::Partition;
     use crate::tiling::tile::Tile;
@@ -505,7 +506,7 @@ mod tests {
             (along, height) in (-3.0_f64..3.0, -0.6_f64..2.0), closeness in 0_u32..3,
             (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
             (spin, turns) in (prop_oneof![Just(0.0_f32), -40.0_f32..40.0], prop_oneof![Just(0.0_f32), -2.0_f32..2.0]),
-            rotations in [any_rotation(), any_rotation()], lay: bool, is_first: bool,
+            rotations in [any_rotation(), any_rotation()], gap in any_gap(), lay: bool, is_first: bool,
         ) {
             let ends = [Vec2::new(-0.5 * length, 0.0), Vec2::new(0.5 * length, 0.0)];
             let beside = |end: Vec2, way: f32, turn: f32| end + Rot::from_angle(turn).rotate(Vec2::new(way, 0.0));
@@ -522,7 +523,9 @@ mod tests {
             // Most often as near as what lies on it.
             let near = DVec2::new(along, height * 0.3_f64.powi(closeness as i32)) + DVec2::Y * f64::from(round) * f64::from(closeness.min(1));
             let (c, s) = (f64::from(rotations[1].c), f64::from(rotations[1].s));
-            let position = DVec2::splat(10.0) + DVec2::new(c * near.x - s * near.y, s * near.x + c * near.y);
+            let away = DVec2::new(c * near.x - s * near.y, s * near.x + c * near.y);
+            let offset = -at_gap(gap, [&setup.kinds[0], &setup.kinds[1]], rotations, -away);
+            let position = DVec2::splat(10.0) + offset;
             let bodies = [
                 (position, rotations[0], Vec2::new(vx, vy) * 0.1_f32.powi(slowness as i32), spin),
                 (DVec2::splat(10.0), rotations[1], Vec2::ZERO, turns),

@@ -12,6 +12,7 @@ use crate::collide::piece_boxes::PieceBoxes;
 use crate::collide::proxies::Proxies;
 use crate::collide::touch::{is_slow, recycle, touch};
 use crate::collide::wide_boxes::WideBoxes;
+use crate::collide::wide_discs::WideDiscs;
 use crate::collide::wide_moments::{PointOutlook, Search};
 use crate::collide::wide_pairs::{Outlook, RoundOutlook};
 use crate::collide::wide_polygons::WidePolygons;
@@ -103,8 +104,8 @@ struct FindAmong<'a> {
 /// So many pairs are sorted by kinds at a time.
 const BLOCK: usize = 256;
 
-/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another, of a segment and any of
-/// these. Of each kind there are two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
+/// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another, of a polygon and a round
+/// body, of a segment and any of these. Of each kind there are two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
 /// do. And a last one of pairs with other shapes.
 struct Lists {
     /// Places in the block.
@@ -112,7 +113,7 @@ struct Lists {
     count: [usize; LISTS],
 }
 
-const LISTS: usize = 11;
+const LISTS: usize = 13;
 
 /// Of boxes.
 const NEW_BOXES: usize = 4;
@@ -126,14 +127,17 @@ const KNOWN_POLYGONS: usize = 7;
 const NEW_ON_SEGMENTS: usize = 8;
 const KNOWN_ON_SEGMENTS: usize = 9;
 
-/// Of bodies one of which is made of pieces, or is round and meets a polygon.
-const OF_PIECES: usize = 10;
+/// Of a round body and a polygon.
+const ROUND_ON_POLYGONS: usize = 10;
+
+/// Of bodies one of which is made of pieces.
+const OF_PIECES: usize = 12;
 
 /// The first list of two [`Form`](crate::model::kind::Form)s.
 const LIST_OF: [[usize; 5]; 5] = [
-    [0, 2, OF_PIECES, NEW_ON_SEGMENTS, OF_PIECES],
+    [0, 2, ROUND_ON_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
     [2, NEW_BOXES, NEW_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
-    [OF_PIECES, NEW_POLYGONS, NEW_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
+    [ROUND_ON_POLYGONS, NEW_POLYGONS, NEW_POLYGONS, NEW_ON_SEGMENTS, OF_PIECES],
     [NEW_ON_SEGMENTS, NEW_ON_SEGMENTS, NEW_ON_SEGMENTS, OF_PIECES, OF_PIECES],
     [OF_PIECES; 5],
 ];
@@ -201,7 +205,7 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
         let (mut round, mut boxes) = (RoundOutlook::default(), PointOutlook::<WideBoxes>::default());
         let (mut polygons, mut segments) =
             (PointOutlook::<WidePolygons>::default(), PointOutlook::<WideSegments>::default());
-        let mut meetings = Meetings::default();
+        let (mut discs, mut meetings) = (PointOutlook::<WideDiscs>::default(), Meetings::default());
         for pairs in sorted.chunks(BLOCK) {
             names.name(pairs, &mut block.named);
             let mut lists = Lists::new(pairs, &block.named, tile, setup);
@@ -217,6 +221,9 @@ impl Kernel for (FindAmong<'_>, &mut Found) {
             setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut polygons });
             let list = lists.get(NEW_ON_SEGMENTS);
             setup.lanes.run(Find { block: &mut block, list, tile, setup, outlook: &mut segments });
+            for list in [ROUND_ON_POLYGONS, ROUND_ON_POLYGONS + 1] {
+                setup.lanes.run(Find { block: &mut block, list: lists.get(list), tile, setup, outlook: &mut discs });
+            }
             if lists.get(OF_PIECES).is_empty() {
                 block.keep(pairs.len(), found);
             } else {
