@@ -106,7 +106,14 @@ fn of_snapshot_error(error: &SnapshotError) -> String {
 fn state(folder: &RunFolder, steps: u64) -> String {
     let ended = match Ended::read(folder.path()) {
         Ok(Some(ended)) => ended,
-        Ok(None) => return format!("to make {steps} steps; under way, or ended before it could say how"),
+        Ok(None) => {
+            let how = match folder.is_claimed() {
+                Some(true) => "under way",
+                Some(false) => "stopped before they were made",
+                None => "under way, or stopped before they were made",
+            };
+            return format!("to make {steps} steps; {how}");
+        }
         Err(error) => {
             complain(&error.counts_as_missing());
             return format!("to make {steps} steps; its summary cannot be read");

@@ -178,6 +178,19 @@ impl RunFolder {
         })
     }
 
+    /// Whether a run writes here now; none where nobody can tell.
+    pub fn is_claimed(&self) -> Option<bool> {
+        let lock = match File::open(self.lock()) {
+            Ok(lock) => lock,
+            Err(error) => return (error.kind() == ErrorKind::NotFound).then_some(false),
+        };
+        match lock.try_lock() {
+            Ok(()) => Some(false),
+            Err(TryLockError::WouldBlock) => Some(true),
+            Err(TryLockError::Error(_)) => None,
+        }
+    }
+
     fn open_lock(&self) -> io::Result<File> {
         // Some file systems share only what can be read.
         File::options().create(true).truncate(false).read(true).write(true).open(self.lock())
@@ -199,6 +212,7 @@ mod tests {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", &folder.path().join("new"));
         assert!(run.hold(None).unwrap().is_none());
+        assert_eq!(run.is_claimed(), Some(false));
         let claim = run.claim(None, Some(("", &configuration()))).unwrap();
         let token = run.token().unwrap();
         let shared = run.share(&token, Duration::ZERO).unwrap();
@@ -218,7 +232,9 @@ mod tests {
         assert!(told.contains("another run is writing there"), "{told}");
         drop(claim);
         assert!(run.hold(None).is_err());
+        assert_eq!(run.is_claimed(), Some(true));
         drop(shared);
+        assert_eq!(run.is_claimed(), Some(false));
         let held = run.hold(None).unwrap();
         assert!(held.is_some());
         // Who comes later finds what was begun meanwhile.

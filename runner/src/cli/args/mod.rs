@@ -17,9 +17,11 @@ pub(crate) use scene::{BodiesAs, SceneArgs, SceneCheckArgs, SceneCommand, SceneE
 pub(crate) use view::ViewArgs;
 
 use crate::wording::OneLine;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsStr;
+use std::path::PathBuf;
 
 /// Very large 2-D rigid-body worlds: one trajectory, bit for bit, on one core, one machine or a cluster.
 #[derive(Debug, Parser)]
@@ -69,6 +71,14 @@ pub fn one_line(error: &clap::Error, first: Option<&OsStr>) -> String {
     let verb = verb.map(|verb| format!(" {verb}")).unwrap_or_default();
     // What was typed is quoted as it was typed.
     format!("{}{hint}; see atoll{verb} --help", OneLine(line.strip_prefix("error: ").unwrap_or(&line)))
+}
+
+/// The path of a plot: what ends otherwise would not be what its name says.
+fn svg() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        let is_svg = path.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("svg"));
+        if is_svg { Ok(path) } else { Err("is drawn as SVG; end its name in .svg") }
+    })
 }
 
 fn lacks_configuration(error: &clap::Error) -> bool {

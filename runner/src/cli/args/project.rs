@@ -1,5 +1,6 @@
 //! Options of `atoll project`.
 
+use super::svg;
 use super::values::given;
 use crate::config::{ConfigError, Override};
 use crate::project::Network;
@@ -50,7 +51,7 @@ pub struct ProjectArgs {
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Draw the speedup to this file, as SVG.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = svg())]
     pub plot: Option<PathBuf>,
     /// Show no progress, only the table.
     #[arg(long)]

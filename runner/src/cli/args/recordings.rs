@@ -1,5 +1,6 @@
 //! Options of the verbs that look at what runs have written.
 
+use super::svg;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,7 +19,7 @@ pub struct DiffArgs {
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Write a picture of how the deviations grow to this file, as SVG.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = svg())]
     pub plot: Option<PathBuf>,
 }
 
@@ -77,6 +78,9 @@ mod tests {
         assert_eq!((args.a.as_path(), args.b.as_path()), (Path::new("runs/a"), Path::new("runs/b")));
         assert_eq!((args.tolerance, args.json.is_some(), args.plot.is_some()), (Some(0.001), true, false));
         assert_eq!(parse::<DiffArgs>("a b").unwrap().tolerance, None);
+        let error = parse::<DiffArgs>("a b --plot d.png").unwrap_err();
+        assert!(error.contains("'--plot <FILE>': is drawn as SVG; end its name in .svg"), "{error}");
+        assert!(parse::<DiffArgs>("a b --plot d.SVG").is_ok() && parse::<DiffArgs>("a b --plot /dev/stdout").is_ok());
         for value in ["-1", "nan", "inf", "1e999", "much"] {
             let error = parse::<DiffArgs>(&format!("a b --tolerance {value}")).unwrap_err();
             assert!(error.contains("'--tolerance <T>': must be a finite number, at least 0"), "{error}");
