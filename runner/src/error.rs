@@ -7,6 +7,7 @@ pub use crate::folder::snapshot::SnapshotError;
 pub use crate::folder::{EndedError, FolderError, LogError};
 pub use crate::scene::SceneError;
 
+use crate::wording::Typed;
 use atoll_core::{GlobalId, SetupError, TileId};
 use atoll_transport::Rank;
 use std::path::PathBuf;
@@ -273,7 +274,7 @@ pub enum RunError {
     /// A run that could not write any more, and stopped.
     #[error(
         "{why}; stopped after {complete} of {steps} steps, and what was written before is whole: mend this and go on with \
-         `atoll run --resume {}`", .folder.display()
+         `atoll run --resume {}`", Typed(.folder)
     )]
     StoppedWriting {
         /// What could not be written.

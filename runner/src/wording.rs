@@ -3,6 +3,7 @@
 use atoll_core::Shape;
 use glam::Vec2;
 use std::fmt::{self, Write as _};
+use std::path::Path;
 use toml::Value;
 
 /// Shows a text that somebody else wrote on one line, and harmless to a terminal: each run of line breaks and other
@@ -20,6 +21,18 @@ impl fmt::Display for OneLine<'_> {
             f.write_str(part)?;
         }
         Ok(())
+    }
+}
+
+/// Shows a path as a shell takes it, in a command that is to be copied.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Typed<'a>(pub &'a Path);
+
+impl fmt::Display for Typed<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = self.0.display().to_string();
+        let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+        if path.chars().all(is_plain) { f.write_str(&path) } else { write!(f, "'{}'", path.replace('\'', r"'\''")) }
     }
 }
 
@@ -122,4 +135,17 @@ pub(crate) fn shortest(number: f32) -> f64 {
     // A file's numbers are rounded twice, to 64 bits and then to 32. Of all numbers, 7.038531e-26 alone ends elsewhere.
     let same = (shortest as f32).to_bits() == number.to_bits();
     if same { shortest } else { number.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_shown_as_a_shell_takes_them() {
+        let typed = |path: &str| Typed(Path::new(path)).to_string();
+        assert_eq!(typed("runs/a-1.b"), "runs/a-1.b");
+        assert_eq!(typed("my runs/a"), "'my runs/a'");
+        assert_eq!(typed("it's $HOME"), r"'it'\''s $HOME'");
+    }
 }

@@ -512,7 +512,7 @@ mod tests {
             let beside = |end: Vec2, way: f32, turn: f32| end + Rot::from_angle(turn).rotate(Vec2::new(way, 0.0));
             let (before, after) = (joints[0].map(|turn| beside(ends[0], -1.0, turn)), joints[1].map(|turn| beside(ends[1], 1.0, turn)));
             let (segment, _) = Segment::new(before, ends[0], ends[1], after).unwrap();
-            let kinds = vec![kind, Kind::new(Shape::Segment(segment), Material::default())];
+            let kinds = [kind, Kind::new(Shape::Segment(segment), Material::default())];
             let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
             let blueprint = Blueprint { params: Params::default(), partition, kinds: kinds[..1].to_vec(), statics: Vec::new() };
             let mut setup = Setup::new(&blueprint).unwrap();

@@ -7,7 +7,7 @@ use crate::folder::durable::{create_folder_durably, write_durably};
 use crate::scene::file::Column;
 use crate::scene::file::digest_of_file;
 use crate::scene::file::write::{self, Alike, BodiesFile, World};
-use crate::wording::plural;
+use crate::wording::{Typed, plural};
 use atoll_core::Body;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -116,7 +116,7 @@ impl<'a> Target<'a> {
             plural(kinds.len() as u64, "kind"),
             plural(statics.len() as u64, "static"),
             bytes as f64 * 1e-6,
-            text.display()
+            Typed(&text)
         ))
     }
 }

@@ -13,7 +13,7 @@ use crate::command::{Action, Answer, Event, Line, NO_UNTIL, Part, Question, Stat
 use crate::error::{Exit, RunError};
 use crate::folder::AnswersFile;
 use crate::plan::Plan;
-use crate::wording::OneLine;
+use crate::wording::{OneLine, Typed};
 use atoll_core::{Command, GlobalId, World};
 use atoll_transport::{Collective, Counting, Rank, Stats, Transport};
 use events::Followed;
@@ -134,7 +134,7 @@ impl Commander {
             disagreement,
             refused: BTreeSet::new(),
             remedy: folder.map_or(String::new(), |folder| {
-                let path = folder.path().display();
+                let path = Typed(folder.path());
                 format!("; to go on without it, or with --commands and what was mended: `atoll run --resume {path}`")
             }),
             refusal: None,
