@@ -7,7 +7,10 @@ use thiserror::Error;
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum SetupError {
     /// A row of the table of kinds.
-    #[error("kind {}: sizes and density must be positive and finite, friction at least 0, restitution within 0 to 1", kind.0)]
+    #[error(
+        "kind {}: sizes and density must be positive, damping and friction at least 0, restitution within 0 to 1, all of them \
+         finite, and neither so small nor so large that its mass or inertia is not", kind.0
+    )]
     BadKind {
         /// Its row.
         kind: KindId,

@@ -77,9 +77,12 @@ impl World {
         Some(self.tiles[tile as usize].at(at))
     }
 
-    /// Removes the body of that name, with the forces upon it, and says whether it was one of this world's. Tell every rank. Takes as long as
-    /// [`get`](Self::get).
+    /// Removes the body of that name, with the forces upon it, and says whether it was one of this world's; a static stays. Tell every
+    /// rank. Takes as long as [`get`](Self::get).
     pub fn remove(&mut self, id: GlobalId) -> bool {
+        if self.is_static(id) {
+            return false;
+        }
         self.removed.push(id);
         self.stop_pushing(id);
         if self.setup.params.sleep {
@@ -97,6 +100,11 @@ impl World {
     /// Whether a body was to be removed since the last step.
     pub(crate) fn was_removed(&self, id: GlobalId) -> bool {
         self.removed.contains(id)
+    }
+
+    /// Once the step, or a restored moment, knows nothing of who was removed before it.
+    pub(super) fn forget_removed(&mut self) {
+        self.removed.clear();
     }
 
     /// Every owned body.
@@ -159,7 +167,8 @@ impl World {
     }
 
     /// Settles which place those bodies have that came since the last step, and that others left. A step begins with this; whoever
-    /// wants to see the tiles before, by [`views`](Self::views), asks for it.
+    /// wants to see the tiles before, by [`views`](Self::views), asks for it. Copies that other tiles have of a body that was removed, and
+    /// their contacts with it, stay until the step.
     pub fn settle(&mut self) {
         if !std::mem::take(&mut self.is_unsettled) {
             return;
@@ -204,7 +213,7 @@ impl World {
 
     /// After a step: bodies that went from tile to tile are found in their new ones.
     pub(super) fn follow_bodies(&mut self) {
-        self.removed.clear();
+        self.forget_removed();
         let bodies = || self.tiles.iter().map(Tile::count).sum();
         let Some(locator) = self.locator.get_mut() else { return };
         if locator.is_stale(bodies()) {

@@ -42,7 +42,8 @@ pub enum Command {
     },
     /// A body is pushed through some steps: its velocity changes in every substep, as by gravity, and by force times time over mass in a
     /// step. What of it would move it, from rest, by more than nine tenths of [`Params::speculative_distance`] within one step comes as
-    /// a blow, as that step begins: so it is known where it goes.
+    /// a blow, as that step begins: so it is known where it goes. Every rank keeps it for who bears that name in those steps, as bodies go
+    /// from rank to rank, until that one is removed: begin it once the body is there.
     Force {
         /// Which.
         id: GlobalId,
@@ -62,7 +63,7 @@ pub enum Command {
     },
     /// The table of kinds has one more row.
     AddKind(Kind),
-    /// Gravity is this from here on, in m/s^2.
+    /// Gravity is this from here on, in m/s^2. Where it changes, everybody wakes.
     SetGravity(Vec2),
     /// A body, and what touches it, sleeps no longer.
     Wake(GlobalId),
@@ -105,8 +106,10 @@ impl World {
             }
             Command::AddKind(ref kind) => self.add_kind(kind).map(|_| true),
             Command::SetGravity(gravity) => {
-                Arc::make_mut(&mut self.setup).params.gravity = gravity;
-                self.tiles.iter_mut().for_each(|tile| tile.sleep.wake_all());
+                if gravity != self.gravity() {
+                    Arc::make_mut(&mut self.setup).params.gravity = gravity;
+                    self.tiles.iter_mut().for_each(|tile| tile.sleep.wake_all());
+                }
                 Ok(true)
             }
         }

@@ -98,6 +98,7 @@ impl World {
         (self.halfway, self.verdict, self.next_partition) = (None, Verdict::default(), None);
         (self.measures, self.takes_figures) = (false, false);
         self.forces.clear();
+        self.forget_removed();
         self.places.forget();
         self.outbox.bags.clear();
         for hand in &mut self.hands {

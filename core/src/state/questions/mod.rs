@@ -20,6 +20,9 @@ use outline::Outline;
 pub(crate) use places::Places;
 use tree::Bounds;
 
+/// Nobody is so far out, in m, and the square of it is still a number.
+const FAR: f64 = 1e150;
+
 /// What a ray meets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RayHit {
@@ -50,15 +53,23 @@ impl World {
     /// looking at each of its bodies. Where there are more, these are sorted by place; each one after that takes time that grows with the
     /// logarithm of their number, and with how much lies near the way.
     pub fn cast_ray(&self, from: DVec2, to: DVec2) -> Option<RayHit> {
-        (from.is_finite() && (to - from).is_finite()).then(|| self.first_hit((from, to)))?
+        self.cast_ray_among(from, to, |_| true)
     }
 
-    /// The bodies and statics that have a point in common with a rectangle between two corners, in m: their names, ascending.
+    /// The same among those bodies and statics of which `counts` says so: to look past whom the ray belongs to, or past sensors, which are
+    /// met as all others are. It is asked of those that the ray meets, and of whom else it is does not matter.
+    pub fn cast_ray_among(&self, from: DVec2, to: DVec2, counts: impl Fn(&Body) -> bool) -> Option<RayHit> {
+        (from.is_finite() && (to - from).is_finite()).then(|| self.first_hit((from, to), counts))?
+    }
+
+    /// The bodies and statics that have a point in common with a rectangle between two corners, in m, which may be infinite: their names,
+    /// ascending. Sensors count.
     pub fn in_rectangle(&self, low: DVec2, high: DVec2) -> Vec<GlobalId> {
+        let [low, high] = [low, high].map(|corner| corner.clamp(DVec2::splat(-FAR), DVec2::splat(FAR)));
         self.found(Bounds { low, high }, |outline| outline.meets_rectangle(low, high))
     }
 
-    /// The bodies and statics that a point in m is in, or on: their names, ascending.
+    /// The bodies and statics that a point in m is in, or on: their names, ascending. Sensors count.
     pub fn at_point(&self, point: DVec2) -> Vec<GlobalId> {
         self.found(Bounds { low: point, high: point }, |outline| outline.holds(point))
     }

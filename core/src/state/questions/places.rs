@@ -83,11 +83,12 @@ impl World {
         }
     }
 
-    /// What a ray meets first.
-    pub(super) fn first_hit(&self, ray: (DVec2, DVec2)) -> Option<RayHit> {
+    /// What a ray meets first of those that count.
+    pub(super) fn first_hit(&self, ray: (DVec2, DVec2), counts: impl Fn(&Body) -> bool) -> Option<RayHit> {
         let mut best = None;
         let ask = |body: &Body, best: &mut Option<RayHit>| {
-            if let Some(hit) = self.outline(body).cast_ray(ray.0, ray.1) {
+            let hit = self.outline(body).cast_ray(ray.0, ray.1);
+            if let Some(hit) = hit.filter(|_| counts(body)) {
                 *best = Some(best.map_or(hit, |best| best.nearer(hit)));
             }
         };

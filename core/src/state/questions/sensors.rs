@@ -17,12 +17,13 @@ impl World {
 
     /// Who of this world's bodies is inside a sensor, between two steps: pairs of the sensor and the body, ascending. The sensors are
     /// all that are statics, and those given: with several ranks, [the sensors](Self::sensors) of all of them together; then the
-    /// answers of all ranks, joined, are those of one rank that holds everything. No sensor is inside another; masks and groups hold
-    /// as for contacts.
+    /// answers of all ranks, joined, are those of one rank that holds everything. Inside is whose shape has a point in common with the
+    /// sensor's. No sensor is inside another; masks and groups hold as for contacts.
     pub fn inside_sensors(&self, moving: &[Body]) -> Vec<(GlobalId, GlobalId)> {
         let setup = &self.setup;
         let fixed = setup.statics_at(self.step).filter(|body| setup.kind(body.kind).sensor);
-        let mut sensors: Vec<Body> = fixed.chain(moving.iter().copied()).collect();
+        let is_sensor = |body: &&Body| setup.has_kind(body.kind) && setup.kind(body.kind).sensor;
+        let mut sensors: Vec<Body> = fixed.chain(moving.iter().filter(is_sensor).copied()).collect();
         sensors.sort_unstable_by_key(|sensor| sensor.id);
         let mut found = Vec::new();
         for sensor in sensors {

@@ -80,6 +80,9 @@ fn answers_are_those_of_looking_at_each_body() {
                 let expected = all.iter().filter_map(|outline| outline.cast_ray(from, to)).reduce(RayHit::nearer);
                 assert_eq!(world.cast_ray(from, to), expected, "{from} {to}");
                 hits += usize::from(expected.is_some());
+                let odd = all.iter().filter(|outline| outline.id.0 % 2 == 1);
+                let expected = odd.filter_map(|outline| outline.cast_ray(from, to)).reduce(RayHit::nearer);
+                assert_eq!(world.cast_ray_among(from, to, |body| body.id.0 % 2 == 1), expected);
                 let (low, high) = (from.min(to), from.min(to) + (from.max(to) - from.min(to)) * 0.1);
                 let names = |is_meant: &dyn Fn(&Outline) -> bool| {
                     let mut names: Vec<_> = all.iter().filter(|outline| is_meant(outline)).map(|o| o.id).collect();
@@ -91,6 +94,9 @@ fn answers_are_those_of_looking_at_each_body() {
                 found += expected.len();
                 assert_eq!(world.at_point(from), names(&|outline| outline.holds(from)));
             }
+            let everywhere = world.in_rectangle(DVec2::NEG_INFINITY, DVec2::INFINITY);
+            assert_eq!(everywhere.len(), all.len());
+            drop(all);
             // What changed is seen, at once.
             match round {
                 0 => drop(step(&mut world, &mut Loopback).unwrap()),

@@ -169,7 +169,8 @@ impl World {
     }
 
     /// Makes a tile what it was when `block` was saved; what it held before is forgotten. On an error it is left as it
-    /// was. The blueprint must be the one of the world that was saved, and all tiles are to be restored to one moment: a body that has gone
+    /// was. The blueprint must be the one of the world that was saved, with gravity and kinds as they had become
+    /// by commands, given before this; and all tiles are to be restored to one moment: a body that has gone
     /// from one to another meanwhile would be in both, or in none.
     ///
     /// # Errors

@@ -119,7 +119,11 @@ fn a_restored_world_is_what_it_was_when_saved() {
             step(&mut restored, &mut Loopback).unwrap();
         }
         assert_ne!(restored.hashes(), original.hashes());
+        let touching = |world: &World| original.bodies().map(|body| world.touching(body.id)).collect::<Vec<_>>();
+        original.bodies().for_each(|body| assert!(restored.remove(body.id)));
         restore_all(&mut restored, &saved, &bytes);
+        restored.resume_at(original.step_count());
+        assert_eq!(touching(&restored), touching(&original), "bodies are there again");
         assert!(save(&restored) == (saved, bytes), "something of the old tile is left");
     }
 }

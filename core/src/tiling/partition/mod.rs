@@ -129,6 +129,9 @@ impl Partition {
     }
 
     /// The rectangle a tile owns; infinite where the tile is outermost.
+    ///
+    /// # Panics
+    /// If there is no such tile.
     #[inline]
     pub fn region(&self, tile: TileId) -> Region {
         match &self.0 {
@@ -139,6 +142,9 @@ impl Partition {
     }
 
     /// The part of the domain that a tile owns.
+    ///
+    /// # Panics
+    /// If there is no such tile.
     pub fn rectangle(&self, tile: TileId) -> Region {
         match &self.0 {
             Cut::Uniform(grid) => grid.rectangle(tile.0),

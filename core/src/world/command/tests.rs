@@ -187,6 +187,15 @@ fn whatever_slept_on_a_body_that_is_gone_falls() {
     assert!((fixed(|_| ()).position.y - 1.25).abs() < 0.02);
     let fallen = fixed(|world| assert!(world.remove(GlobalId(1))));
     assert!((fallen.position.y - 0.75).abs() < 0.02, "{fallen:?}");
+    // The same gravity, and to remove a static, which is not done, changes nothing.
+    let left = fixed(|world| {
+        assert!(world.command(&Command::SetGravity(world.gravity())).unwrap());
+        assert_eq!(world.touching(GlobalId(1)).len(), 2);
+        assert!(!world.remove(GlobalId(0)));
+        assert_eq!(world.touching(GlobalId(1)).len(), 2);
+        assert_eq!(step(world, &mut Loopback).unwrap().asleep, 3);
+    });
+    assert!((left.position.y - 1.25).abs() < 0.02, "{left:?}");
     let lifted = fixed(|world| assert!(world.command(&Command::SetGravity(Vec2::new(0.0, 10.0))).unwrap()));
     assert!(lifted.position.y > 4.0, "{lifted:?}");
     let struck = fixed(|world| {
