@@ -358,6 +358,8 @@ impl<'a> Approach<'a> {
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };
             let speed = 0.5 * (bound + closing);
+            // Who is let through may go away from where he is nearest, and still come to the face.
+            let speed = if speed > 0.0 { speed } else { dot(self.between, self.between).sqrt() + sweep };
             let way = if at.manifold.is_distance() { max(nearest.separation, LEAST_WAY) } else { nearest.separation };
             at = self.at(at.time + min(way / speed, left), reach);
             if at.manifold.is_distance() {

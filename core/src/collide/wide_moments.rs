@@ -410,7 +410,11 @@ impl<V: Wide> Pairs<V> {
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = self.closing(anchor, at.offset, at.normal).max(zero);
             let closing = if S::OF_SEGMENTS { bound } else { closing };
-            let speed = V::splat(0.5).mul(bound.add(closing));
+            let mut speed = V::splat(0.5).mul(bound.add(closing));
+            if S::OF_SEGMENTS {
+                let whole = self.between.dot(self.between).sqrt().add(self.sweep(0).add(self.sweep(1)));
+                speed = speed.if_positive(speed, whole);
+            }
             let way = at.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
             let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);
             at = Moments::pick(going, &next, &at);

@@ -70,7 +70,10 @@ pub(super) fn collide(
     let is_behind = |over: &Manifold| over.nearest().is_some_and(|nearest| nearest.separation < 0.0);
     // Its lowest corner may be above the surface by no more than rounding then.
     let band = behind..=max(radius, lowest);
-    let over = over.filter(|over| !is_behind(over) || comes_to(other, [from, along, n], length, radius, band));
+    let comes = || {
+        comes_to(other, [from, along, n], length, band) || [from, to].iter().any(|&end| other.nearest(end).1 <= radius)
+    };
+    let over = over.filter(|over| !is_behind(over) || comes());
     // What lies over the segment with its nearest point is nearest there.
     if let Some(over) = over
         && lowest > 0.0
@@ -128,15 +131,9 @@ pub(super) fn collide(
     }
 }
 
-/// Whether the corners and edges of a piece come between the ends of a segment, or within a radius of these, at one of some heights over it.
-/// The segment is told by where it starts, its direction and its normal.
-fn comes_to(
-    other: &Convex,
-    [from, along, n]: [Vec2; 3],
-    length: f32,
-    radius: f32,
-    heights: RangeInclusive<f32>,
-) -> bool {
+/// Whether the corners and edges of a piece come between the ends of a segment at one of some heights over it. The segment is told by where it
+/// starts, its direction and its normal.
+fn comes_to(other: &Convex, [from, along, n]: [Vec2; 3], length: f32, heights: RangeInclusive<f32>) -> bool {
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
     let mut here = other.corner(other.count() - 1) - from;
     for corner in other.corners() {
@@ -152,7 +149,7 @@ fn comes_to(
         }
         here = there;
     }
-    low <= length + radius && high >= -radius
+    low <= length && high >= 0.0
 }
 
 /// Along the segment's own normal, as far as the piece is over it.

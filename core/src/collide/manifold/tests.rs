@@ -364,7 +364,10 @@ fn who_touches_a_segment_is_near_it() {
         let segment = crate::model::piece::pieces(&segment.shape);
         for _ in 0..40_000 {
             let [long, thick] = [0.2 + 6.0 * random.next() * random.next(), 0.02 + 0.5 * random.next()];
-            let piece = row(&rectangle(long, thick));
+            let is_rounded = random.next() < 0.5;
+            let (core, radius) = if is_rounded { (0.0, 0.5 * thick) } else { (0.5 * thick, 0.0) };
+            let capsule = || Kind::new(Shape::capsule(long, radius).unwrap(), Material::default());
+            let piece = row(&if is_rounded { capsule() } else { rectangle(long, thick) });
             let rotation = Rot::from_angle(random.next() * 6.3);
             let offset = Rot::from_angle(random.next() * 6.3).rotate(Vec2::new(5.0 * random.next(), 0.0));
             let lies = (random.next() < 0.5).then_some(0.01);
@@ -372,8 +375,8 @@ fn who_touches_a_segment_is_near_it() {
             let manifold = convex::collide(pieces, [Rot::IDENTITY, rotation], offset, f32::INFINITY, lies);
             let Some(nearest) = manifold.nearest().filter(|_| !manifold.is_distance()) else { continue };
             let apart = |part: f32| {
-                let seen = rotation.unrotate(from + (to - from) * part - offset).abs() - 0.5 * Vec2::new(long, thick);
-                seen.max(Vec2::ZERO).length()
+                let seen = rotation.unrotate(from + (to - from) * part - offset).abs() - Vec2::new(0.5 * long, core);
+                seen.max(Vec2::ZERO).length() - radius
             };
             let least = (0..=300).map(|i| apart(i as f32 / 300.0)).fold(f32::INFINITY, f32::min);
             if nearest.separation < 0.0 {
