@@ -10,6 +10,9 @@ use glam::Vec2;
 /// come deeper anyway: who is fast and thin would step over what is as thin.
 const LEAST: f32 = 1.0 / 128.0;
 
+/// And so many are made, at most: of what is swept faster than by so many depths at a time, no more is known to be free.
+const MOST_LOOKS: usize = 1024;
+
 /// A body comes deeper into another within a step by this part of its inner radius, and no more; and how exactly that is found.
 const DEPTH: f32 = 0.25;
 const EXACT: f32 = 0.05;
@@ -78,7 +81,7 @@ impl<'a> Passage<'a> {
     fn free_part_of(&self, pieces: [&Piece; 2], other: &Self, offset: Vec2, bound: impl Fn(Vec2) -> f32) -> f32 {
         let depth = DEPTH * self.kind.inner_radius;
         let (mut part, mut deepest) = (0.0, depth);
-        while part < 1.0 {
+        for _ in 0..MOST_LOOKS {
             let rotations = [self.rotation_at(part), other.rotation_at(part)];
             let manifold = collide(pieces, rotations, offset + (other.way - self.way) * part, f32::INFINITY, None);
             let Some(nearest) = manifold.nearest() else { return 1.0 };
@@ -93,7 +96,10 @@ impl<'a> Passage<'a> {
                 return part;
             }
             part += max(left / bound, min(LEAST, depth / bound));
+            if part >= 1.0 {
+                return 1.0;
+            }
         }
-        1.0
+        part
     }
 }
