@@ -93,7 +93,7 @@ fn what_a_run_keeps_is_not_written_over() {
         ".run.toml.7.tmp",
     ] {
         let options = match name {
-            name if name == segment => ["--timings", "--plot"],
+            name if name == segment => ["--timings", "--json"],
             "timings.csv" | "run.toml" => ["--log", "--json"],
             _ => ["--json", "--json"],
         };

@@ -119,7 +119,8 @@ fn what_cannot_be_projected_is_refused() {
         ("--fit --network node", "the argument '--fit' cannot be used with '--network <NETWORK>'"),
         ("--bodies -5", "--bodies -5: must be a whole number"),
         ("--json no/such/x.json", "--json no/such/x.json: "),
-        ("--plot world.toml", "--plot world.toml: "),
+        ("--json world.toml", "--json world.toml: "),
+        ("--plot p.png", "invalid value 'p.png' for '--plot <FILE>': is drawn as SVG; end its name in .svg; see"),
     ] {
         assert_refused(&project(&desk, options), 2, expected);
     }
