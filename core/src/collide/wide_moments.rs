@@ -337,7 +337,7 @@ impl<V: Wide> Pairs<V> {
         self.half[0].x.if_positive(self.half[1].x.if_positive(zero, one), one)
     }
 
-    /// Round bodies that roll on segments, as they are in the middle of the step, and one where they do: see `roll` of `touch/kept.rs`.
+    /// Round bodies that roll on the others, as they are in the middle of the step, and one where they do: see `roll` of `touch/kept.rs`.
     #[inline(always)]
     fn roll_on<S: Shapes<V>>(&self, shapes: &S, setup: &Setup) -> (Moments<V>, V) {
         let (zero, half) = (V::splat(0.0), V::splat(0.5));

@@ -212,6 +212,7 @@ impl<V: Wide> AtEnd<V> {
     }
 }
 
+/// Zero where a number is positive, else one.
 #[inline(always)]
 fn not<V: Wide>(positive: V) -> V {
     positive.if_positive(V::splat(0.0), V::splat(1.0))

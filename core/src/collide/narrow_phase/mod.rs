@@ -105,8 +105,8 @@ struct FindAmong<'a> {
 const BLOCK: usize = 256;
 
 /// Pairs of a block by kinds: of two round bodies, of one and a box, of boxes, of a polygon and a box or another, of a polygon and a round
-/// body, of a segment and any of these. Of each kind there are two lists: first those that had no contact in the last step, most of whom do not touch yet, then those that had one, most of whom
-/// do. And a last one of pairs with other shapes.
+/// body, of a segment and any of these. Of each kind there are two lists: first those that had no contact in the last step, most of whom
+/// do not touch yet, then those that had one, most of whom do. And a last one of pairs with other shapes.
 struct Lists {
     /// Places in the block.
     places: [[u8; BLOCK]; LISTS],
@@ -123,7 +123,7 @@ const KNOWN_BOXES: usize = 5;
 const NEW_POLYGONS: usize = 6;
 const KNOWN_POLYGONS: usize = 7;
 
-/// Of segments.
+/// Of a segment and a round body, a box or a polygon.
 const NEW_ON_SEGMENTS: usize = 8;
 const KNOWN_ON_SEGMENTS: usize = 9;
 
