@@ -128,50 +128,52 @@ impl Arithmetic for f32 {
 }
 
 /// Plain arrays: the reference, and what other processors run.
+///
+/// With assertions, which is where little is optimized, kernels call it: unrolled into them it was most of what there was to compile.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable(Row);
 
 impl Portable {
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn map2(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|l| f(self.0[l], other.0[l])))
     }
 }
 
 impl Arithmetic for Portable {
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn splat(x: f32) -> Self {
         Self([x; LANES])
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn add(self, other: Self) -> Self {
         self.map2(other, |a, b| a + b)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn sub(self, other: Self) -> Self {
         self.map2(other, |a, b| a - b)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn mul(self, other: Self) -> Self {
         self.map2(other, |a, b| a * b)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn div(self, other: Self) -> Self {
         self.map2(other, |a, b| a / b)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn sqrt(self) -> Self {
         Self(self.0.map(f32::sqrt))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn max(self, other: Self) -> Self {
         self.map2(other, math::max)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn min(self, other: Self) -> Self {
         self.map2(other, math::min)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn if_positive(self, yes: Self, no: Self) -> Self {
         Self(std::array::from_fn(|l| if self.0[l] > 0.0 { yes.0[l] } else { no.0[l] }))
     }
@@ -180,62 +182,62 @@ impl Arithmetic for Portable {
 impl Lanes for Portable {
     const HAS_REGISTERS: bool = false;
     type Wide = Twice<Self>;
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn load(from: &Row) -> Self {
         Self(*from)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn store(self, to: &mut Row) {
         *to = self.0;
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn gather(from: &[Cell<Quad>], index: &[u32; LANES]) -> [Self; 4] {
         let quads = index.map(|i| from[i as usize].get());
         Self::load_quads(&quads)
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn scatter(columns: [Self; 4], to: &[Cell<Quad>], index: &[u32; LANES]) {
         for (l, &i) in index.iter().enumerate() {
             to[i as usize].set(columns.map(|column| column.0[l]));
         }
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn load_quads(from: &[Quad; LANES]) -> [Self; 4] {
         std::array::from_fn(|c| Self(std::array::from_fn(|l| from[l][c])))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn store_quads(columns: [Self; 4], to: &mut [Quad; LANES]) {
         for (l, quad) in to.iter_mut().enumerate() {
             *quad = columns.map(|column| column.0[l]);
         }
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn gather_fixed(from: &[Quad], index: &[u32; LANES]) -> [Self; 4] {
         Self::load_quads(&index.map(|i| from[i as usize]))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn load_pairs(from: &[Pair; LANES]) -> [Self; 2] {
         std::array::from_fn(|c| Self(std::array::from_fn(|l| from[l][c])))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn store_pairs([a, b]: [Self; 2], to: &mut [Pair; LANES]) {
         *to = std::array::from_fn(|l| [a.0[l], b.0[l]]);
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn seen_from(origin: Place, places: &[Place; LANES]) -> [Self; 2] {
         std::array::from_fn(|c| Self(std::array::from_fn(|l| (places[l][c] - origin[c]) as f32)))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn advance([x, y]: [Self; 2], places: &mut [Place; LANES]) {
         for (l, place) in places.iter_mut().enumerate() {
             *place = [place[0] + f64::from(x.0[l]), place[1] + f64::from(y.0[l])];
         }
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn are_within(places: &[Place; LANES], low: Place, high: Place) -> bool {
         places.iter().all(|place| (0..2).all(|axis| place[axis] >= low[axis] && place[axis] < high[axis]))
     }
-    #[inline(always)]
+    #[cfg_attr(debug_assertions, inline(never))]
     fn all_below(self, most: f32) -> bool {
         self.0.iter().all(|&lane| lane < most)
     }
