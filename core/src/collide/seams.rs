@@ -7,7 +7,7 @@
 
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::{self, Stopped};
-use crate::collide::wide_pairs::TOUCHING;
+use crate::collide::wide::pairs::TOUCHING;
 use crate::model::contact::{Contact, PairKey, SlotKind};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{dot, max, min};

@@ -21,7 +21,7 @@ pub(super) use straight::Course;
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
-use crate::collide::wide_pairs::TOUCHING;
+use crate::collide::wide::pairs::TOUCHING;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
@@ -202,12 +202,13 @@ impl<'a> Approach<'a> {
         pair
     }
 
-    /// The contact of two pieces, or of bodies of one piece each, if there is one: also that of a disc that [rolls](Self::roll) on another.
+    /// The contact of two pieces, or of bodies of one piece each, if there is one.
     fn touch_unless_passing(&self, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
-        if self.pass_by(setup) {
-            return None;
-        }
-        let far = self.far(setup.params.dt);
+        if self.pass_by(setup) { None } else { self.roll_or_touch(known, self.far(setup.params.dt), setup) }
+    }
+
+    /// As [`Self::touch`], or that of a disc that [rolls](Self::roll) on another.
+    fn roll_or_touch(&self, known: Option<&Contact>, far: f32, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         let has_round = self.pieces.is_some() && (self.a.is_round() || self.b.is_round());
         let may_roll = has_round && far < setup.params.speculative_distance;
         let rolls = known.filter(|_| may_roll).and_then(|known| self.roll(known, setup));

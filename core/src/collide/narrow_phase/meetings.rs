@@ -3,9 +3,9 @@
 use super::names::Named;
 use super::{BLOCK, FindAmong};
 use crate::collide::touch::{Meeting, Met, meet};
-use crate::collide::wide_moments::{Points, Search, WidePieces};
-use crate::collide::wide_polygons::WidePolygons;
-use crate::collide::wide_segments::WideSegments;
+use crate::collide::wide::moments::{Points, Search, WidePieces};
+use crate::collide::wide::polygons::WidePolygons;
+use crate::collide::wide::segments::WideSegments;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Kernel, Lanes, WIDE};
 use crate::tiling::blueprint::Setup;

@@ -3,7 +3,7 @@
 use super::{Approach, Side};
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint};
-use crate::collide::wide_pairs::{ROLLING, TOUCHING};
+use crate::collide::wide::pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::{dot, max, min};
 use crate::model::params::Exchange;
@@ -83,7 +83,7 @@ impl Approach<'_> {
     }
 
     /// The contact of a round body with what it has touched and still touches, slowly: that of the middle of the step, as in
-    /// `wide_pairs.rs`, which tells why.
+    /// `wide/pairs.rs`, which tells why.
     pub(super) fn roll(&self, known: &Contact, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         if !self.pressed(known) {
             return None;

@@ -4,7 +4,7 @@ use super::Approach;
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
 use crate::collide::piece_boxes::PieceBoxes;
-use crate::collide::wide_moments::{Points, WidePieces};
+use crate::collide::wide::moments::{Points, WidePieces};
 use crate::model::contact::Contact;
 use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
@@ -103,17 +103,15 @@ pub(in crate::collide) fn meet<'a>(
         (pair.pieces, pair.features) = (Some(pieces), features);
         let known = known.iter().copied().find(|known| known.pieces() == features);
         let mut lies = None;
-        let rolled = known.filter(|_| is_slow && rolls && pair.is_solid()).and_then(|known| pair.roll(known, setup));
         let kept = known.filter(|_| is_slow && !rolls).and_then(|known| pair.recycle(known, setup));
-        let outcome = match (kept, rolled) {
-            (Some(separation), _) => Met::Known(separation),
-            (None, Some((contact, separation))) => Met::Found(contact, separation),
-            _ if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
-            _ if !pair.is_solid() => {
+        let outcome = match kept {
+            Some(separation) => Met::Known(separation),
+            None if pieces.iter().all(|piece| piece.has_faces()) => Met::Open,
+            None if !pair.is_solid() => {
                 lies = super::lies(pieces, known, setup);
                 Met::Open
             }
-            _ => Met::from(pair.touch(known, far, setup)),
+            None => Met::from(pair.roll_or_touch(known, far, setup)),
         };
         met(Meeting { bodies, pieces, features, known, lies, outcome });
     };

@@ -3,9 +3,10 @@
 //!
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
-use super::cull::passes;
-use super::touch::{Course, DEEP, NEAR, ROUNDS};
-use super::wide_pairs::{Pairs, TOUCHING};
+use super::manifolds::both;
+use super::pairs::{Pairs, TOUCHING};
+use crate::collide::cull::passes;
+use crate::collide::touch::{Course, DEEP, NEAR, ROUNDS};
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, less, tangent};
 use crate::tiling::blueprint::Setup;
@@ -40,12 +41,6 @@ pub(super) struct Touches<V> {
     /// Of the contact, and as it is now.
     pub(super) separation: V,
     pub(super) now: V,
-}
-
-/// `yes` where a number is positive, else `no`, for the bodies A and B.
-#[inline(always)]
-pub(super) fn both<V: Wide>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
-    [Vectors::pick(positive, yes[0], no[0]), Vectors::pick(positive, yes[1], no[1])]
 }
 
 impl<V: Wide> Moments<V> {

@@ -3,12 +3,12 @@
 //!
 //! Where speeds overflow, or a corner may pass over another, it cannot tell, and leaves the pair to that.
 
-use super::broad_phase::Pair;
-use super::cull::passes;
-use super::manifold::chain::Lies;
-use super::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROUNDS};
-use super::wide_pairs::{Outlook, Pairs, ROLLING, TOUCHING, WidePairs};
-use super::wide_touches::both;
+use super::manifolds::{Manifolds, both};
+use super::pairs::{Outlook, Pairs, ROLLING, TOUCHING, WidePairs};
+use crate::collide::broad_phase::Pair;
+use crate::collide::cull::passes;
+use crate::collide::manifold::chain::Lies;
+use crate::collide::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROUNDS};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::model::piece::Piece;
@@ -18,23 +18,15 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 
-/// Manifolds of up to two points, and the moments in which they are those. What is asked of them is one, or else zero.
+/// Moments of sixteen pairs, and their manifolds in these.
 #[derive(Clone, Copy)]
-pub(super) struct Moments<V> {
+struct Moments<V> {
     /// From now, in s.
-    pub(super) time: V,
+    time: V,
     /// At that time: from the center of A to that of B, and how both have turned.
-    pub(super) offset: Vectors<V>,
-    pub(super) turning: [Vectors<V>; 2],
-    /// Whether there is a point, and whether there is a second.
-    pub(super) some: V,
-    pub(super) two: V,
-    /// Whether the point only tells [how far they are](crate::collide::manifold::Manifold::is_distance) from each other.
-    pub(super) tells: V,
-    pub(super) normal: Vectors<V>,
-    pub(super) anchor: [Vectors<V>; 2],
-    pub(super) separation: [V; 2],
-    pub(super) feature: [V; 2],
+    offset: Vectors<V>,
+    turning: [Vectors<V>; 2],
+    manifolds: Manifolds<V>,
 }
 
 /// The shapes of sixteen pairs.
@@ -46,16 +38,8 @@ pub(super) trait Shapes<V> {
     /// Whether one of each two may be a disc, which rolls.
     const WITH_DISCS: bool = false;
 
-    /// Their manifolds after some seconds, in which B has come to `offset` from A, and both have turned so. Further ones than `reach`
-    /// may give none.
-    fn manifolds(
-        &self,
-        pairs: &Pairs<V>,
-        time: V,
-        offset: Vectors<V>,
-        turning: [Vectors<V>; 2],
-        reach: V,
-    ) -> Moments<V>;
+    /// Their manifolds once B has come to `offset` from A, and both have turned so. Further ones than `reach` may give none.
+    fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V>;
 }
 
 /// The moment of touch is looked for in so few lanes of sixteen only when there are no others.
@@ -63,14 +47,14 @@ const FEW: usize = 6;
 
 /// When the moments of touch are looked for, which most pairs do not need.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Search {
+pub(in crate::collide) enum Search {
     /// At once, where it pays for all sixteen.
     WhereManyNeedIt,
     Always,
 }
 
 /// Sixteen pairs, and the shapes of their bodies.
-pub(super) trait Shaped: Default {
+pub(in crate::collide) trait Shaped: Default {
     /// As [`Outlook::NEEDS_REGISTERS`].
     const NEED_REGISTERS: bool = false;
 
@@ -82,7 +66,7 @@ pub(super) trait Shaped: Default {
 }
 
 /// Sixteen pairs of pieces of two bodies.
-pub(super) trait WidePieces: Shaped {
+pub(in crate::collide) trait WidePieces: Shaped {
     /// The bodies.
     fn pairs(&mut self) -> &mut WidePairs;
 
@@ -92,7 +76,7 @@ pub(super) trait WidePieces: Shaped {
 
 /// What can be said of pairs whose contacts have up to two points.
 #[derive(Default, Debug)]
-pub(super) struct PointOutlook<S> {
+pub(in crate::collide) struct PointOutlook<S> {
     pub(super) pairs: S,
     pub(super) points: Points,
 }
@@ -133,7 +117,7 @@ impl<S: Shaped> Outlook for PointOutlook<S> {
 
 /// What comes of sixteen pairs.
 #[derive(Default, Debug)]
-pub(super) struct Points {
+pub(in crate::collide) struct Points {
     /// Positive if that cannot be told here.
     unsure: WideRow,
     /// Positive if the moment of touch was not looked for yet.
@@ -166,53 +150,27 @@ impl<V: Wide> Moments<V> {
             time: positive.if_positive(yes.time, no.time),
             offset: Vectors::pick(positive, yes.offset, no.offset),
             turning: both(positive, &yes.turning, &no.turning),
-            some: positive.if_positive(yes.some, no.some),
-            two: positive.if_positive(yes.two, no.two),
-            tells: positive.if_positive(yes.tells, no.tells),
-            normal: Vectors::pick(positive, yes.normal, no.normal),
-            anchor: both(positive, &yes.anchor, &no.anchor),
-            separation: [
-                positive.if_positive(yes.separation[0], no.separation[0]),
-                positive.if_positive(yes.separation[1], no.separation[1]),
-            ],
-            feature: [
-                positive.if_positive(yes.feature[0], no.feature[0]),
-                positive.if_positive(yes.feature[1], no.feature[1]),
-            ],
+            manifolds: Manifolds::pick(positive, &yes.manifolds, &no.manifolds),
         }
-    }
-
-    /// Anchor and separation of the point with the least.
-    #[inline(always)]
-    fn nearest(&self) -> (Vectors<V>, V) {
-        let (second, least) = self.least();
-        (Vectors::pick(second, self.anchor[1], self.anchor[0]), least)
-    }
-
-    /// Whether the second point has the least separation, and that.
-    #[inline(always)]
-    fn least(&self) -> (V, V) {
-        let second = self.two.mul(less(self.separation[1], self.separation[0]));
-        (second, second.if_positive(self.separation[1], self.separation[0]))
     }
 }
 
 impl Points {
     /// As [`Outlook::is_unsure`].
     #[inline(always)]
-    pub(super) fn is_unsure(&self, lane: usize) -> bool {
+    pub(in crate::collide) fn is_unsure(&self, lane: usize) -> bool {
         self.unsure[lane] > 0.0
     }
 
     /// As [`Outlook::is_postponed`].
     #[inline(always)]
-    pub(super) fn is_postponed(&self, lane: usize) -> bool {
+    pub(in crate::collide) fn is_postponed(&self, lane: usize) -> bool {
         self.postponed[lane] > 0.0
     }
 
     /// As [`Outlook::meets`].
     #[inline(always)]
-    pub(super) fn meets(&self, lane: usize) -> bool {
+    pub(in crate::collide) fn meets(&self, lane: usize) -> bool {
         self.holds[0][lane] + self.holds[1][lane] > 0.0
     }
 
@@ -223,9 +181,10 @@ impl Points {
         let (dt, speculative) = (pairs.dt, V::splat(setup.params.speculative_distance));
         let far = pairs.far();
         let reach = speculative.add(far);
-        let identity = Vectors::new(one, zero);
-        let now = shapes.manifolds(pairs, zero, pairs.offset, [identity; 2], reach);
-        let (_, separation) = now.nearest();
+        let turning = [Vectors::new(one, zero); 2];
+        let manifolds = shapes.manifolds(pairs, pairs.offset, turning, reach);
+        let now = Moments { time: zero, offset: pairs.offset, turning, manifolds };
+        let (_, separation) = manifolds.least();
         let is_slow = less(far, speculative);
         let scale = pairs.scale();
         let rests = less(separation, scale.mul(V::splat(TOUCHING))).mul(is_slow).mul(pairs.pressed);
@@ -233,9 +192,9 @@ impl Points {
         let has_straight = S::WITH_DISCS && !S::OF_SEGMENTS;
         let straight = if has_straight { pairs.is_straight() } else { zero };
         let is_now = less(separation, straight.if_positive(zero, scale.mul(V::splat(NEAR)))).max(rests);
-        let is_now = now.tells.if_positive(zero, is_now);
+        let is_now = manifolds.tells.if_positive(zero, is_now);
         let passes = passes(pairs.offset, pairs.between, pairs.bound[0].add(pairs.bound[1]), setup);
-        let mut asked = passes.if_positive(zero, now.some);
+        let mut asked = passes.if_positive(zero, manifolds.some);
         let (mut rolling, mut rolls) = (now, zero);
         let may_roll = pairs.is_round().mul(pairs.pressed).mul(passes.if_positive(zero, is_slow));
         if S::WITH_DISCS && may_roll.any_positive() {
@@ -259,33 +218,34 @@ impl Points {
             meets = meets.max(found);
         }
         (at, meets) = (Moments::pick(rolls, &rolling, &at), meets.max(rolls));
-        meets = at.tells.if_positive(zero, meets.mul(asked).mul(at.some));
-        let moved = pairs.between.dot(at.normal).mul(at.time);
+        let found = &at.manifolds;
+        meets = found.tells.if_positive(zero, meets.mul(asked).mul(found.some));
+        let moved = pairs.between.dot(found.normal).mul(at.time);
         let closing = pairs.closing_of_both(&at);
         for point in 0..2 {
-            let (anchor, separation) = (at.anchor[point], at.separation[point]);
-            let blow = at.two.if_positive(V::splat(0.5).mul(closing[1 - point].max(zero)), zero);
+            let (anchor, separation) = (found.anchor[point], found.separation[point]);
+            let blow = found.two.if_positive(V::splat(0.5).mul(closing[1 - point].max(zero)), zero);
             let closing = closing[point].add(blow).max(zero);
             let ahead = pairs.fixed.if_positive(dt.sub(at.time).max(zero).mul(closing), zero);
-            let there = if point == 0 { meets } else { meets.mul(at.two) };
+            let there = if point == 0 { meets } else { meets.mul(found.two) };
             less(separation, speculative.add(ahead)).mul(there).store(&mut self.holds[point]);
-            let swung = pairs.swing_apart(at.turning, at.offset, at.normal, anchor, separation);
+            let swung = pairs.swing_apart(at.turning, at.offset, found.normal, anchor, separation);
             let before = separation.sub(moved.add(swung));
             let now = at.time.if_positive(before, separation);
             V::store_quads([anchor.x, anchor.y, separation, now], &mut self.points[point]);
-            at.feature[point].store(&mut self.feature[point]);
+            found.feature[point].store(&mut self.feature[point]);
         }
         // Speeds that overflow tell of no other moment; and who may pass over a corner, or comes straight, is looked at alone.
-        let unsure = if S::WITH_DISCS { straight } else { pairs.run_into_corners(&at, closing[0]) };
+        let unsure = if S::WITH_DISCS { straight } else { pairs.run_into_corners(found, closing[0]) };
         less(far, V::splat(0.125 * f32::MAX)).if_positive(unsure, one).store(&mut self.unsure);
         let [a, b] = [at.turning[0].rotate(pairs.rotation[0]), at.turning[1].rotate(pairs.rotation[1])];
-        V::store_quads([at.normal.x, at.normal.y, at.offset.x, at.offset.y], &mut self.frames);
+        V::store_quads([found.normal.x, found.normal.y, at.offset.x, at.offset.y], &mut self.frames);
         V::store_quads([a.x, a.y, b.x, b.y], &mut self.rotations);
     }
 
     /// The contact of a pair, if it makes one, of these pieces, with the impulses of the last one, and the separation of its points now.
     #[inline(always)]
-    pub(super) fn contact(&self, lane: usize, pieces: u32, known: Option<&Contact>) -> (Contact, [f32; 2]) {
+    pub(in crate::collide) fn contact(&self, lane: usize, pieces: u32, known: Option<&Contact>) -> (Contact, [f32; 2]) {
         let ([nx, ny, x, y], [ca, sa, cb, sb]) = (self.frames[lane], self.rotations[lane]);
         // Of two points it may be the second alone that holds.
         let first = usize::from(self.holds[0][lane] == 0.0);
@@ -321,7 +281,7 @@ impl<V: Wide> Pairs<V> {
     #[inline(always)]
     fn moments(&self, shapes: &impl Shapes<V>, time: V, reach: V) -> Moments<V> {
         let (offset, turning) = self.moved(time);
-        shapes.manifolds(self, time, offset, turning, reach)
+        Moments { time, offset, turning, manifolds: shapes.manifolds(self, offset, turning, reach) }
     }
 
     /// One where nothing turns by as much as counts (see `touch/straight.rs`).
@@ -343,8 +303,9 @@ impl<V: Wide> Pairs<V> {
         let (zero, half) = (V::splat(0.0), V::splat(0.5));
         let time = half.mul(self.dt);
         let mut then = self.moments(shapes, time, V::splat(f32::INFINITY));
-        let (anchor, separation) = then.nearest();
-        let normal = then.normal;
+        let found = &mut then.manifolds;
+        let (anchor, separation) = found.nearest();
+        let normal = found.normal;
         let on_a = self.swing(0, then.turning[0], anchor, normal);
         let on_b = self.swing(1, then.turning[1], anchor.minus(then.offset), normal);
         let nearer = self.between.dot(normal).mul(time).add(on_b.sub(on_a));
@@ -352,11 +313,11 @@ impl<V: Wide> Pairs<V> {
         let (scale, speculative) = (self.scale(), V::splat(setup.params.speculative_distance));
         let most = scale.mul(V::splat(TOUCHING)).min(speculative);
         let rolls = less(absolute(nearer), scale.mul(V::splat(ROLLING))).mul(less(now, most));
-        let rolls = then.tells.if_positive(zero, rolls.mul(then.some));
+        let rolls = found.tells.if_positive(zero, rolls.mul(found.some));
         // As if they had come so near at once, along the normal.
-        then.anchor[0] = anchor.minus(normal.scaled(half.mul(nearer)));
+        found.anchor[0] = anchor.minus(normal.scaled(half.mul(nearer)));
         then.offset = then.offset.minus(normal.scaled(nearer));
-        (then.separation[0], then.time, then.two) = (now, zero, zero);
+        (found.separation[0], found.two, then.time) = (now, zero, zero);
         (then, rolls)
     }
 
@@ -369,22 +330,23 @@ impl<V: Wide> Pairs<V> {
     /// How fast both points come nearer, in m/s. Written out, as a closure might be compiled without the instructions of its kernel.
     #[inline(always)]
     fn closing_of_both(&self, at: &Moments<V>) -> [V; 2] {
-        [self.closing(at.anchor[0], at.offset, at.normal), self.closing(at.anchor[1], at.offset, at.normal)]
+        let Manifolds { anchor, normal, .. } = at.manifolds;
+        [self.closing(anchor[0], at.offset, normal), self.closing(anchor[1], at.offset, normal)]
     }
 
     /// One for those that may touch within the rest of so many seconds: what is apart along a direction stays so for as long as nothing
     /// moves further along it.
     #[inline(always)]
     fn come_near(&self, at: &Moments<V>, dt: V) -> V {
-        let (_, separation) = at.nearest();
-        let way = self.bound_along(at.normal).mul(dt.sub(at.time));
+        let (_, separation) = at.manifolds.least();
+        let way = self.bound_along(at.manifolds.normal).mul(dt.sub(at.time));
         less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
     }
 
     /// One for those of which one corner runs into another, at such a speed, that it overlaps by so little that it may pass over it: see
     /// `touch.rs`.
     #[inline(always)]
-    fn run_into_corners(&self, at: &Moments<V>, closing: V) -> V {
+    fn run_into_corners(&self, at: &Manifolds<V>, closing: V) -> V {
         let (_, nearest) = at.least();
         let overlap = absolute(at.anchor[1].minus(at.anchor[0]).cross(at.normal));
         let (a, b) = (self.half[0].x.min(self.half[0].y), self.half[1].x.min(self.half[1].y));
@@ -401,42 +363,43 @@ impl<V: Wide> Pairs<V> {
         let (mut at, mut going, mut ending, mut found) = (*now, asked, zero, zero);
         let scale = self.scale();
         for _ in 0..if S::OF_SEGMENTS { MORE_ROUNDS } else { ROUNDS } {
-            let (anchor, separation) = at.nearest();
-            let (bound, left) = (self.bound_along(at.normal), dt.sub(at.time));
+            let (anchor, separation) = at.manifolds.nearest();
+            let (bound, left) = (self.bound_along(at.manifolds.normal), dt.sub(at.time));
             going = self.come_near(&at, dt).if_positive(going, zero);
             if !going.any_positive() {
                 break;
             }
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
-            let closing = self.closing(anchor, at.offset, at.normal).max(zero);
+            let closing = self.closing(anchor, at.offset, at.manifolds.normal).max(zero);
             let closing = if S::OF_SEGMENTS { bound } else { closing };
             let mut speed = V::splat(0.5).mul(bound.add(closing));
             if S::OF_SEGMENTS {
                 let whole = self.between.dot(self.between).sqrt().add(self.sweep(0).add(self.sweep(1)));
                 speed = speed.if_positive(speed, whole);
             }
-            let way = at.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
+            let way = at.manifolds.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
             let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);
             at = Moments::pick(going, &next, &at);
-            going = going.mul(at.some);
-            let (_, separation) = at.nearest();
-            let touches = at.tells.if_positive(zero, going);
+            going = going.mul(at.manifolds.some);
+            let (_, separation) = at.manifolds.least();
+            let touches = at.manifolds.tells.if_positive(zero, going);
             let deep = less(separation, scale.mul(V::splat(DEEP))).mul(touches);
             let near = less(separation, scale.mul(V::splat(NEAR))).mul(touches);
             ending = ending.max(deep);
             found = found.max(deep.if_positive(zero, near));
             going = near.max(deep).if_positive(zero, going);
         }
-        ending = at.tells.if_positive(zero, ending.max(going));
+        let last = at.manifolds;
+        ending = last.tells.if_positive(zero, ending.max(going));
         // Of two points the further one may be the first to touch.
         let never = V::splat(f32::INFINITY);
         let closing = self.closing_of_both(&at);
-        let first = less(zero, closing[0]).if_positive(at.separation[0].div(closing[0]), never);
-        let second = less(zero, closing[1]).if_positive(at.separation[1].div(closing[1]), never);
+        let first = less(zero, closing[0]).if_positive(last.separation[0].div(closing[0]), never);
+        let second = less(zero, closing[1]).if_positive(last.separation[1].div(closing[1]), never);
         // Where one is too deep, it is that one's moment.
-        let (second_is_nearest, nearest) = at.least();
+        let (second_is_nearest, nearest) = last.least();
         let of_nearest = second_is_nearest.if_positive(second, first);
-        let of_any = at.two.if_positive(first.min(second), first);
+        let of_any = last.two.if_positive(first.min(second), first);
         let soonest = less(nearest, zero).if_positive(of_nearest, of_any);
         let closes = less(soonest, never).mul(ending);
         let time = at.time.add(soonest);
@@ -445,7 +408,7 @@ impl<V: Wide> Pairs<V> {
         if exact.any_positive() {
             let then = self.moments(shapes, time.max(zero), reach);
             at = Moments::pick(exact, &then, &at);
-            found = found.max(exact.mul(then.some));
+            found = found.max(exact.mul(then.manifolds.some));
         }
         (at, found)
     }

@@ -1,9 +1,10 @@
 //! Discs and polygons, sixteen pairs at once: what `manifold/convex.rs` does for one, in the same words and with the same bits.
 
-use super::broad_phase::Pair;
-use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, opposite};
-use super::wide_outlines::{Polygon, WideOutlines};
-use super::wide_pairs::{Pairs, WidePairs};
+use super::manifolds::Manifolds;
+use super::moments::{Points, Search, Shaped, Shapes, opposite};
+use super::outlines::{Polygon, WideOutlines};
+use super::pairs::{Pairs, WidePairs};
+use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::{Wide, WideRow};
 use crate::parallel::vectors::Vectors;
@@ -12,7 +13,7 @@ use crate::tiling::tile::Tile;
 
 /// Sixteen pairs of a disc and a polygon.
 #[derive(Default, Debug)]
-pub(super) struct WideDiscs {
+pub(in crate::collide) struct WideDiscs {
     pairs: WidePairs,
     outlines: WideOutlines,
     /// One where the disc is body A, else zero.
@@ -54,7 +55,7 @@ impl<V: Wide> Shapes<V> for Discs<V> {
     const WITH_DISCS: bool = true;
 
     #[inline(always)]
-    fn manifolds(&self, pairs: &Pairs<V>, time: V, offset: Vectors<V>, turning: [Vectors<V>; 2], _: V) -> Moments<V> {
+    fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], _: V) -> Manifolds<V> {
         let (one, zero, half) = (V::splat(1.0), V::splat(0.0), V::splat(0.5));
         let none = Vectors::new(zero, zero);
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
@@ -73,17 +74,6 @@ impl<V: Wide> Shapes<V> for Discs<V> {
         let anchor = on_a.plus(normal.scaled(pairs.radius[0].add(half.mul(separation))));
         // Back to the frame of the world.
         let (normal, anchor) = (rotation[0].rotate(normal), rotation[0].rotate(anchor));
-        Moments {
-            time,
-            offset,
-            turning,
-            some: one,
-            two: zero,
-            tells: zero,
-            normal,
-            anchor: [anchor; 2],
-            separation: [separation; 2],
-            feature: [zero; 2],
-        }
+        Manifolds::single(one, normal, anchor, separation, zero)
     }
 }

@@ -1,9 +1,10 @@
 //! The boxes of sixteen pairs: what `manifold/box_box.rs` does for two, in the same words and with the same bits.
 
-use super::broad_phase::Pair;
-use super::manifold::box_box::PREFERENCE;
-use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, negated, opposite};
-use super::wide_pairs::{Pairs, WidePairs};
+use super::manifolds::Manifolds;
+use super::moments::{Points, Search, Shaped, Shapes, negated, opposite};
+use super::pairs::{Pairs, WidePairs};
+use crate::collide::broad_phase::Pair;
+use crate::collide::manifold::box_box::PREFERENCE;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less};
@@ -12,7 +13,7 @@ use crate::tiling::tile::Tile;
 
 /// Sixteen pairs of boxes.
 #[derive(Default, Debug)]
-pub(super) struct WideBoxes(WidePairs);
+pub(in crate::collide) struct WideBoxes(WidePairs);
 
 impl Shaped for WideBoxes {
     #[inline(always)]
@@ -53,14 +54,7 @@ struct Boxes;
 
 impl<V: Wide> Shapes<V> for Boxes {
     #[inline(always)]
-    fn manifolds(
-        &self,
-        pairs: &Pairs<V>,
-        time: V,
-        offset: Vectors<V>,
-        turning: [Vectors<V>; 2],
-        reach: V,
-    ) -> Moments<V> {
+    fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V> {
         let (one, zero, half) = (V::splat(1.0), V::splat(0.0), V::splat(0.5));
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
         let turn = rotation[0].to(rotation[1]);
@@ -108,10 +102,7 @@ impl<V: Wide> Shapes<V> for Boxes {
         // The edge clipped to the width of the face.
         let span = place[1].sub(place[0]);
         let slope = span.if_positive(rise[1].sub(rise[0]).div(span), zero);
-        let mut at = Moments {
-            time,
-            offset,
-            turning,
+        let mut at = Manifolds {
             some: beyond.if_positive(zero, one),
             two: corner.if_positive(zero, one),
             tells: zero,

@@ -1,6 +1,6 @@
 //! The outlines of sixteen convex pieces: what `Convex` does for one, in the same words and with the same bits.
 
-use super::wide_boxes::nearest;
+use super::boxes::nearest;
 use crate::model::math::max;
 use crate::model::piece::Piece;
 use crate::model::shape::MOST_CORNERS;

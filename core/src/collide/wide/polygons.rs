@@ -1,11 +1,12 @@
 //! The convex pieces of sixteen pairs: what `manifold/convex.rs` does for two, in the same words and with the same bits.
 
-use super::broad_phase::Pair;
-use super::manifold::box_box::PREFERENCE;
-use super::manifold::chain::Lies;
-use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, WidePieces, opposite};
-use super::wide_outlines::{Face, Polygon, WideOutlines, clip};
-use super::wide_pairs::{Pairs, WidePairs};
+use super::manifolds::Manifolds;
+use super::moments::{Points, Search, Shaped, Shapes, WidePieces, opposite};
+use super::outlines::{Face, Polygon, WideOutlines, clip};
+use super::pairs::{Pairs, WidePairs};
+use crate::collide::broad_phase::Pair;
+use crate::collide::manifold::box_box::PREFERENCE;
+use crate::collide::manifold::chain::Lies;
 use crate::model::contact::Contact;
 use crate::model::piece::Piece;
 use crate::parallel::lanes::Wide;
@@ -15,7 +16,7 @@ use crate::tiling::tile::Tile;
 
 /// A piece of each body of sixteen pairs, all of which have faces.
 #[derive(Default, Debug)]
-pub(super) struct WidePolygons {
+pub(in crate::collide) struct WidePolygons {
     pairs: WidePairs,
     outlines: [WideOutlines; 2],
 }
@@ -106,14 +107,7 @@ struct Polygons<V>([Polygon<V>; 2]);
 
 impl<V: Wide> Shapes<V> for Polygons<V> {
     #[inline(always)]
-    fn manifolds(
-        &self,
-        pairs: &Pairs<V>,
-        time: V,
-        offset: Vectors<V>,
-        turning: [Vectors<V>; 2],
-        reach: V,
-    ) -> Moments<V> {
+    fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V> {
         let (one, zero, half) = (V::splat(1.0), V::splat(0.0), V::splat(0.5));
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
         let a = &self.0[0];
@@ -141,10 +135,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let other_radius = from_b.if_positive(pairs.radius[0], pairs.radius[1]);
         let [from, to] = reference.ends;
         let clipped = clip(reference.ends, n, edge.ends, [radius, other_radius]);
-        let mut at = Moments {
-            time,
-            offset,
-            turning,
+        let mut at = Manifolds {
             some: beyond.if_positive(zero, one),
             two: clipped.two.mul(clipped.none.if_positive(zero, one)),
             tells: zero,

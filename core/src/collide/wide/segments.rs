@@ -1,12 +1,13 @@
 //! Segments of chains and convex pieces, sixteen pairs at once: what `manifold/chain.rs` does for one, in the same words and with the same
 //! bits.
 
-use super::broad_phase::Pair;
-use super::manifold::chain::{BEYOND, FAR, Lies, SAME};
-use super::touch::lies;
-use super::wide_moments::{Moments, Points, Search, Shaped, Shapes, WidePieces, negated, opposite};
-use super::wide_outlines::{Face, Polygon, WideOutlines, clip};
-use super::wide_pairs::{Pairs, WidePairs};
+use super::manifolds::Manifolds;
+use super::moments::{Points, Search, Shaped, Shapes, WidePieces, negated, opposite};
+use super::outlines::{Face, Polygon, WideOutlines, clip};
+use super::pairs::{Pairs, WidePairs};
+use crate::collide::broad_phase::Pair;
+use crate::collide::manifold::chain::{BEYOND, FAR, Lies, SAME};
+use crate::collide::touch::lies;
 use crate::model::contact::Contact;
 use crate::model::piece::{Joint, Piece};
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
@@ -16,7 +17,7 @@ use crate::tiling::tile::Tile;
 
 /// A piece of one body of sixteen pairs, and the segment that the other is.
 #[derive(Default, Debug)]
-pub(super) struct WideSegments {
+pub(in crate::collide) struct WideSegments {
     pairs: WidePairs,
     outlines: WideOutlines,
     /// Center of the piece; one where it [lies](Lies) on the segment, and how far behind it that may be.
@@ -128,71 +129,25 @@ struct Segments<V> {
     are_first: V,
 }
 
-/// Manifolds of one point or two, seen from the segment.
-#[derive(Clone, Copy)]
-struct Found<V> {
-    some: V,
-    two: V,
-    normal: Vectors<V>,
-    anchor: [Vectors<V>; 2],
-    separation: [V; 2],
-    feature: [V; 2],
+/// Manifolds at a corner, with a radius around it, so high over a segment.
+#[inline(always)]
+fn at_corner<V: Wide>(some: V, corner: Vectors<V>, height: V, n: Vectors<V>, radius: V, feature: V) -> Manifolds<V> {
+    let separation = height.sub(radius);
+    let anchor = corner.minus(n.scaled(height.sub(V::splat(0.5).mul(separation))));
+    Manifolds::single(some, n, anchor, separation, feature)
 }
 
-impl<V: Wide> Found<V> {
-    /// Those at a corner, with a radius around it, so high over a segment.
-    #[inline(always)]
-    fn of_corner(some: V, corner: Vectors<V>, height: V, n: Vectors<V>, radius: V, feature: V) -> Self {
-        let separation = height.sub(radius);
-        let anchor = corner.minus(n.scaled(height.sub(V::splat(0.5).mul(separation))));
-        Self::single(some, n, anchor, separation, feature)
-    }
-
-    #[inline(always)]
-    fn single(some: V, normal: Vectors<V>, anchor: Vectors<V>, separation: V, feature: V) -> Self {
-        let (two, anchor, separation) = (V::splat(0.0), [anchor; 2], [separation; 2]);
-        Self { some, two, normal, anchor, separation, feature: [feature; 2] }
-    }
-
-    /// `yes` where a number is positive, else `no`.
-    #[inline(always)]
-    fn pick(positive: V, yes: &Self, no: &Self) -> Self {
-        Self {
-            some: positive.if_positive(yes.some, no.some),
-            two: positive.if_positive(yes.two, no.two),
-            normal: Vectors::pick(positive, yes.normal, no.normal),
-            anchor: [
-                Vectors::pick(positive, yes.anchor[0], no.anchor[0]),
-                Vectors::pick(positive, yes.anchor[1], no.anchor[1]),
-            ],
-            separation: [
-                positive.if_positive(yes.separation[0], no.separation[0]),
-                positive.if_positive(yes.separation[1], no.separation[1]),
-            ],
-            feature: [
-                positive.if_positive(yes.feature[0], no.feature[0]),
-                positive.if_positive(yes.feature[1], no.feature[1]),
-            ],
-        }
-    }
-
-    /// The least separation.
-    #[inline(always)]
-    fn nearest(&self) -> V {
-        self.two.if_positive(self.separation[1].min(self.separation[0]), self.separation[0])
-    }
-
-    /// One where it is further than what makes a contact.
-    #[inline(always)]
-    fn is_far(&self) -> V {
-        less(V::splat(FAR), self.nearest())
-    }
+/// One where a manifold is further than what makes a contact.
+#[inline(always)]
+fn is_far<V: Wide>(found: &Manifolds<V>) -> V {
+    let (_, separation) = found.least();
+    less(V::splat(FAR), separation)
 }
 
 /// Pieces at one end of their segments.
 struct AtEnd<V> {
     distance: V,
-    found: Found<V>,
+    found: Manifolds<V>,
 }
 
 impl<V: Wide> AtEnd<V> {
@@ -200,15 +155,15 @@ impl<V: Wide> AtEnd<V> {
     #[inline(always)]
     fn none() -> Self {
         let (zero, none) = (V::splat(0.0), Vectors::new(V::splat(0.0), V::splat(0.0)));
-        Self { distance: V::splat(f32::INFINITY), found: Found::single(zero, none, none, zero, zero) }
+        Self { distance: V::splat(f32::INFINITY), found: Manifolds::single(zero, none, none, zero, zero) }
     }
 
     /// Takes another where it is asked to, and that is nearer.
     #[inline(always)]
-    fn take(&mut self, asked: V, distance: V, found: &Found<V>) {
+    fn take(&mut self, asked: V, distance: V, found: &Manifolds<V>) {
         let nearer = less(distance, self.distance).mul(asked);
         self.distance = nearer.if_positive(distance, self.distance);
-        self.found = Found::pick(nearer, found, &self.found);
+        self.found = Manifolds::pick(nearer, found, &self.found);
     }
 }
 
@@ -240,7 +195,7 @@ impl<V: Wide> Segments<V> {
 
     /// Along the segment's own normal, as far as the piece, of which some are but a corner, is over it.
     #[inline(always)]
-    fn against_face(&self, other: &Polygon<V>, single: V) -> Found<V> {
+    fn against_face(&self, other: &Polygon<V>, single: V) -> Manifolds<V> {
         let Self { n, radius, .. } = *self;
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
         let [from, to] = self.ends;
@@ -251,9 +206,10 @@ impl<V: Wide> Segments<V> {
         }
         let clipped = clip([to, from], n, edge.ends, [zero, radius]);
         let feature = edge.number.add(edge.number);
-        let over = Found {
+        let over = Manifolds {
             some: not(clipped.none),
             two: clipped.two,
+            tells: V::splat(0.0),
             normal: n,
             anchor: clipped.anchor,
             separation: clipped.separation,
@@ -264,7 +220,7 @@ impl<V: Wide> Segments<V> {
         let (along, height, square) = (point.minus(from).dot(way), point.minus(from).dot(n), way.dot(way));
         let beyond = V::splat(BEYOND);
         let is_over = at_least(along, zero.sub(beyond).mul(square)).mul(at_least(one.add(beyond).mul(square), along));
-        Found::pick(single, &Found::of_corner(is_over, point, height, n, radius, zero), &over)
+        Manifolds::pick(single, &at_corner(is_over, point, height, n, radius, zero), &over)
     }
 
     /// One where corners and edges of the piece come between the ends of the segment at one of some heights.
@@ -289,9 +245,9 @@ impl<V: Wide> Segments<V> {
         at_least(self.length, low).mul(at_least(high, V::splat(0.0)))
     }
 
-    /// What is between each segment and a piece, seen from the segment, and one where that only tells how far they are from each other.
+    /// What is between each segment and a piece, seen from the segment.
     #[inline(always)]
-    fn collide(&self, other: &Polygon<V>, center: Vectors<V>, reach: V) -> (Found<V>, V) {
+    fn collide(&self, other: &Polygon<V>, center: Vectors<V>, reach: V) -> Manifolds<V> {
         let Self { radius, length, along, n, .. } = *self;
         let zero = V::splat(0.0);
         let from = self.ends[0];
@@ -317,8 +273,8 @@ impl<V: Wide> Segments<V> {
         let is_before = is_pressed.max(at_least(from_center.dot(n), zero));
         let against = self.against_face(other, single);
         // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
-        let of_lowest = Found::of_corner(is_over, corner, lowest, n, radius, V::splat(512.0).add(number));
-        let mut over = Found::pick(against.some, &against, &of_lowest);
+        let of_lowest = at_corner(is_over, corner, lowest, n, radius, V::splat(512.0).add(number));
+        let mut over = Manifolds::pick(against.some, &against, &of_lowest);
         over.some = over.some.mul(is_before);
         // What is between the ends has nothing to do with these.
         let margin = V::splat(BEYOND).mul(length);
@@ -327,11 +283,11 @@ impl<V: Wide> Segments<V> {
         let mut done = over.some.mul(is_within).mul(at_least(highest, behind)).max(beyond);
         if !not(done).any_positive() {
             over.some = beyond.if_positive(zero, over.some);
-            return (over, zero);
+            return over;
         }
         let at_ends = [nearest_of(other, self.ends[0], single), nearest_of(other, self.ends[1], single)];
         // What has come behind the segment around an end of it is not pressed into its face.
-        let doubtful = done.if_positive(zero, less(over.nearest(), zero).mul(over.some));
+        let doubtful = done.if_positive(zero, less(over.least().1, zero).mul(over.some));
         if doubtful.any_positive() {
             // Its lowest corner may be above the surface by no more than rounding then.
             let comes = self.comes_to(other, [behind, radius.max(lowest)]);
@@ -340,10 +296,10 @@ impl<V: Wide> Segments<V> {
         }
         // What lies over the segment with its nearest point is nearest there.
         done = done.max(over.some.mul(less(zero, lowest)).mul(is_over));
-        let (at_end, tells) = self.at_ends(at_ends, center, [single, is_before], &over, lowest);
-        let mut found = Found::pick(done, &over, &at_end);
+        let at_end = self.at_ends(at_ends, center, [single, is_before], &over, lowest);
+        let mut found = Manifolds::pick(done, &over, &at_end);
         found.some = beyond.if_positive(zero, found.some);
-        (found, done.if_positive(zero, tells))
+        found
     }
 
     /// The same of those whose ends count, from the direction and the distance of the piece at these; `over` is what is along the normal.
@@ -353,9 +309,9 @@ impl<V: Wide> Segments<V> {
         nearest_at: [(Vectors<V>, V); 2],
         center: Vectors<V>,
         [single, is_before]: [V; 2],
-        over: &Found<V>,
+        over: &Manifolds<V>,
         lowest: V,
-    ) -> (Found<V>, V) {
+    ) -> Manifolds<V> {
         let n = self.n;
         let (zero, half) = (V::splat(0.0), V::splat(0.5));
         let (mut touched, mut nearest) = (AtEnd::none(), AtEnd::none());
@@ -376,25 +332,27 @@ impl<V: Wide> Segments<V> {
             let separation = distance.sub(self.radius);
             let anchor = end.plus(normal.scaled(half.mul(separation)));
             let feature = single.if_positive(zero, V::splat(256.0 + number as f32));
-            let found = Found::single(V::splat(1.0), normal, anchor, separation, feature);
+            let found = Manifolds::single(V::splat(1.0), normal, anchor, separation, feature);
             touched.take(may, distance, &found);
             // Whoever is on the solid side, but for a joint, is let through.
             nearest.take(is_before, distance, &found);
         }
         let (has_over, has_nearest) = (over.some, nearest.found.some);
-        let is_touched = touched.found.some.mul(not(touched.found.is_far()));
+        let is_touched = touched.found.some.mul(not(is_far(&touched.found)));
         let is_deep = at_least(zero, lowest);
         // What lies over an edge is deep in the wall below it, and touches what is before the edge; and along the segment's normal what
         // reaches beyond it may be nearer than what is over it.
         let is_below = is_deep.mul(less(lowest, beyond));
-        let is_nearer = over.is_far().mul(nearest.found.is_far());
+        let is_nearer = is_far(over).mul(is_far(&nearest.found));
         let only_nearest = not(is_touched).mul(has_nearest);
         let tells = only_nearest.mul(has_over.if_positive(is_below.max(is_nearer), V::splat(1.0)));
         // Both are ways out.
         let is_way_out = has_over.mul(is_deep).mul(at_least(lowest, touched.distance));
         let takes_over = has_over.mul(not(is_touched).max(is_way_out));
-        let found = Found::pick(takes_over, over, &touched.found);
-        (Found::pick(tells, &nearest.found, &found), tells)
+        let found = Manifolds::pick(takes_over, over, &touched.found);
+        let mut found = Manifolds::pick(tells, &nearest.found, &found);
+        found.tells = tells;
+        found
     }
 }
 
@@ -415,182 +373,24 @@ impl<V: Wide> Shapes<V> for Segments<V> {
     const WITH_DISCS: bool = true;
 
     #[inline(always)]
-    fn manifolds(
-        &self,
-        pairs: &Pairs<V>,
-        time: V,
-        offset: Vectors<V>,
-        turning: [Vectors<V>; 2],
-        reach: V,
-    ) -> Moments<V> {
+    fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V> {
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
         let way = Vectors::pick(self.are_first, offset, opposite(offset));
         let own = Vectors::pick(self.are_first, rotation[0], rotation[1]);
         let (turn, seen) = (own.to(Vectors::pick(self.are_first, rotation[1], rotation[0])), own.unrotate(way));
         let other = self.outline.seen(turn, seen, self.outline.most);
         let center = turn.rotate(self.center).plus(seen);
-        let (found, tells) = self.collide(&other, center, reach);
+        let mut found = self.collide(&other, center, reach);
         // Back to the frame of the world, and of body A.
-        let (normal, mut anchor) = (own.rotate(found.normal), found.anchor);
-        for anchor in &mut anchor {
+        let normal = own.rotate(found.normal);
+        found.normal = Vectors::pick(self.are_first, normal, opposite(normal));
+        for anchor in &mut found.anchor {
             let from_center = own.rotate(*anchor);
             *anchor = Vectors::pick(self.are_first, from_center, from_center.plus(offset));
         }
-        Moments {
-            time,
-            offset,
-            turning,
-            some: found.some,
-            two: found.two,
-            tells,
-            normal: Vectors::pick(self.are_first, normal, opposite(normal)),
-            anchor,
-            separation: found.separation,
-            feature: found.feature,
-        }
+        found
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::collide::piece_boxes::PieceBoxes;
-    use crate::collide::touch::{Meeting, Met, meet};
-    use crate::model::body::Body;
-    use crate::model::contact::{Contact, ContactPoint};
-    use crate::model::id::{GlobalId, KindId, TileId};
-    use crate::model::kind::{Kind, KindRow, Material};
-    use crate::model::math::Rot;
-    use crate::model::params::{Instructions, Params};
-    use crate::model::shape::{Segment, Shape};
-    use crate::parallel::lanes::{Kernel, LaneSet, Lanes};
-    use crate::testing::{any_convex, any_gap, any_rotation, at_gap, cases};
-    use crate::tiling::blueprint::Blueprint;
-    use crate::tiling::partition::Partition;
-    use crate::tiling::tile::Tile;
-    use bytemuck::Zeroable;
-    use glam::{DVec2, Vec2};
-    use proptest::prelude::*;
-
-    /// The lane that is looked at.
-    const LANE: usize = 5;
-
-    /// Looks at a meeting in each of sixteen lanes.
-    struct Look<'a, 'm>(&'a mut Meeting<'m>, &'a Tile, &'a Setup);
-
-    impl Kernel for Look<'_, '_> {
-        type Output = ();
-        fn run<V: Lanes>(self) {
-            let Self(meeting, tile, setup) = self;
-            let (mut pairs, mut points) = (WideSegments::default(), Points::default());
-            (0..WIDE).for_each(|lane| meeting.set(lane, &mut pairs, tile, setup));
-            pairs.look::<V::Wide>(&mut points, Search::WhereManyNeedIt, setup);
-            assert!(!points.is_postponed(LANE), "all sixteen need it, or none");
-            if points.is_unsure(LANE) {
-                meeting.touch(tile, setup);
-            } else {
-                meeting.see(LANE, &points);
-            }
-        }
-    }
-
-    /// A tile with a body, at a place seen from a segment, and that.
-    fn over_segment(
-        kind: Kind,
-        segment: Segment,
-        (place, rotation, velocity, angular_velocity): (DVec2, Rot, Vec2, f32),
-        (turned, turns): (Rot, f32),
-    ) -> (Tile, Setup) {
-        let partition = Partition::uniform(DVec2::ZERO, DVec2::splat(20.0), 1, 1).unwrap();
-        let blueprint = Blueprint { params: Params::default(), partition, kinds: vec![kind], statics: Vec::new() };
-        let mut setup = Setup::new(&blueprint).unwrap();
-        setup.kinds.push(KindRow::fixed(&Kind::new(Shape::Segment(segment), Material::default())).unwrap());
-        let mut tile = Tile::new(TileId(0), &setup);
-        let bodies = [(place, rotation, velocity, angular_velocity), (DVec2::ZERO, turned, Vec2::ZERO, turns)];
-        for (k, (place, rotation, velocity, angular_velocity)) in bodies.into_iter().enumerate() {
-            let (id, kind, position) = (GlobalId(k as u64), KindId(k as u32), DVec2::splat(10.0) + place);
-            tile.bodies.push(Body { id, kind, position, rotation, velocity, angular_velocity });
-        }
-        (tile, setup)
-    }
-
-    /// Fails unless every bit of a contact is the same, whoever looks for it.
-    fn same_contacts(tile: &Tile, bodies: Pair, known: &[&Contact], setup: &Setup) -> Result<(), TestCaseError> {
-        let meeting = || {
-            let mut found = None;
-            meet(tile, bodies, &PieceBoxes::default(), known, setup, |meeting| found = Some(meeting));
-            found.filter(|meeting| matches!(meeting.outcome, Met::Open))
-        };
-        let Some(mut expected) = meeting() else { return Ok(()) };
-        expected.touch(tile, setup);
-        for instructions in [Instructions::Auto, Instructions::Portable] {
-            let mut found = meeting().unwrap();
-            LaneSet::of(instructions).unwrap().run(Look(&mut found, tile, setup));
-            prop_assert_eq!(found.contact().is_some(), expected.contact().is_some());
-            if let (Some((contact, separation)), Some((expected, now))) = (found.contact(), expected.contact()) {
-                prop_assert_eq!(bytemuck::bytes_of(contact), bytemuck::bytes_of(expected));
-                for point in 0..expected.points().len() {
-                    prop_assert_eq!(separation[point].to_bits(), now[point].to_bits());
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// One of a few directions, so that neighbours often go straight on.
-    fn any_turn() -> impl Strategy<Value = Option<f32>> {
-        prop_oneof![Just(None), Just(Some(0.0)), (-3.0_f32..3.0).prop_map(Some)]
-    }
-
-    /// A capsule that glides over a segment of a centimeter, and comes away from its end while it comes down on it.
-    #[test]
-    fn sixteen_glide_off_as_one_does() {
-        let ends = [Vec2::new(-0.005, 0.0), Vec2::new(0.005, 0.0)];
-        let beside = [Some(Vec2::new(-0.015, 0.0)), Some(Vec2::new(0.07, 0.0))];
-        let (segment, _) = Segment::new(beside[0], ends[0], ends[1], beside[1]).unwrap();
-        let capsule = Kind::new(Shape::capsule(0.547_431_2, 0.196_753_7).unwrap(), Material::default());
-        let near = DVec2::new(-0.261_244_277_2, 0.199_505_401_2);
-        for step in 0..400 {
-            let velocity = Vec2::new(-0.956_281_36 - 0.002 * step as f32, 0.009_192_503);
-            let body = (near, Rot::from_angle(-0.010_130_988), velocity, -0.033_585_604);
-            let (tile, setup) = over_segment(capsule.clone(), segment, body, (Rot::IDENTITY, 0.0));
-            same_contacts(&tile, [0, 1], &[], &setup).unwrap();
-        }
-    }
-
-    proptest! {
-        #![proptest_config(cases(16384))]
-
-        /// Every bit of one contact, whoever looks for it.
-        #[test]
-        fn sixteen_meet_segments_as_one_does(
-            kind in any_convex(0.05, 2.0), length in 0.02_f32..4.0, joints in [any_turn(), any_turn()],
-            (along, height) in (-3.0_f64..3.0, -0.6_f64..2.0), closeness in 0_u32..3,
-            (vx, vy) in (-200.0_f32..200.0, -200.0_f32..200.0), slowness in 0_u32..4,
-            (spin, turns) in (prop_oneof![Just(0.0_f32), -40.0_f32..40.0], prop_oneof![Just(0.0_f32), -2.0_f32..2.0]),
-            rotations in [any_rotation(), any_rotation()], gap in any_gap(), lay: bool, is_first: bool,
-        ) {
-            let ends = [Vec2::new(-0.5 * length, 0.0), Vec2::new(0.5 * length, 0.0)];
-            let beside = |end: Vec2, way: f32, turn: f32| end + Rot::from_angle(turn).rotate(Vec2::new(way, 0.0));
-            let (before, after) = (joints[0].map(|turn| beside(ends[0], -1.0, turn)), joints[1].map(|turn| beside(ends[1], 1.0, turn)));
-            let (segment, _) = Segment::new(before, ends[0], ends[1], after).unwrap();
-            let setup_of = |kind: &Kind| KindRow::fixed(kind).unwrap();
-            let rows = [setup_of(&kind), setup_of(&Kind::new(Shape::Segment(segment), Material::default()))];
-            let round = rows[0].bounding_radius;
-            // Most often as near as what lies on it.
-            let near = DVec2::new(along, height * 0.3_f64.powi(closeness as i32)) + DVec2::Y * f64::from(round) * f64::from(closeness.min(1));
-            let (c, s) = (f64::from(rotations[1].c), f64::from(rotations[1].s));
-            let away = DVec2::new(c * near.x - s * near.y, s * near.x + c * near.y);
-            let offset = -at_gap(gap, [&rows[0], &rows[1]], rotations, -away);
-            let velocity = Vec2::new(vx, vy) * 0.1_f32.powi(slowness as i32);
-            let (tile, setup) = over_segment(kind, segment, (offset, rotations[0], velocity, spin), (rotations[1], turns));
-            // Who lay on its face pressed there at another point.
-            let point = ContactPoint { normal_impulse: 1.0, feature: ContactPoint::ABSENT - 1, ..ContactPoint::NONE };
-            let (normal, points) = (rotations[1].rotate(Vec2::Y), [point, ContactPoint::NONE]);
-            let [rotation_a, rotation_b] = if is_first { [rotations[1], rotations[0]] } else { rotations };
-            let known = Contact { normal, rotation_a, rotation_b, points, ..Contact::zeroed() };
-            let known: Vec<&Contact> = Some(&known).filter(|_| lay).into_iter().collect();
-            same_contacts(&tile, if is_first { [1, 0] } else { [0, 1] }, &known, &setup)?;
-        }
-    }
-}
+mod tests;

@@ -1,10 +1,10 @@
 //! Sixteen pairs at once, at least one body of each being round: the contacts of what rolls, as most does in a pile, and of what
-//! touches within the step (`wide_touches.rs`).
+//! touches within the step (`wide/touches.rs`).
 
+use super::moments::Search;
+use super::touches::Touches;
 use crate::collide::broad_phase::Pair;
 use crate::collide::touch::{pressed, scale_of};
-use crate::collide::wide_moments::Search;
-use crate::collide::wide_touches::Touches;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
@@ -14,14 +14,14 @@ use crate::tiling::tile::Tile;
 use glam::Vec2;
 
 /// Surfaces nearer than this touch, in m.
-pub(super) const TOUCHING: f32 = 0.002;
+pub(in crate::collide) const TOUCHING: f32 = 0.002;
 
 /// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
-pub(super) const ROLLING: f32 = 0.0005;
+pub(in crate::collide) const ROLLING: f32 = 0.0005;
 
 /// Sixteen pairs of bodies A and B, one of which is round.
 #[derive(Default, Debug)]
-pub(super) struct WidePairs {
+pub(in crate::collide) struct WidePairs {
     /// One where they pressed at each other in the last step, else zero.
     pressed: WideRow,
     /// One where one of them is a static, else zero.
@@ -37,7 +37,7 @@ pub(super) struct WidePairs {
 }
 
 /// What can be said of sixteen pairs of some kind.
-pub(super) trait Outlook: Default {
+pub(in crate::collide) trait Outlook: Default {
     /// Whether it takes longer than one pair after another where lanes are no registers.
     const NEEDS_REGISTERS: bool = false;
 
@@ -62,7 +62,7 @@ pub(super) trait Outlook: Default {
 
 /// What can be said of pairs with a round body.
 #[derive(Default, Debug)]
-pub(super) struct RoundOutlook {
+pub(in crate::collide) struct RoundOutlook {
     pairs: WidePairs,
     /// Positive if they make a contact, of which the others tell.
     meets: WideRow,
@@ -76,7 +76,14 @@ pub(super) struct RoundOutlook {
 
 impl WidePairs {
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, tile: &Tile, pair: Pair, known: Option<&Contact>, setup: &Setup) {
+    pub(in crate::collide) fn set(
+        &mut self,
+        lane: usize,
+        tile: &Tile,
+        pair: Pair,
+        known: Option<&Contact>,
+        setup: &Setup,
+    ) {
         let (bodies, [a, b]) = (&tile.bodies, pair.map(|body| body as usize));
         let moves = |i: usize| bytemuck::cast([bodies.velocity[i].to_array(), bytemuck::cast(bodies.rotation[i])]);
         let offset = (bodies.position[b] - bodies.position[a]).as_vec2();
@@ -278,10 +285,10 @@ impl Outlook for RoundOutlook {
 mod tests {
     use super::*;
     use crate::collide::touch::touch;
-    use crate::collide::wide_boxes::WideBoxes;
-    use crate::collide::wide_discs::WideDiscs;
-    use crate::collide::wide_moments::PointOutlook;
-    use crate::collide::wide_polygons::WidePolygons;
+    use crate::collide::wide::boxes::WideBoxes;
+    use crate::collide::wide::discs::WideDiscs;
+    use crate::collide::wide::moments::PointOutlook;
+    use crate::collide::wide::polygons::WidePolygons;
     use crate::model::body::Body;
     use crate::model::id::{GlobalId, KindId, TileId};
     use crate::model::kind::Form;
