@@ -85,6 +85,7 @@ mod error;
 mod frame;
 #[cfg(feature = "iceoryx2")]
 pub mod iceoryx2;
+mod launched;
 pub mod local;
 #[cfg(feature = "mpi")]
 pub mod mpi;
@@ -98,6 +99,7 @@ mod stats;
 pub use collective::Collective;
 pub use error::{Aborted, RankFailure, TransportError};
 pub use frame::{Incoming, Outgoing};
+pub use launched::{Launched, launched, ranks_here};
 pub use rank::Rank;
 pub use stats::{Counting, Stats};
 

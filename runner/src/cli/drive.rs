@@ -37,6 +37,10 @@ impl Said {
     fn hear(&mut self, number: u64, text: String) {
         let step = match word(number, &text, self.until) {
             Ok(Word::Until(until)) => {
+                // Who goes on to a step that is made is told anew where the run waits.
+                if until <= self.until {
+                    self.waited_after = None;
+                }
                 self.until = self.until.max(until);
                 return;
             }
@@ -114,13 +118,14 @@ impl Host for Driver {
 
     fn next(&self, steps: u64, patience: Duration) -> Next {
         let mut said = self.lock();
-        let waiting = |said: &mut Said| !said.is_due(steps) && said.waits(steps);
-        if waiting(&mut said) {
-            // At first, and at once, it is said that there is nothing to do: whoever drives may wait for that.
-            if said.waited_after.replace(steps) != Some(steps) {
-                return Next::Wait;
-            }
-            said = self.more.wait_timeout_while(said, patience, waiting).expect("nobody panics who holds it").0;
+        let waits = |said: &Said| !said.is_due(steps) && said.waits(steps);
+        let has_told = |said: &Said| said.waited_after == Some(steps);
+        let is_quiet = |said: &mut Said| waits(said) && has_told(said);
+        said = self.more.wait_timeout_while(said, patience, is_quiet).expect("nobody panics who holds it").0;
+        // At first, and at once, it is said that there is nothing to do: whoever drives may wait for that.
+        if waits(&said) && !has_told(&said) {
+            said.waited_after = Some(steps);
+            return Next::Announce;
         }
         if said.is_due(steps) {
             let mut text = String::new();
@@ -188,8 +193,11 @@ mod tests {
         assert!(driver.calls(0) && driver.lingers());
         // Who drives step by step is kept waiting at none.
         let begun = Instant::now();
-        assert_eq!(driver.next(0, Duration::from_secs(60)), Next::Wait);
+        assert_eq!(driver.next(0, Duration::from_secs(60)), Next::Announce);
         assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+        assert_eq!(driver.next(0, Duration::from_millis(1)), Next::Wait);
+        driver.lock().hear(1, "{\"until\": 0}".to_owned());
+        assert_eq!(driver.next(0, Duration::from_secs(60)), Next::Announce);
         assert_eq!(driver.next(0, Duration::from_millis(1)), Next::Wait);
         driver.lock().hear(1, "{\"until\": 7}".to_owned());
         assert!(!driver.calls(6) && driver.calls(7));

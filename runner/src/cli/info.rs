@@ -197,6 +197,8 @@ fn blocks<'a>(text: &mut String, files: impl Iterator<Item = &'a SnapshotFile> +
 
 fn of_segment(path: &Path) -> Result<String, RecordingError> {
     let segment = Segment::open(path)?;
+    let stage = segment.stage()?;
+    segment.check_records(stage.as_ref().map_or(0, |stage| stage.kinds.len()))?;
     let (facts, records) = (&segment.facts, &segment.records);
     let mut text = format!(
         "recording of {}, seed {}: the part of rank {} of {}\n",
@@ -208,7 +210,7 @@ fn of_segment(path: &Path) -> Result<String, RecordingError> {
     let steps: Vec<String> = records.iter().map(|record| record.step.to_string()).collect();
     row(&mut text, "steps", &steps.join(" "));
     row(&mut text, "rows", &records.iter().map(|record| record.rows).sum::<u64>().to_string());
-    row(&mut text, "shapes", &segment.stage()?.as_ref().map_or("none: format 1".to_owned(), shapes));
+    row(&mut text, "shapes", &stage.as_ref().map_or("none: format 1".to_owned(), shapes));
     row(&mut text, "size", &megabytes(iter::once(path)));
     Ok(text)
 }

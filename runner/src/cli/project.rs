@@ -58,10 +58,7 @@ fn begin(args: &ProjectArgs) -> Result<Option<(Config, Network, Option<Measured>
         return Ok(Some((config?, args.network, None)));
     }
     #[cfg(feature = "mpi")]
-    if config
-        .as_ref()
-        .map_or_else(|_| launch::mpi::Job::is_launched(), |config| config.transport() == TransportKind::Mpi)
-    {
+    if config.as_ref().map_or_else(|_| launch::is_launched(), |config| config.transport() == TransportKind::Mpi) {
         let fit = launch::fit_job(config, complain)?;
         return Ok(fit.map(|(config, (network, measured))| (config, network, Some(measured))));
     }

@@ -48,6 +48,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit, RunError> {
         return over_mpi(args, config);
     }
     let config = config?;
+    launch::check_alone(&config)?;
     check_kept(args, &config)?;
     // First of all: what is in a folder may change while another run writes there.
     let held = hold(args)?;
@@ -267,9 +268,7 @@ fn hold_new(args: &RunArgs, plan: &Plan, held: Option<Claim>) -> Result<Option<C
 fn is_for_mpi(args: &RunArgs, config: &Result<Config, RunError>) -> bool {
     match config {
         Ok(config) => config.transport() == TransportKind::Mpi,
-        Err(_) => {
-            args.values.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::mpi::Job::is_launched()
-        }
+        Err(_) => args.values.transport.as_deref() == Some(TransportKind::Mpi.name()) || launch::is_launched(),
     }
 }
 

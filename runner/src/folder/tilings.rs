@@ -73,16 +73,19 @@ impl TilingsFile {
     /// # Errors
     /// What the system says.
     pub(crate) fn start(path: PathBuf, first: &Partition, resumed: Option<u64>) -> io::Result<Self> {
-        let known = resumed.map(|_| fs::read_to_string(&path)).transpose();
+        let known = resumed.map(|_| fs::read(&path)).transpose();
         let known = known.or_else(|error| if error.kind() == ErrorKind::NotFound { Ok(None) } else { Err(error) })?;
         let mut file = Self { file: File::create(&path)?, path };
-        let is_kept =
-            |number: usize, line: &Line<'_>| number == 0 || resumed.is_some_and(|resumed| line.after < resumed);
+        // What is damaged stays so, for who reads it to tell; half of a line goes.
+        let is_before = |line: &[u8]| {
+            let after = serde_json::from_slice(line).map(|Line { after, .. }| after);
+            line.ends_with(b"\n") && after.map_or(true, |after| resumed.is_some_and(|resumed| after < resumed))
+        };
         match known {
             Some(known) => {
-                let lines = known.lines().map_while(|line| serde_json::from_str::<Line<'_>>(line).ok()).enumerate();
-                for (_, line) in lines.filter(|(number, line)| is_kept(*number, line)) {
-                    file.write(&line)?;
+                let lines = known.split_inclusive(|&byte| byte == b'\n').enumerate();
+                for (_, line) in lines.take_while(|&(number, line)| number == 0 || is_before(line)) {
+                    file.file.write_all(line)?;
                 }
             }
             None => file.append(resumed.unwrap_or(0), first)?,
@@ -224,6 +227,11 @@ mod tests {
         };
         assert_eq!(ended(5), None);
         assert!(ended(8).unwrap().contains("it ends with 5 tiles, and the run ended with 8, so"));
+        // What cannot be read is told of still once the run has gone on.
+        fs::write(&path, b"{\"after\":0,\"levels\":\"aa\"}\n\xff\n{\"after\":64,\"levels\":\"aa\"}\n{").unwrap();
+        TilingsFile::start(path.clone(), &all[3], Some(64)).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"{\"after\":0,\"levels\":\"aa\"}\n\xff\n");
+        assert!(damage().unwrap().contains("line 2 cannot be read"));
         fs::write(&path, "{\"after\":0,\"levels\":\"q\"}\n").unwrap();
         assert!(damage().unwrap().contains("line 1 cannot be read, so tiles are not shown as they were"));
     }

@@ -13,16 +13,51 @@ mod outcome;
 #[cfg(feature = "iceoryx2")]
 mod rank_report;
 
-use crate::config::TransportKind;
+use crate::config::{Config, TransportKind};
 use crate::error::RunError;
 use crate::plan::Plan;
 use crate::rank::Observer;
 use crate::summary::Summary;
+use atoll_transport::{Rank, launched};
 pub(crate) use fit::fit;
 #[cfg(feature = "mpi")]
 pub(crate) use fit::fit_job;
 use outcome::{Ends, outcome};
 use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::Duration;
+
+/// What a process that may be one of many which have the same to say leaves to the first of them.
+const TIME_TO_SPEAK: Duration = Duration::from_secs(5);
+
+/// Whether a launcher of MPI started this process to join others.
+#[cfg(feature = "mpi")]
+pub(crate) fn is_launched() -> bool {
+    launched().is_some_and(|launched| launched.can_join_others())
+}
+
+/// Refuses a run that does not say on what, and would be made by each of the processes that a launcher of MPI started.
+///
+/// # Errors
+/// If it is such a one.
+pub(crate) fn check_alone(config: &Config) -> Result<(), RunError> {
+    match launched().filter(|launched| launched.can_join_others()) {
+        Some(launched) if config.run.transport.is_none() => {
+            // The launcher ends all when one has ended.
+            if launched.rank != Rank(0) {
+                thread::sleep(TIME_TO_SPEAK);
+            }
+            let build = if TransportKind::Mpi.is_built_in() { "" } else { "build with --features mpi and " };
+            Err(RunError::Ranks(format!(
+                "an MPI launcher started {} processes, and this one would make the whole run by itself: {build}add \
+                 --transport mpi, or --transport {} if that is what you want",
+                launched.size,
+                config.transport().name()
+            )))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Runs a plan whose ranks are threads of this process.
 ///

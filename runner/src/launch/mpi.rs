@@ -1,5 +1,6 @@
 //! Ranks as processes that an MPI launcher started, this one among them.
 
+use super::TIME_TO_SPEAK;
 use super::outcome::told;
 use crate::config::{Config, MpiExchange};
 use crate::error::{Exit, RunError};
@@ -10,8 +11,8 @@ use crate::rank::trouble::{Refusal, all_well};
 use crate::rank::{self, Observer, RankError};
 use crate::summary::Summary;
 use atoll_core::StepError;
-use atoll_transport::mpi::{self, Method, Mpi, MpiOptions};
-use atoll_transport::{Collective, Rank, RankFailure, Transport};
+use atoll_transport::mpi::{Method, Mpi, MpiOptions};
+use atoll_transport::{Collective, Rank, RankFailure, Transport, launched};
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
@@ -21,9 +22,6 @@ use std::time::Duration;
 /// How long ranks wait for each other until they have agreed on a configuration, which says how long.
 /// Longer than rank 0 may wait for an earlier run to let go of its folder.
 const AGREEMENT_TIMEOUT: Duration = Duration::from_secs(150);
-
-/// What a process that finds itself alone leaves to the one that says so.
-const TIME_TO_SPEAK: Duration = Duration::from_secs(5);
 
 /// This process as a rank of an MPI job.
 ///
@@ -43,7 +41,7 @@ impl Job {
     pub(crate) fn join(complain: fn(&dyn Display)) -> Result<Self, RunError> {
         let options = MpiOptions { peer_timeout: AGREEMENT_TIMEOUT, ..MpiOptions::default() };
         let endpoint = Mpi::init(options).map_err(|error| RunError::Ranks(error.to_string()))?;
-        match mpi::launched() {
+        match launched() {
             Some(launched) if launched.size > 1 && endpoint.size() == 1 => {
                 // Each of them is alone and believes itself the first; one is enough to say so. It is given time, as a
                 // launcher ends all others when one has ended.
@@ -204,10 +202,5 @@ impl Job {
     /// Ends this process at once, which makes the launcher end the others.
     pub(crate) fn quit() -> ! {
         Mpi::exit_at_once(Exit::Interrupted as i32)
-    }
-
-    /// Whether a launcher started this process to join others.
-    pub(crate) fn is_launched() -> bool {
-        mpi::can_join_others() && mpi::launched().is_some_and(|launched| launched.size > 1)
     }
 }

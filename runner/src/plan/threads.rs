@@ -1,6 +1,7 @@
 //! How many threads each rank of this process gets.
 
 use crate::config::{Config, MOST_THREADS, TransportKind};
+use atoll_transport::ranks_here;
 use std::thread;
 
 /// Those that were asked for; else the cores that this process may use (its affinity and the quota of its group are heeded), shared
@@ -33,16 +34,6 @@ fn count(list: &str) -> Option<usize> {
         Some(last.parse::<usize>().ok()?.checked_sub(first.parse().ok()?)? + 1)
     };
     list.split(',').map(range).sum()
-}
-
-#[cfg(feature = "mpi")]
-fn ranks_here() -> Option<usize> {
-    atoll_transport::mpi::ranks_here()
-}
-
-#[cfg(not(feature = "mpi"))]
-fn ranks_here() -> Option<usize> {
-    None
 }
 
 #[cfg(test)]

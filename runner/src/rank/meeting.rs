@@ -19,6 +19,8 @@ pub enum Next {
     Ask(Vec<u8>),
     /// It has no question yet; the others are to wait.
     Wait,
+    /// As [`Next::Wait`], and whoever drives the run is told that it waits for him.
+    Announce,
     /// It has this done by all ranks, lines of commands as a file has them, each after its number and a tab.
     Do(Vec<u8>),
     /// It lets time go on.
@@ -69,6 +71,8 @@ const ASK: u8 = 1;
 const WAIT: u8 = 2;
 /// See [`ASK`].
 const DO: u8 = 3;
+/// See [`ASK`].
+const ANNOUNCE: u8 = 4;
 /// What other ranks say: nothing, or that they are to stop.
 const STOP: u8 = 1;
 
@@ -76,8 +80,8 @@ const STOP: u8 = 1;
 #[derive(Debug)]
 pub(super) struct Meetings<'a> {
     observer: &'a Observer,
-    /// Whether whoever is waited for hears of it.
-    tells_of_waiting: bool,
+    /// Whether somebody drives the run, who ends it where he stops it.
+    is_driven: bool,
     /// The longest that rank 0 is silent.
     patience: Duration,
     /// How long time stood still because somebody wished so.
@@ -93,7 +97,7 @@ impl<'a> Meetings<'a> {
     pub(super) fn new(observer: &'a Observer, plan: &Plan) -> Self {
         let patience = (plan.config.run.peer_timeout / 4).min(Duration::from_millis(250));
         let (stood, spent, sent) = Default::default();
-        Self { observer, tells_of_waiting: plan.commands.drives, patience, stood, spent, sent }
+        Self { observer, is_driven: plan.commands.drives, patience, stood, spent, sent }
     }
 
     fn host(&self) -> Option<&'a dyn Host> {
@@ -148,13 +152,13 @@ impl<'a> Meetings<'a> {
                 Round::Over => break,
                 Round::Stopped => stopped = true,
                 Round::Answered => {}
-                Round::Waits if self.tells_of_waiting => commander.wait(world.step_count()),
                 Round::Waits => {}
+                Round::Announced => commander.wait(world.step_count()),
                 Round::Told(words) => commander.hear(&words, world, transport, self.observer)?,
             }
         }
         self.sent += transport.stats().since(&before);
-        Ok(stopped && self.tells_of_waiting)
+        Ok(stopped && self.is_driven)
     }
 
     /// One word of rank 0 and what follows from it.
@@ -170,6 +174,7 @@ impl<'a> Meetings<'a> {
             word = match host.next(held.world.step_count(), self.patience) {
                 Next::Ask(question) => [&[0, ASK][..], &question].concat(),
                 Next::Wait => vec![0, WAIT],
+                Next::Announce => vec![0, ANNOUNCE],
                 Next::Do(words) => [&[0, DO][..], &words].concat(),
                 Next::GoOn => vec![0],
             };
@@ -191,6 +196,7 @@ impl<'a> Meetings<'a> {
                 Round::Answered
             }
             Some(&DO) => Round::Told(word[2..].to_vec()),
+            Some(&ANNOUNCE) => Round::Announced,
             Some(_) => Round::Waits,
             None => Round::Over,
         })
@@ -207,6 +213,8 @@ enum Round {
     Answered,
     /// It had nothing to say.
     Waits,
+    /// It waits for whoever drives the run.
+    Announced,
     /// It has something done.
     Told(Vec<u8>),
 }

@@ -133,10 +133,28 @@ fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
     let mut page = Page::open(&served);
     let hello = page.hello();
     page.look(domain(&hello), [320, 240], "kind");
-    let why = heard(&mut page, "failed")["why"].as_str().unwrap().to_owned();
-    assert!(why.contains("line 1: step 3: there is no body 777777"), "{why}");
-    let ended = served.end();
-    assert_eq!((ended.code, ended.stderr.contains(&why)), (Some(2), true), "{ended}");
+    let has_failed = |served: Served, mut page: Page, expected: &str| {
+        let why = heard(&mut page, "failed")["why"].as_str().unwrap().to_owned();
+        assert!(why.contains(expected), "{why}");
+        let ended = served.end();
+        assert_eq!((ended.code, ended.stderr.contains(&why)), (Some(2), true), "{ended}");
+    };
+    has_failed(served, page, "line 1: step 3: there is no body 777777");
+    // A record that is damaged.
+    let recorded = folder.path().join("recorded");
+    let mut command = program::command();
+    program::run(command.args(["run", "configs/quickstart.toml", "--record-every", "10", "--out"]).arg(&recorded).args(small(20)));
+    let segment = recorded.join("rank-00000/steps-0000000000-0000000020.parquet");
+    let mut bytes = std::fs::read(&segment).unwrap();
+    bytes[40] ^= 1;
+    std::fs::write(&segment, bytes).unwrap();
+    let info = program::run(program::command().arg("info").arg(&segment));
+    assert_eq!((info.code, info.stderr.contains("are not those that were written")), (Some(2), true), "{info}");
+    let served = Served::start(program::command().arg("view").arg(&recorded));
+    let mut page = Page::open(&served);
+    let hello = page.hello();
+    page.look(domain(&hello), [320, 240], "kind");
+    has_failed(served, page, "the bytes of step 0 are not those that were written");
 }
 
 #[test]

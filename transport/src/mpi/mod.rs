@@ -2,7 +2,7 @@
 //!
 //! Behind the cargo feature `mpi`, which needs an MPI library to build with. The program is started by that library's own
 //! launcher, as in `mpirun -n 4 program`; with another one's, each process finds itself alone, which a program can
-//! tell by [`launched()`]. Each process calls [`Mpi::init`] once and passes the endpoint to the code that needs it.
+//! tell by [`launched()`](crate::launched()). Each process calls [`Mpi::init`] once and passes the endpoint to the code that needs it.
 //!
 //! There are two ways to exchange a round, a [`Method`] each, with the same results. Every rank switches at the same
 //! round.
@@ -37,7 +37,6 @@
 mod alltoallv;
 mod control;
 mod endpoint;
-mod launched;
 mod notice;
 mod pause;
 mod raw;
@@ -47,7 +46,6 @@ mod sparse;
 use std::time::Duration;
 
 pub use self::endpoint::Mpi;
-pub use self::launched::{Launched, can_join_others, launched, ranks_here};
 
 /// The exit code of a job that a rank ended by [`abort`](crate::Transport::abort) or by a panic.
 pub const ABORTED: i32 = 3;

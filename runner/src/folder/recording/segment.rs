@@ -103,6 +103,14 @@ impl Segment {
         self.stage.as_ref().map(StageText::read).transpose().map_err(bad)
     }
 
+    /// Reads all records, as nothing but that shows whether they are whole.
+    ///
+    /// # Errors
+    /// If one is damaged.
+    pub(crate) fn check_records(&self, kinds: usize) -> Result<(), RecordingError> {
+        self.records.iter().try_for_each(|record| self.read(record.step, kinds, &mut Vec::new()))
+    }
+
     /// Whether all that the metadata says can be. Finds where the records lie.
     fn check(&mut self, format: Format, length: u64) -> Result<(), &'static str> {
         let (first, last) = self.records.first().zip(self.records.last()).ok_or("it holds no record")?;

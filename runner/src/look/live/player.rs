@@ -99,7 +99,7 @@ impl Player {
             }
             let played = self.go_on(stop);
             ended.request();
-            played
+            played.inspect_err(|error| self.desk.greet(Say::Failed { why: error.to_string() }))
         })
     }
 

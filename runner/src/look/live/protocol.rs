@@ -157,7 +157,7 @@ pub(crate) enum Say {
         /// A sentence.
         text: String,
     },
-    /// The run has failed.
+    /// The run has failed, or a record cannot be shown.
     Failed {
         /// Why.
         why: String,

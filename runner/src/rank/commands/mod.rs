@@ -59,8 +59,6 @@ pub(super) struct Commander {
     names: Vec<Option<String>>,
     crowds: Crowds,
     failure: Option<RunError>,
-    /// After how many steps it was last said that the run waits.
-    waits_after: Option<u64>,
     /// How many lines of the step from which the run goes on were done before; until that is said.
     done_before: u64,
     /// How long all of this took this rank, and what ranks sent each other for it.
@@ -142,7 +140,6 @@ impl Commander {
             names: plan.kind_names().to_vec(),
             crowds: Crowds::default(),
             failure: None,
-            waits_after: None,
             done_before,
             time: Duration::ZERO,
             sent: Stats::default(),
@@ -363,10 +360,8 @@ impl Commander {
 
     /// Tells whoever drives the run that it is his turn.
     pub(super) fn wait(&mut self, step: u64) {
-        if self.waits_after.replace(step) != Some(step) {
-            let done = std::mem::take(&mut self.done_before);
-            self.tell(step, None, Answer::Waits { done });
-        }
+        let done = std::mem::take(&mut self.done_before);
+        self.tell(step, None, Answer::Waits { done });
     }
 
     fn tell(&mut self, step: u64, name: Option<&str>, answer: Answer<'_>) {

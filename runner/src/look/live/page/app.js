@@ -95,8 +95,8 @@ function body({ body }) {
 }
 
 function failed({ why }) {
-  state.failure = why;
-  say(`The run has failed: ${why}`);
+  state.failure = `${state.hello?.recorded ? "This view" : "The run"} has failed: ${why}`;
+  say(state.failure);
 }
 
 function over() {

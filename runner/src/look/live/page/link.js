@@ -24,7 +24,7 @@ export function listen(hear, show) {
 
 socket.onopen = () => say("Waiting for the first picture…");
 socket.onclose = () => {
-  const end = state.failure ? `The run has failed: ${state.failure}`
+  const end = state.failure ? state.failure
     : state.over ? `${state.hello?.recorded ? "This view" : "The run"} is over; this is what was seen last.`
       : state.hello ? "The program has ended without a word, or cannot be reached; this is what was seen last."
         : "There is no run here, or this is not its address.";

@@ -11,6 +11,14 @@ pub struct Launched {
     pub rank: Rank,
 }
 
+impl Launched {
+    /// Whether they were started to join each other: by a launcher of MPI, or another one in a way that MPI understands.
+    pub fn can_join_others(self) -> bool {
+        let names = ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"];
+        self.size > 1 && names.iter().any(|name| std::env::var_os(name).is_some())
+    }
+}
+
 /// What the launcher says, if there was one that says it: `mpirun` of Open MPI or of MPICH and those like it, or `srun`.
 ///
 /// If its number of ranks is not the [size](crate::Transport::size) of the run, the program was started by the launcher of
@@ -22,12 +30,6 @@ pub fn launched() -> Option<Launched> {
 /// How many of the ranks run on this machine, this one among them, if the launcher says so.
 pub fn ranks_here() -> Option<usize> {
     ranks_here_in(|name| std::env::var(name).ok())
-}
-
-/// Whether a launcher of MPI started this process, or another one in a way that MPI understands, so that it can join
-/// others.
-pub fn can_join_others() -> bool {
-    ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"].iter().any(|name| std::env::var_os(name).is_some())
 }
 
 fn launched_in(variable: impl Fn(&str) -> Option<String>) -> Option<Launched> {
