@@ -17,14 +17,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let place = DVec2::new(10.0, 0.5 + f64::from(row));
         tower.push(world.insert(Body::at_rest(GlobalId(0), KindId(0), place))?);
     }
+    let (mut touching, mut meetings) = (world.contact_pairs(), 0);
     for step_number in 0..180 {
         if step_number == 60 {
             let ball = world.insert(Body::at_rest(GlobalId(0), KindId(1), DVec2::new(2.0, 3.0)))?;
             world.command(&Command::SetVelocity { id: ball, velocity: Vec2::new(25.0, 3.0), angular_velocity: 0.0 })?;
         }
         step(&mut world, &mut Loopback)?;
+        let now = world.contact_pairs();
+        // Who met in this step; the other way round it is who parted.
+        meetings += pairs_not_in(&now, &touching).len();
+        touching = now;
     }
     let hit = world.cast_ray(DVec2::new(10.0, 9.0), DVec2::new(10.0, -1.0)).expect("at least the floor is below");
+    println!("{meetings} times two bodies met; {} pairs touch now", touching.len());
     println!("{} bodies; below (10, 9) lies {} at a height of {:.2} m", world.body_count(), hit.id, hit.point.y);
     println!("in the middle: {:?}", world.in_rectangle(DVec2::new(8.0, 0.1), DVec2::new(12.0, 9.0)));
     for id in tower {

@@ -102,7 +102,7 @@ pub use model::shape::{Compound, MOST_CORNERS, MOST_PARTS, Part, Polygon, Segmen
 pub use state::facts::{Facts, TileFacts};
 pub use state::figures::Figures;
 pub use state::hash::Hashes;
-pub use state::questions::RayHit;
+pub use state::questions::{RayHit, pairs_not_in};
 pub use state::snapshot::{RestoreError, SNAPSHOT_FORMAT, SavedTile};
 pub use state::view::{ContactView, TileView};
 pub use step::phase::{Phase, Timings};

@@ -132,12 +132,18 @@ pub enum RunError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// A run that is to go on and is at its end.
-    #[error("all {steps} steps of this run are made already, see {}; give more --steps to go on", .summary.display())]
+    #[error("all {steps} steps of this run are made already, see {}; {}", .summary.display(), if *.goes_on {
+        "give more --steps to go on"
+    } else {
+        "it left no snapshot to go on from: for more steps begin another run with --out"
+    })]
     Complete {
         /// What it came to.
         summary: PathBuf,
         /// How many it was to make.
         steps: u64,
+        /// Whether it left a snapshot to go on from.
+        goes_on: bool,
     },
     /// A recording that cannot be written or read.
     #[error(transparent)]

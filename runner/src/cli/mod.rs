@@ -99,7 +99,7 @@ fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Done } as u8)
         }
         _ => {
-            console::complain(&args::one_line(error, env::args_os().nth(1).as_deref()));
+            console::complain(&args::one_line(error, env::args_os().skip(1)));
             ExitCode::from(Exit::Usage as u8)
         }
     }

@@ -105,7 +105,9 @@ impl Plan {
         let (ended, unreadable) = ended.map_or_else(|error| (None, Some(error)), |ended| (ended, None));
         if let Some(ended) = ended.as_ref().filter(|ended| !ended.interrupted && ended.steps == steps) {
             RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
-            return Err(RunError::Complete { summary: folder.summary(), steps });
+            let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles);
+            let goes_on = found.is_ok_and(|found| !found.snapshots.is_empty());
+            return Err(RunError::Complete { summary: folder.summary(), steps, goes_on });
         }
         // Before the first step there is nothing to go on from: it begins anew.
         let ended = ended.map(|ended| ended.steps).filter(|&steps| steps > 0);

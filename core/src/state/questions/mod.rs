@@ -1,9 +1,10 @@
-//! Questions to a world between two steps: what a ray meets first, what is in a rectangle or at a point, what touches a body.
+//! Questions to a world between two steps: what a ray meets first, what is in a rectangle or at a point, what touches what.
 //!
 //! Each rank answers for its own bodies, and for all statics: answers of all ranks are joined, and are those of one rank that holds
 //! everything, to the last bit.
 
 mod outline;
+mod pairs;
 mod pieces;
 mod places;
 mod sensors;
@@ -17,6 +18,7 @@ use crate::state::view::{ContactView, TileView};
 use crate::world::World;
 use glam::DVec2;
 use outline::Outline;
+pub use pairs::pairs_not_in;
 pub(crate) use places::Places;
 use tree::Bounds;
 

@@ -120,6 +120,33 @@ fn answers_are_those_of_looking_at_each_body() {
 }
 
 #[test]
+fn pairs_that_touch_are_those_that_each_body_tells_of() {
+    for (columns, rows) in [(1, 1), (4, 3)] {
+        let mut world = World::whole(&blueprint(columns, rows, DVec2::ZERO)).unwrap();
+        fill(&mut world, &mut Any(5), DVec2::ZERO);
+        let told = |world: &World| {
+            let of = |body: Body| world.touching(body.id).into_iter().map(|contact| contact.bodies.into());
+            let mut pairs: Vec<(GlobalId, GlobalId)> = world.bodies().flat_map(of).collect();
+            pairs.sort_unstable();
+            pairs.dedup();
+            pairs
+        };
+        (0..2).for_each(|_| drop(step(&mut world, &mut Loopback).unwrap()));
+        let before = world.contact_pairs();
+        assert!(before.len() > 300, "{} pairs", before.len());
+        assert_eq!(before, told(&world));
+        let is_gone = |&id: &GlobalId| (10..200).contains(&id.0);
+        (10..200).for_each(|id| assert!(world.remove(GlobalId(id))));
+        let now = world.contact_pairs();
+        assert_eq!(now, told(&world));
+        assert_eq!(pairs_not_in(&now, &before), []);
+        let ended = pairs_not_in(&before, &now);
+        assert!(!ended.is_empty() && ended.iter().all(|(a, b)| is_gone(a) || is_gone(b)));
+        assert_eq!(ended.len() + now.len(), before.len());
+    }
+}
+
+#[test]
 fn parts_of_a_world_answer_together_as_the_whole() {
     let blueprint = blueprint(4, 1, DVec2::ZERO);
     let mut whole = World::whole(&blueprint).unwrap();

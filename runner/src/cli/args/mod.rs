@@ -55,11 +55,12 @@ pub enum Command {
     Scene(SceneArgs),
 }
 
-/// What clap has to say about bad usage, on one line. `first` is the first argument, which may be a verb.
-pub fn one_line(error: &clap::Error, first: Option<&OsStr>) -> String {
+/// What clap has to say about bad usage, on one line. `words` are the arguments, the first of which may be verbs.
+pub fn one_line(error: &clap::Error, words: impl IntoIterator<Item: AsRef<OsStr>>) -> String {
     let text = error.render().to_string();
-    let said =
-        |line: &&str| !(line.is_empty() || line.starts_with("Usage:") || line.starts_with("For more information"));
+    // No option is meant as a value.
+    let unsaid = ["Usage:", "For more information", "tip: to pass '"];
+    let said = |line: &&str| !(line.is_empty() || unsaid.iter().any(|start| line.starts_with(start)));
     let lines: Vec<&str> = text.lines().map(str::trim).filter(said).collect();
     let line = lines.join(" ").replace(" tip: ", "; ");
     let hint = if lacks_configuration(error) {
@@ -67,8 +68,12 @@ pub fn one_line(error: &clap::Error, first: Option<&OsStr>) -> String {
     } else {
         ""
     };
-    let verb = first.and_then(OsStr::to_str).filter(|first| Cli::command().find_subcommand(first).is_some());
-    let verb = verb.map(|verb| format!(" {verb}")).unwrap_or_default();
+    let (mut verb, mut command) = (String::new(), Cli::command());
+    for word in words {
+        let Some(deeper) = command.find_subcommand(word.as_ref()).cloned() else { break };
+        verb = format!("{verb} {}", deeper.get_name());
+        command = deeper;
+    }
     // What was typed is quoted as it was typed.
     format!("{}{hint}; see atoll{verb} --help", OneLine(line.strip_prefix("error: ").unwrap_or(&line)))
 }
@@ -92,7 +97,7 @@ mod tests {
 
     fn complaint(line: &str) -> String {
         let words = || line.split_whitespace();
-        one_line(&Cli::try_parse_from(words()).unwrap_err(), words().nth(1).map(OsStr::new))
+        one_line(&Cli::try_parse_from(words()).unwrap_err(), words().skip(1))
     }
 
     #[test]
@@ -110,6 +115,12 @@ mod tests {
             ),
             ("atoll run c.toml --ranks", "a value is required for '--ranks <N>'", "atoll run --help"),
             ("atoll run", "the following required arguments were not provided: <CONFIG>", "atoll run --help"),
+            (
+                "atoll scene export",
+                "the following required arguments were not provided: --out <DIR>",
+                "atoll scene export --help",
+            ),
+            ("atoll project c.toml --resume x", "unexpected argument '--resume' found; see", "atoll project --help"),
             ("atoll runn c.toml", "unrecognized subcommand 'runn'; a similar subcommand exists: 'run'", "atoll --help"),
         ] {
             let text = complaint(line);
@@ -117,7 +128,7 @@ mod tests {
             assert!(text.ends_with(&format!("; see {help}")), "{text}");
         }
         let error = Cli::try_parse_from(["atoll", "ru\r\u{1b}[2Jn"]).unwrap_err();
-        let text = one_line(&error, None);
+        let text = one_line(&error, [""; 0]);
         assert!(text.starts_with("unrecognized subcommand 'ru n'"), "{text}");
     }
 }

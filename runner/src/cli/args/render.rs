@@ -123,7 +123,7 @@ mod tests {
         match Cli::try_parse_from(["atoll", "render"].into_iter().chain(line.split_whitespace())) {
             Ok(Cli { command: Command::Render(args) }) => Ok(*args),
             Ok(_) => unreachable!("the verb is render"),
-            Err(error) => Err(one_line(&error, Some("render".as_ref()))),
+            Err(error) => Err(one_line(&error, ["render"])),
         }
     }
 

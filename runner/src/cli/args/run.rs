@@ -121,7 +121,7 @@ mod tests {
         match Cli::try_parse_from(["atoll", "run"].into_iter().chain(line.split_whitespace())) {
             Ok(Cli { command: Command::Run(args) }) => Ok(*args),
             Ok(_) => unreachable!("the verb is run"),
-            Err(error) => Err(one_line(&error, Some("run".as_ref()))),
+            Err(error) => Err(one_line(&error, ["run"])),
         }
     }
 

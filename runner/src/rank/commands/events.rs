@@ -2,7 +2,7 @@
 
 use super::super::{RankError, records};
 use crate::command::{Event, Since};
-use atoll_core::{Body, World};
+use atoll_core::{Body, World, pairs_not_in};
 use atoll_transport::{Collective, Rank, Transport};
 
 /// A contact by the names of its bodies, the lower first; or a sensor and who is inside.
@@ -44,16 +44,16 @@ impl Followed {
     ) -> Result<Since, RankError> {
         let Some(before) = self.of(event).as_deref() else { return Ok(Since::default()) };
         let pairs = now(event, world, transport)?;
-        let came = gather_all(transport, &not_in(&pairs, before))?;
-        let went = gather_all(transport, &not_in(before, &pairs))?;
+        let came = gather_all(transport, &pairs_not_in(&pairs, before))?;
+        let went = gather_all(transport, &pairs_not_in(before, &pairs))?;
         // Of a pair that another rank tells of from now on both are said.
-        Ok(Since { came: not_in(&came, &went), went: not_in(&went, &came) })
+        Ok(Since { came: pairs_not_in(&came, &went), went: pairs_not_in(&went, &came) })
     }
 
     /// Goes back to the pairs after the last step, from those that there are now: who went is told of by one rank.
     pub(super) fn go_back(&mut self, event: Event, Since { came, went }: &Since, rank: Rank) {
         let Some(pairs) = self.of(event) else { return };
-        *pairs = not_in(pairs, came);
+        *pairs = pairs_not_in(pairs, came);
         if rank == Rank(0) {
             pairs.extend(went);
             pairs.sort_unstable();
@@ -81,28 +81,21 @@ impl Followed {
     ) -> Result<Option<[Vec<Pair>; 2]>, RankError> {
         let Some(before) = self.of(event).take() else { return Ok(None) };
         let pairs = now(event, world, transport)?;
-        let began = gather(transport, &not_in(&pairs, &before))?;
-        let ended = gather(transport, &not_in(&before, &pairs))?;
+        let began = gather(transport, &pairs_not_in(&pairs, &before))?;
+        let ended = gather(transport, &pairs_not_in(&before, &pairs))?;
         *self.of(event) = Some(pairs);
         // Of a pair that another rank tells of from now on both are said.
-        Ok(began.zip(ended).map(|(began, ended)| [not_in(&began, &ended), not_in(&ended, &began)]))
+        Ok(began.zip(ended).map(|(began, ended)| [pairs_not_in(&began, &ended), pairs_not_in(&ended, &began)]))
     }
 }
 
 /// The pairs that there are.
 fn now(event: Event, world: &World, transport: &mut impl Transport) -> Result<Vec<Pair>, RankError> {
-    if event == Event::Sensors {
-        let moving = sensors(world, transport)?;
-        return Ok(world.inside_sensors(&moving).into_iter().map(|(sensor, body)| [sensor.0, body.0]).collect());
-    }
-    let contacts = world.views().flat_map(|tile| tile.contacts());
-    // Of one between two tiles the owner of body A tells.
-    let own = contacts.filter(|contact| !contact.is_border || contact.owned[0].is_some());
-    let mut pairs: Vec<Pair> = own.map(|contact| contact.bodies.map(|id| id.0)).collect();
-    pairs.sort_unstable();
-    // Two bodies of several pieces may have several.
-    pairs.dedup();
-    Ok(pairs)
+    let pairs = match event {
+        Event::Contacts => world.contact_pairs(),
+        Event::Sensors => world.inside_sensors(&sensors(world, transport)?),
+    };
+    Ok(pairs.into_iter().map(|(a, b)| [a.0, b.0]).collect())
 }
 
 /// The sensors among the bodies of all ranks.
@@ -113,16 +106,6 @@ pub(super) fn sensors(world: &World, transport: &mut impl Transport) -> Result<V
     }
     let told = transport.all_gather(bytemuck::cast_slice(&own)).map_err(RankError::Transport)?;
     records(&told).map_err(RankError::Transport)
-}
-
-/// Of ascending pairs those that are not among others, ascending too.
-fn not_in(all: &[Pair], others: &[Pair]) -> Vec<Pair> {
-    let mut others = others.iter().peekable();
-    let is_new = |pair: &&Pair| {
-        while others.next_if(|other| other < pair).is_some() {}
-        others.peek() != Some(pair)
-    };
-    all.iter().filter(is_new).copied().collect()
 }
 
 /// What all ranks have to say, ascending.
