@@ -189,7 +189,7 @@ mod iceoryx2 {
 /// Each of the processes of a launcher would make all of it.
 #[test]
 fn a_run_that_a_launcher_started_says_how_it_is_to_join() {
-    let options = ["run", "configs/quickstart.toml", "--bodies", "10", "--steps", "1", "--quiet"];
+    let options = ["run", "configs/quickstart.toml", "--bodies", "100", "--steps", "1", "--quiet"];
     let started = |more: &[&str]| {
         let mut command = program::command();
         program::run(command.args(options).args(more).env("PMI_SIZE", "4").env("PMI_RANK", "0"))
@@ -198,7 +198,7 @@ fn a_run_that_a_launcher_started_says_how_it_is_to_join() {
     assert_eq!((ended.code, ended.complaints().len()), (Some(2), 1), "{ended}");
     let expected = "atoll: an MPI launcher started 4 processes, and this one would make the whole run by itself: ";
     assert!(ended.stderr.starts_with(expected) && ended.stderr.contains("--transport mpi"), "{ended}");
-    assert_eq!(started(&["--transport", "local"]).code, Some(0));
+    assert_eq!(started(&["--transport", "channel"]).code, Some(0));
 }
 
 #[cfg(feature = "mpi")]

@@ -3,7 +3,8 @@
 
 use atoll_transport::conformance::process::{record, recorded};
 use atoll_transport::conformance::{Case, Ending, case};
-use atoll_transport::mpi::{Method, Mpi, MpiOptions, launched};
+use atoll_transport::launched;
+use atoll_transport::mpi::{Method, Mpi, MpiOptions};
 use atoll_transport::{Collective, Incoming, Outgoing, Rank, Transport, TransportError};
 use std::path::Path;
 use std::thread::sleep;
