@@ -247,21 +247,25 @@ impl<'a> Approach<'a> {
         let along = right_perp(at.manifold.normal);
         let overlap = dot(two.anchor - one.anchor, along).abs();
         let [a, b] = [&self.a, &self.b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
-        let is_little = overlap < min(touching, PASSABLE * min(a, b));
+        let little = min(touching, PASSABLE * min(a, b));
         let closing = self.closing(&at, one.anchor);
-        if !self.is_solid() || !touches || !is_little || closing <= CREEPING {
+        if !self.is_solid() || !touches || overlap >= little || closing <= CREEPING {
             return at;
         }
+        let pieces = self.pieces.unwrap_or([&self.a.kind.pieces[0], &self.b.kind.pieces[0]]);
+        let rotations = [at.turning_a.after(self.a.rotation), at.turning_b.after(self.b.rotation)];
         // From the piece of A to that of B.
-        let offset = match self.pieces {
-            None => at.offset,
-            Some([a, b]) => {
-                let centers = [(at.turning_a, &self.a, a), (at.turning_b, &self.b, b)]
-                    .map(|(turning, side, piece)| turning.after(side.rotation).rotate(piece.center));
-                at.offset + centers[1] - centers[0]
-            }
+        let [a, b] = [0, 1].map(|side: usize| rotations[side].rotate(pieces[side].center));
+        let across = if dot(at.offset + b - a, along) < 0.0 { -along } else { along };
+        // Two points that are near each other may be a short edge, too, of what is over the other as a whole.
+        let reach = |side: usize, direction: Vec2| {
+            let way = rotations[side].unrotate(direction);
+            pieces[side].outline.corners().fold(f32::NEG_INFINITY, |most, corner| max(most, dot(corner, way)))
+                + pieces[side].radius
         };
-        let across = if dot(offset, along) < 0.0 { -along } else { along };
+        if reach(0, across) + reach(1, -across) - dot(at.offset, across) > little {
+            return at;
+        }
         let mut over = Manifold { normal: across, ..Manifold::EMPTY };
         over.push(ManifoldPoint { separation: -overlap, ..one });
         let over = Moment { manifold: over, ..at };
