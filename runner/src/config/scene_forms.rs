@@ -93,7 +93,8 @@ impl Form for SceneDigest {
         match settings.text(key, MUST)? {
             Some(digest) if digest != spec.digest => {
                 let must = format!(
-                    "\"{}\", that of {} as it is now: bring back the scene that was meant, or leave scene.digest out",
+                    "\"{}\", that of {} as it is now: bring back the scene that was meant, or, where no run is to go on, \
+                     leave scene.digest out",
                     spec.digest, spec.path
                 );
                 Err(settings.refusal(key, must))

@@ -1,9 +1,10 @@
 //! Who may write to the folder of a run: all processes of one run, and nobody else.
 
 use super::durable::{create_folder_durably, remove_if_there, sync_folder, write_durably};
-use super::{FolderError, RunFolder};
+use super::{FolderError, RunFolder, recording};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 use std::process;
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -30,10 +31,11 @@ impl RunFolder {
     /// If another run writes here, or nobody can.
     pub fn hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Option<Claim>, FolderError> {
         // What is no run, and cannot become one, is left as it is. Asked in this order, as one may begin meanwhile.
-        if !self.path().is_dir() || self.check_free(false).is_err() && !self.holds_run() {
+        let was_run = || self.holds_run() || self.damaged().is_some();
+        if !self.path().is_dir() || self.check_free(false).is_err() && !was_run() {
             return Ok(None);
         }
-        self.check_links()?;
+        self.check_contents()?;
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
         let deadline = Instant::now() + if waiting.is_some() { LINGERING } else { Duration::ZERO };
         let mut told = false;
@@ -164,18 +166,49 @@ impl RunFolder {
         Err(self.refusal(reason))
     }
 
-    /// Refuses a folder in which something that a run writes to, or removes, is a link to what is elsewhere.
-    fn check_links(&self) -> Result<(), FolderError> {
-        let entries = fs::read_dir(self.path()).map_err(|error| self.not_writable(&error))?;
-        let is_link = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_symlink());
-        let link = entries.flatten().find(|entry| self.owns(&entry.file_name()) && is_link(entry));
-        link.map_or(Ok(()), |link| {
-            let name = link.file_name();
-            Err(self.refusal(format!(
-                "its {} is a link: a run writes to its own folder alone; put there what the link leads to",
-                name.display()
-            )))
-        })
+    /// Refuses a folder in which something that a run writes to, or removes, is a link to what is elsewhere, or a folder in the place of a
+    /// file, or what else it may be: then nothing is touched.
+    fn check_contents(&self) -> Result<(), FolderError> {
+        let entries = |folder: &Path| {
+            let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+            entries
+                .map_err(|error| self.refusal(format!("{}: {error}; make it one that can be read", folder.display())))
+        };
+        for entry in entries(self.path())? {
+            let name = entry.file_name();
+            if !self.owns(&name) {
+                continue;
+            }
+            let is_rank_folder = name.to_str().is_some_and(recording::is_rank_folder);
+            let is_folder = is_rank_folder || Some(name.as_os_str()) == self.snapshots().file_name();
+            self.check_entry(&entry, is_folder)?;
+            if is_rank_folder {
+                let own = |entry: &fs::DirEntry| entry.file_name().to_str().is_some_and(recording::is_segment);
+                entries(&entry.path())?
+                    .iter()
+                    .filter(|entry| own(entry))
+                    .try_for_each(|entry| self.check_entry(entry, false))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what a run has made is a folder, or a file, as it was.
+    fn check_entry(&self, entry: &fs::DirEntry, is_folder: bool) -> Result<(), FolderError> {
+        let kind = entry.file_type().map_err(|error| self.not_writable(&error))?;
+        let path = entry.path();
+        let name = path.strip_prefix(self.path()).unwrap_or(&path).display();
+        if kind.is_symlink() {
+            return Err(self.refusal(format!(
+                "its {name} is a link: a run writes to its own folder alone; put there what the link leads to"
+            )));
+        }
+        let (is_as_made, made) = if is_folder { (kind.is_dir(), "folder") } else { (kind.is_file(), "file") };
+        if is_as_made {
+            Ok(())
+        } else {
+            Err(self.refusal(format!("its {name} is no {made}, as a run makes it; move it away")))
+        }
     }
 
     /// Whether a run writes here now; none where nobody can tell.

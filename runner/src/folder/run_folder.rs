@@ -89,7 +89,17 @@ impl RunFolder {
 
     /// Whether a run was begun here: the configuration is one that a run wrote.
     pub fn holds_run(&self) -> bool {
-        fs::read_to_string(self.configuration()).is_ok_and(|text| is_resolved(&text))
+        self.read_configuration().is_ok_and(|text| is_resolved(&text))
+    }
+
+    /// The text of the configuration, which is waited for from no pipe.
+    fn read_configuration(&self) -> io::Result<String> {
+        let path = self.configuration();
+        if path.metadata()?.is_file() {
+            fs::read_to_string(path)
+        } else {
+            Err(io::Error::new(ErrorKind::InvalidInput, "it is no file"))
+        }
     }
 
     /// Refuses a folder in which no run can begin, before anything is done to it.
@@ -100,6 +110,11 @@ impl RunFolder {
         if self.holds_run() {
             let how = "name another folder, or have `atoll run` go on with that (--resume) or replace it (--overwrite)";
             return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
+        }
+        // What was a run, and nothing else, can be replaced without its configuration.
+        let is_left = |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|one| self.owns(&one.file_name()));
+        if overwrite && self.damaged().is_some() && fs::read_dir(&self.path).is_ok_and(|mut all| all.all(is_left)) {
+            return Ok(());
         }
         // Of commands the lock tells whose they are.
         let is_begun = self.lock().exists();
@@ -144,16 +159,28 @@ impl RunFolder {
     pub fn damaged(&self) -> Option<FolderError> {
         let is_run =
             self.lock().is_file() && (self.snapshots().is_dir() || self.rank(0).is_dir() || self.log().is_file());
-        let reason = match fs::read_to_string(self.configuration()) {
-            _ if !is_run || self.holds_run() => return None,
-            Ok(_) => "it does not begin as runs write it".to_owned(),
-            Err(error) => error.to_string(),
-        };
-        Some(self.bad_configuration(&reason))
+        match self.read_configuration() {
+            _ if !is_run || self.holds_run() => None,
+            Ok(_) => Some(self.bad_configuration("it does not begin as runs write it")),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                Some(self.refusal(format!("its {CONFIGURATION} is missing; {}", self.mend())))
+            }
+            Err(error) if error.kind() == ErrorKind::PermissionDenied => {
+                Some(self.refusal(format!("its {CONFIGURATION} cannot be read: {error}; let it be read")))
+            }
+            Err(error) => Some(self.bad_configuration(&error.to_string())),
+        }
     }
 
     fn bad_configuration(&self, reason: &str) -> FolderError {
-        self.refusal(format!("its {CONFIGURATION} is damaged: {reason}; bring back a good copy of it"))
+        self.refusal(format!("its {CONFIGURATION} is damaged: {reason}; {}", self.mend()))
+    }
+
+    /// What becomes of a run without its configuration.
+    fn mend(&self) -> String {
+        let copies =
+            if self.rank(0).is_dir() { " (each segment of the recording has its text, as atoll.config)" } else { "" };
+        format!("bring back a good copy of it{copies}, or begin anew with --out and --overwrite")
     }
 
     /// The configuration of the run that was begun here.
@@ -162,7 +189,7 @@ impl RunFolder {
     /// If none was, or it is damaged.
     pub fn begun(&self) -> Result<Config, FolderError> {
         self.check_begun()?;
-        let is_cut = || !fs::read_to_string(self.configuration()).unwrap_or_default().contains(LAST_LINE);
+        let is_cut = || !self.read_configuration().unwrap_or_default().contains(LAST_LINE);
         // What wrote no log yet wrote no such line.
         if self.log().is_file() && is_cut() {
             return Err(self.bad_configuration("its end is missing"));

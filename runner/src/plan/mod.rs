@@ -167,7 +167,7 @@ impl Plan {
         let stage = Some(StageText::named(&self.blueprint.kinds, self.kind_names(), &self.blueprint.statics));
         let run = OfRun { path: output.folder.configuration(), facts, stage };
         Recording::check_until(output.folder.path(), run, newest)
-            .map_err(|error| output.folder.refusal(format!("{error}, or begin anew with --out and --overwrite")).into())
+            .map_err(|error| output.folder.refusal(format!("{error}; or begin anew with --out and --overwrite")).into())
     }
 
     /// Where a run is about to be overwritten by a world in files, whether that is one: it is not to be lost to a fault in them.

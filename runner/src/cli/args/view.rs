@@ -25,6 +25,9 @@ pub struct ViewArgs {
     /// Do what this file says while it runs, a line of JSON for each command; of a configuration.
     #[arg(long, value_name = "FILE")]
     pub commands: Option<PathBuf>,
+    /// Leave out commands that cannot be done, and go on.
+    #[arg(long, requires = "commands")]
+    pub skip_refused: bool,
     /// How fast time goes on at first: so many seconds of the world in one, or max, as fast as can be.
     #[arg(long, value_name = "X", default_value = "1", value_parser = speed)]
     pub speed: f64,
@@ -42,13 +45,14 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// The same as options of a run that stays to be looked at.
     pub(crate) fn into_run(self) -> RunArgs {
-        let Self { mut sources, values, tiles, out, commands, speed, port, bind, open } = self;
+        let Self { mut sources, values, tiles, out, commands, skip_refused, speed, port, bind, open } = self;
         RunArgs {
             config: sources.pop(),
             values,
             tiles,
             out,
             commands,
+            skip_refused,
             view: true,
             speed,
             port,

@@ -83,6 +83,11 @@ fn is_open_segment(name: &str) -> bool {
     name.starts_with(".steps-") && name.ends_with(".parquet.tmp")
 }
 
+/// Whether a file of that name is a segment, complete or under way.
+pub(crate) fn is_segment(name: &str) -> bool {
+    is_open_segment(name) || steps_of_segment(name).is_some()
+}
+
 /// The first and the last step of a complete segment with that name.
 fn steps_of_segment(name: &str) -> Option<(u64, u64)> {
     let (first, last) = name.strip_prefix("steps-")?.strip_suffix(".parquet")?.split_once('-')?;

@@ -145,8 +145,10 @@ impl Scenery<'_> {
 
     /// A value that cannot be. `row` counts from 0.
     pub(super) fn refuse(&self, row: u64, line: Option<u64>, column: Column, value: &str, reason: &str) -> SceneError {
-        let short: String = value.chars().take(40).collect();
-        let name = format!("{} = {}", column.name(), if short.is_empty() { "nothing" } else { &short });
+        const MOST: usize = 40;
+        let (short, is_cut) = (value.chars().take(MOST).collect::<String>(), value.chars().nth(MOST).is_some());
+        let shown = if short.is_empty() { "nothing" } else { &short };
+        let name = format!("{} = {shown}{}", column.name(), if is_cut { "..." } else { "" });
         SceneError::bad(self.file, Place { line, row: Some(row + 1), name: Some(name) }, reason)
     }
 
