@@ -386,3 +386,39 @@ fn who_is_squeezed_by_a_static_that_moves_gets_what_that_gives() {
         }
     }
 }
+
+/// Its ends touch the floor at two points near each other, as do two corners that hardly overlap, and may pass over each other.
+#[test]
+fn who_falls_on_a_short_edge_is_held() {
+    let chamfered = |side: f32, cut: f32| {
+        let (near, far) = (cut, side - cut);
+        let corners =
+            [(near, 0.0), (far, 0.0), (side, near), (side, far), (far, side), (near, side), (0.0, far), (0.0, near)];
+        Shape::polygon(&corners.map(Vec2::from), 0.0).unwrap()
+    };
+    let core = [(0.0, 0.0), (0.001, 0.0), (0.0005, 0.001)].map(Vec2::from);
+    let shapes = [
+        chamfered(0.5, 0.0005),
+        chamfered(0.5, 0.001),
+        chamfered(2.0, 0.0014),
+        Shape::polygon(&core, 0.5).unwrap(),
+        Shape::capsule(0.001, 0.2).unwrap(),
+    ];
+    let mut scene = Scene { half: DVec2::splat(500.0), ..Scene::new(DVec2::ZERO, -10.0) };
+    scene.wall(DVec2::new(0.0, -5.0), (2000.0, 10.0), 0.0, rough());
+    let mut all = Vec::new();
+    for (number, shape) in (0..).zip(shapes) {
+        let kind = scene.kind(shape, rough());
+        for drop in 0..40_u32 {
+            let place = DVec2::new(f64::from(4 * (40 * number + drop)) - 400.0, 2.0 + 0.02 * f64::from(drop));
+            let id = scene.body(kind, place, Vec2::new(0.5, 0.0));
+            scene.last().rotation = Rot::from_angle(0.16 * drop as f32);
+            scene.last().angular_velocity = 0.4 * (drop % 7) as f32 - 1.2;
+            all.push(id);
+        }
+    }
+    let mut sim = start(&scene);
+    sim.run(180);
+    let fallen = all.iter().filter(|&&id| sim.body(id).position.y < 0.1).count();
+    assert_eq!(fallen, 0, "of {}", all.len());
+}

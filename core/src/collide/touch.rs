@@ -258,12 +258,9 @@ impl<'a> Approach<'a> {
         let [a, b] = [0, 1].map(|side: usize| rotations[side].rotate(pieces[side].center));
         let across = if dot(at.offset + b - a, along) < 0.0 { -along } else { along };
         // Two points that are near each other may be a short edge, too, of what is over the other as a whole.
-        let reach = |side: usize, direction: Vec2| {
-            let way = rotations[side].unrotate(direction);
-            pieces[side].outline.corners().fold(f32::NEG_INFINITY, |most, corner| max(most, dot(corner, way)))
-                + pieces[side].radius
-        };
-        if reach(0, across) + reach(1, -across) - dot(at.offset, across) > little {
+        let reach = |side: usize, direction: Vec2| pieces[side].reach(rotations[side].unrotate(direction));
+        let has_short_edge = pieces.iter().any(|piece| piece.has_edge_shorter_than(little));
+        if has_short_edge && reach(0, across) + reach(1, -across) - dot(at.offset, across) > little {
             return at;
         }
         let mut over = Manifold { normal: across, ..Manifold::EMPTY };

@@ -2,7 +2,7 @@
 
 use crate::model::abutting::join_abutting;
 use crate::model::convex::Convex;
-use crate::model::math::dot;
+use crate::model::math::{dot, max};
 use crate::model::shape::{Polygon, Segment, Shape};
 use glam::Vec2;
 use std::sync::Arc;
@@ -81,6 +81,17 @@ impl Piece {
     /// Whether it is neither a disc nor a segment that is solid from one side.
     pub(crate) fn has_faces(&self) -> bool {
         self.outline.count() > 1 && self.side.is_none()
+    }
+
+    /// How far it reaches along a direction, from the center of the body that holds it.
+    pub(crate) fn reach(&self, direction: Vec2) -> f32 {
+        self.outline.corners().fold(f32::NEG_INFINITY, |most, corner| max(most, dot(corner, direction))) + self.radius
+    }
+
+    /// Whether an edge that has a length has less than that.
+    pub(crate) fn has_edge_shorter_than(&self, length: f32) -> bool {
+        let edges = (0..self.outline.count()).map(|face| self.outline.edge(face));
+        edges.map(|[from, to]| dot(to - from, to - from)).any(|square| square > 0.0 && square < length * length)
     }
 
     /// Half extents of an upright rectangle around the center of the body that holds it.
