@@ -277,6 +277,38 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_as_a_run_makes_it_is_left_as_is_all_else() {
+        let folder = tempdir().unwrap();
+        let run = RunFolder::new("--out", folder.path());
+        drop(run.claim(None, Some(("", &configuration()))).unwrap());
+        fs::create_dir(run.rank(0)).unwrap();
+        for (name, is_folder) in [
+            ("summary.json", true),
+            ("log.csv", true),
+            ("snapshots", false),
+            ("rank-00001", false),
+            ("rank-00000/steps-0000000000-0000000009.parquet", true),
+        ] {
+            let path = folder.path().join(name);
+            if is_folder { fs::create_dir(&path) } else { fs::write(&path, "") }.unwrap();
+            let (told, made) = (run.hold(None).unwrap_err().to_string(), if is_folder { "file" } else { "folder" });
+            assert!(told.ends_with(&format!(": its {name} is no {made}, as a run makes it; move it away")), "{told}");
+            if is_folder { fs::remove_dir(&path) } else { fs::remove_file(&path) }.unwrap();
+        }
+        drop(run.hold(None).unwrap().unwrap());
+        // Without its configuration it can be replaced, as long as there is nothing but what a run makes.
+        fs::remove_file(run.configuration()).unwrap();
+        let told = run.check_free(false).unwrap_err().to_string();
+        assert!(told.contains("its run.toml is missing; bring back a good copy of it"), "{told}");
+        run.check_free(true).unwrap();
+        drop(run.claim(run.hold(None).unwrap(), Some(("", &configuration()))).unwrap());
+        fs::remove_file(run.configuration()).unwrap();
+        fs::create_dir_all(run.rank(0)).unwrap();
+        fs::write(folder.path().join("thesis.tex"), "").unwrap();
+        assert!(run.check_free(true).is_err());
+    }
+
+    #[test]
     fn no_configuration_is_there_without_its_commands() {
         let folder = tempdir().unwrap();
         let run = RunFolder::new("--out", folder.path());
