@@ -157,17 +157,20 @@ impl Form for Seconds {
     }
 }
 
+/// The fewest steps in a second.
+const LEAST_HERTZ: f32 = 0.001;
+
 /// Steps in a second, of which the inverse is kept.
 pub(super) struct Hertz;
 
 impl Form for Hertz {
     fn read(&self, key: &'static str, settings: &mut Settings, config: &mut Config) -> Result<(), ConfigError> {
-        let dt = settings.float(key)?.map(f32::recip);
-        // The physics tells of others that cannot be.
-        if dt == Some(f32::INFINITY) {
-            return Err(settings.refusal(key, "positive and finite, and at least 1e-38"));
+        let hertz = settings.float(key)?;
+        // The physics tells of others that cannot be. In longer steps everybody comes by everybody.
+        if hertz.is_some_and(|hertz| (0.0..LEAST_HERTZ).contains(&hertz)) {
+            return Err(settings.refusal(key, format!("positive and finite, and at least {LEAST_HERTZ}")));
         }
-        keep(dt, &mut config.params.dt);
+        keep(hertz.map(f32::recip), &mut config.params.dt);
         Ok(())
     }
 

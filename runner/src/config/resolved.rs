@@ -175,7 +175,8 @@ mod tests {
             let mut any = || f32::from_bits(random.bits() as u32 & 0x7fff_ffff);
             (config.params.dt, config.params.push_out_speed, config.params.margin_cap) = (1.0 / any(), any(), any());
             config.run.peer_timeout = Duration::from_nanos(1_000_000 + random.bits() % 999_999_000_000_000);
-            if config.params.check().is_ok() {
+            // Longer steps than of a thousand seconds are refused.
+            if config.params.check().is_ok() && config.params.dt < 999.0 {
                 assert_comes_back(&config);
                 tried += 1;
             }
