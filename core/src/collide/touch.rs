@@ -248,8 +248,9 @@ impl<'a> Approach<'a> {
         let overlap = dot(two.anchor - one.anchor, along).abs();
         let [a, b] = [&self.a, &self.b].map(|side| min(side.kind.extent.x, side.kind.extent.y));
         let little = min(touching, PASSABLE * min(a, b));
+        let is_little = overlap < little;
         let closing = self.closing(&at, one.anchor);
-        if !self.is_solid() || !touches || overlap >= little || closing <= CREEPING {
+        if !self.is_solid() || !touches || !is_little || closing <= CREEPING {
             return at;
         }
         let pieces = self.pieces.unwrap_or([&self.a.kind.pieces[0], &self.b.kind.pieces[0]]);
