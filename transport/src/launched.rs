@@ -9,14 +9,8 @@ pub struct Launched {
     pub size: usize,
     /// Which of them this is.
     pub rank: Rank,
-}
-
-impl Launched {
     /// Whether they were started to join each other: by a launcher of MPI, or another one in a way that MPI understands.
-    pub fn can_join_others(self) -> bool {
-        let names = ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"];
-        self.size > 1 && names.iter().any(|name| std::env::var_os(name).is_some())
-    }
+    pub is_joint: bool,
 }
 
 /// What the launcher says, if there was one that says it: `mpirun` of Open MPI or of MPICH and those like it, or `srun`.
@@ -40,7 +34,11 @@ fn launched_in(variable: impl Fn(&str) -> Option<String>) -> Option<Launched> {
         // The last, as a launcher within a job of Slurm may have been started by srun itself.
         ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
     ];
-    let found = |(size, rank)| Some(Launched { size: number(size)? as usize, rank: Rank(number(rank)?) });
+    let is_told = ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"].iter().any(|name| variable(name).is_some());
+    let found = |(size, rank)| {
+        let (size, rank) = (number(size)? as usize, Rank(number(rank)?));
+        Some(Launched { size, rank, is_joint: is_told && size > 1 })
+    };
     names.into_iter().find_map(found)
 }
 
@@ -60,7 +58,7 @@ mod tests {
         let with = |variables: &'static [(&str, &str)]| {
             launched_in(move |asked| Some(variables.iter().find(|(name, _)| *name == asked)?.1.to_owned()))
         };
-        let launched = |size, rank| Some(Launched { size, rank: Rank(rank) });
+        let launched = |size, rank| Some(Launched { size, rank: Rank(rank), is_joint: true });
         assert_eq!(with(&[("OMPI_COMM_WORLD_SIZE", "4"), ("OMPI_COMM_WORLD_RANK", "3")]), launched(4, 3));
         assert_eq!(with(&[("PMI_SIZE", "8"), ("PMI_RANK", "0")]), launched(8, 0));
         let within_slurm = &[
@@ -69,8 +67,12 @@ mod tests {
             ("OMPI_COMM_WORLD_SIZE", "16"),
             ("OMPI_COMM_WORLD_RANK", "9"),
         ];
-        assert_eq!(with(&within_slurm[..2]), launched(2, 1));
+        // Of tasks alone nobody knows whether they are to join.
+        let alone = Some(Launched { size: 2, rank: Rank(1), is_joint: false });
+        assert_eq!(with(&within_slurm[..2]), alone);
         assert_eq!(with(within_slurm), launched(16, 9));
+        let of_one = with(&[("PMI_SIZE", "1"), ("PMI_RANK", "0")]);
+        assert_eq!(of_one, Some(Launched { size: 1, rank: Rank(0), is_joint: false }));
         assert_eq!(with(&[("PMI_SIZE", "many"), ("PMI_RANK", "0")]), None);
         assert_eq!(with(&[("HOME", "1")]), None);
     }

@@ -21,7 +21,6 @@ pub(super) use straight::Course;
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
 use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
-use crate::collide::wide::pairs::TOUCHING;
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
@@ -46,12 +45,20 @@ pub(super) fn scale_of<V: Arithmetic>([a, b]: [V; 2]) -> V {
     a.min(b).mul(V::splat(PER_ROOMY)).min(V::splat(1.0))
 }
 
+/// Surfaces nearer than this touch, in m.
+pub(super) const TOUCHING: f32 = 0.002;
+
+/// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
+pub(super) const ROLLING: f32 = 0.0005;
+
 /// Steps of the search, at most. A last one mends what they leave.
 pub(super) const ROUNDS: usize = 3;
 
-/// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m.
+/// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m: of what is shorter by no
+/// more than a part, so as not to go past all of it.
 pub(super) const MORE_ROUNDS: usize = 12;
 pub(super) const LEAST_WAY: f32 = 0.002;
+pub(super) const LEAST_PART: f32 = 0.5;
 
 /// The cosine between a segment's normal and that of its contact with what lies on it, at least.
 const LIES: f32 = 0.99;
@@ -363,7 +370,8 @@ impl<'a> Approach<'a> {
             let speed = 0.5 * (bound + closing);
             // Who is let through may go away from where he is nearest, and still come to the face.
             let speed = if speed > 0.0 { speed } else { dot(self.between, self.between).sqrt() + sweep };
-            let way = if at.manifold.is_distance() { max(nearest.separation, LEAST_WAY) } else { nearest.separation };
+            let least = if at.manifold.is_distance() { self.least_way() } else { nearest.separation };
+            let way = max(nearest.separation, least);
             at = self.at(at.time + min(way / speed, left), reach);
             if at.manifold.is_distance() {
                 continue;
@@ -394,6 +402,15 @@ impl<'a> Approach<'a> {
         }
         let time = at.time + soonest;
         if time <= dt { (self.at(max(time, 0.0), reach), true) } else { (at, false) }
+    }
+
+    /// See [`LEAST_WAY`].
+    fn least_way(&self) -> f32 {
+        let segment = self.pieces.and_then(|pieces| pieces.into_iter().find(|piece| piece.side.is_some()));
+        segment.map_or(LEAST_WAY, |segment| {
+            let [to, from] = segment.outline.edge(0);
+            min(LEAST_WAY, LEAST_PART * dot(to - from, to - from).sqrt())
+        })
     }
 
     /// The contact with the geometry of a moment, and the separations that its points have now.

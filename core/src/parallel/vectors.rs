@@ -10,6 +10,12 @@ pub(crate) struct Vectors<V> {
     pub(crate) y: V,
 }
 
+/// With the sign that it has not.
+#[inline(always)]
+pub(crate) fn negated<V: Arithmetic>(x: V) -> V {
+    V::splat(-0.0).sub(x)
+}
+
 impl<V: Arithmetic> Vectors<V> {
     #[inline(always)]
     pub(crate) fn new(x: V, y: V) -> Self {
@@ -70,6 +76,18 @@ impl<V: Arithmetic> Vectors<V> {
     pub(crate) fn hold(self, v: Self) -> Self {
         let zero = V::splat(0.0);
         Self { x: v.x.min(self.x).max(zero.sub(self.x)), y: v.y.min(self.y).max(zero.sub(self.y)) }
+    }
+
+    /// [`pick`](Self::pick) for each of two.
+    #[inline(always)]
+    pub(crate) fn pick_both(positive: V, yes: &[Self; 2], no: &[Self; 2]) -> [Self; 2] {
+        [Self::pick(positive, yes[0], no[0]), Self::pick(positive, yes[1], no[1])]
+    }
+
+    /// With both signs that they have not.
+    #[inline(always)]
+    pub(crate) fn opposite(self) -> Self {
+        Self { x: negated(self.x), y: negated(self.y) }
     }
 
     /// `yes` where a number is positive, else `no`.

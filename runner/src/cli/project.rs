@@ -63,6 +63,7 @@ fn begin(args: &ProjectArgs) -> Result<Option<(Config, Network, Option<Measured>
         return Ok(fit.map(|(config, (network, measured))| (config, network, Some(measured))));
     }
     let config = config?;
+    launch::check_alone(&config)?;
     let (network, measured) = launch::fit(&config)?;
     Ok(Some((config, network, Some(measured))))
 }

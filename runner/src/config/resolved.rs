@@ -181,6 +181,7 @@ mod tests {
                 tried += 1;
             }
         }
+        assert_comes_back(&scene("rooms", &[("hertz", "0.001")]));
         // The greatest there is: the inverse of its inverse is infinity.
         assert_comes_back(&scene("rooms", &[("hertz", "3.4028235e38")]));
     }

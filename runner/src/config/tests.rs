@@ -242,8 +242,8 @@ fn out_of_range_and_of_the_wrong_type() {
         ),
         (
             "physics",
-            "hertz = 1e-300",
-            "test.toml: physics.hertz = 1e-300: must be positive and finite, and at least 0.001",
+            "hertz = 0.00099",
+            "test.toml: physics.hertz = 0.00099: must be positive and finite, and at least 0.001",
         ),
         ("physics", "gravity = [0, 1e300]", "test.toml: physics.gravity = [0, 1e300]: must be two numbers of at most"),
         ("physics", "gravity = [0, nan]", "test.toml: physics.gravity = [0, nan]: must be finite"),

@@ -1,7 +1,8 @@
 //! Who may write to the folder of a run: all processes of one run, and nobody else.
 
 use super::durable::{create_folder_durably, remove_if_there, sync_folder, write_durably};
-use super::{FolderError, RunFolder, recording};
+use super::{FolderError, RunFolder, recording, snapshot};
+use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
@@ -31,11 +32,10 @@ impl RunFolder {
     /// If another run writes here, or nobody can.
     pub fn hold(&self, waiting: Option<&dyn Fn(&str)>) -> Result<Option<Claim>, FolderError> {
         // What is no run, and cannot become one, is left as it is. Asked in this order, as one may begin meanwhile.
-        let was_run = || self.holds_run() || self.damaged().is_some();
-        if !self.path().is_dir() || self.check_free(false).is_err() && !was_run() {
+        if !self.path().is_dir() || self.check_free(false).is_err() && !self.was_run() {
             return Ok(None);
         }
-        self.check_contents()?;
+        self.check_made(&self.lock(), false)?;
         let lock = self.open_lock().map_err(|error| self.not_writable(&error))?;
         let deadline = Instant::now() + if waiting.is_some() { LINGERING } else { Duration::ZERO };
         let mut told = false;
@@ -52,9 +52,13 @@ impl RunFolder {
                     return Err(self.refusal("another run is writing there; wait for its end, or stop it"));
                 }
                 // A file system without locks; then nobody can tell.
-                Err(TryLockError::Error(_)) => return Ok(Some(Claim { _lock: None })),
+                Err(TryLockError::Error(_)) => {
+                    self.check_contents()?;
+                    return Ok(Some(Claim { _lock: None }));
+                }
             }
         }
+        self.check_contents()?;
         // From now on it is shared with the other processes of the run.
         let shared = lock.lock_shared().is_ok();
         Ok(Some(Claim { _lock: Some(lock).filter(|_| shared) }))
@@ -167,37 +171,34 @@ impl RunFolder {
     }
 
     /// Refuses a folder in which something that a run writes to, or removes, is a link to what is elsewhere, or a folder in the place of a
-    /// file, or what else it may be: then nothing is touched.
+    /// file, or what else it may be: then nothing is touched. For who holds it.
     fn check_contents(&self) -> Result<(), FolderError> {
-        let entries = |folder: &Path| {
-            let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-            entries
-                .map_err(|error| self.refusal(format!("{}: {error}; make it one that can be read", folder.display())))
-        };
-        for entry in entries(self.path())? {
-            let name = entry.file_name();
-            if !self.owns(&name) {
-                continue;
-            }
+        for name in self.names_in(self.path())?.iter().filter(|name| self.owns(name)) {
+            let path = self.path().join(name);
             let is_rank_folder = name.to_str().is_some_and(recording::is_rank_folder);
-            let is_folder = is_rank_folder || Some(name.as_os_str()) == self.snapshots().file_name();
-            self.check_entry(&entry, is_folder)?;
-            if is_rank_folder {
-                let own = |entry: &fs::DirEntry| entry.file_name().to_str().is_some_and(recording::is_segment);
-                entries(&entry.path())?
-                    .iter()
-                    .filter(|entry| own(entry))
-                    .try_for_each(|entry| self.check_entry(entry, false))?;
+            let is_snapshots = path == self.snapshots();
+            self.check_made(&path, is_rank_folder || is_snapshots)?;
+            let is_own = |name: &&OsString| {
+                name.to_str().is_some_and(if is_snapshots { snapshot::is_folder } else { recording::is_segment })
+            };
+            if is_rank_folder || is_snapshots {
+                let names = self.names_in(&path)?;
+                names.iter().filter(is_own).try_for_each(|name| self.check_made(&path.join(name), is_snapshots))?;
             }
         }
         Ok(())
     }
 
-    /// Whether what a run has made is a folder, or a file, as it was.
-    fn check_entry(&self, entry: &fs::DirEntry, is_folder: bool) -> Result<(), FolderError> {
-        let kind = entry.file_type().map_err(|error| self.not_writable(&error))?;
-        let path = entry.path();
-        let name = path.strip_prefix(self.path()).unwrap_or(&path).display();
+    /// What is in a folder.
+    fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, FolderError> {
+        let names = fs::read_dir(folder).and_then(|all| all.map(|entry| Ok(entry?.file_name())).collect());
+        names.map_err(|error| self.refusal(format!("{}: {error}; make it one that can be read", folder.display())))
+    }
+
+    /// Whether what a run has made is a folder, or a file, as it was, if it is there.
+    fn check_made(&self, path: &Path, is_folder: bool) -> Result<(), FolderError> {
+        let Ok(kind) = fs::symlink_metadata(path).map(|data| data.file_type()) else { return Ok(()) };
+        let name = path.strip_prefix(self.path()).unwrap_or(path).display();
         if kind.is_symlink() {
             return Err(self.refusal(format!(
                 "its {name} is a link: a run writes to its own folder alone; put there what the link leads to"
@@ -282,10 +283,11 @@ mod tests {
         let run = RunFolder::new("--out", folder.path());
         drop(run.claim(None, Some(("", &configuration()))).unwrap());
         fs::create_dir(run.rank(0)).unwrap();
+        fs::create_dir(folder.path().join("snapshots")).unwrap();
         for (name, is_folder) in [
             ("summary.json", true),
             ("log.csv", true),
-            ("snapshots", false),
+            ("snapshots/step-0000000010", false),
             ("rank-00001", false),
             ("rank-00000/steps-0000000000-0000000009.parquet", true),
         ] {
@@ -305,7 +307,13 @@ mod tests {
         fs::remove_file(run.configuration()).unwrap();
         fs::create_dir_all(run.rank(0)).unwrap();
         fs::write(folder.path().join("thesis.tex"), "").unwrap();
-        assert!(run.check_free(true).is_err());
+        let told = run.check_free(true).unwrap_err().to_string();
+        assert!(told.ends_with(": it holds thesis.tex as well, which is no run's; move it away"), "{told}");
+        fs::remove_file(folder.path().join("thesis.tex")).unwrap();
+        // What somebody wrote stays.
+        fs::write(run.configuration(), "[scene]\n").unwrap();
+        let told = run.check_free(true).unwrap_err().to_string();
+        assert!(told.contains("run.toml is damaged") && !told.contains("--overwrite"), "{told}");
     }
 
     #[test]

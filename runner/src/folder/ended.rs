@@ -31,7 +31,7 @@ pub enum EndedError {
 impl EndedError {
     /// As a note where work goes on without it.
     pub fn counts_as_missing(&self) -> String {
-        format!("{self}; so long it counts as missing")
+        format!("{self}; until then it counts as missing")
     }
 }
 

@@ -111,10 +111,12 @@ impl RunFolder {
             let how = "name another folder, or have `atoll run` go on with that (--resume) or replace it (--overwrite)";
             return if overwrite { Ok(()) } else { Err(self.refusal(format!("it holds a run; {how}"))) };
         }
-        // What was a run, and nothing else, can be replaced without its configuration.
-        let is_left = |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|one| self.owns(&one.file_name()));
-        if overwrite && self.damaged().is_some() && fs::read_dir(&self.path).is_ok_and(|mut all| all.all(is_left)) {
-            return Ok(());
+        // What was a run, and nothing else, can be replaced when its configuration is lost.
+        if overwrite && self.has_lost_configuration() && self.damaged().is_some() {
+            let mut names = fs::read_dir(&self.path).into_iter().flatten().flatten().map(|entry| entry.file_name());
+            let other = names.find(|name| !self.owns(name)).map(|name| name.display().to_string());
+            let refuse = |name| self.refusal(format!("it holds {name} as well, which is no run's; move it away"));
+            return other.map_or(Ok(()), |name| Err(refuse(name)));
         }
         // Of commands the lock tells whose they are.
         let is_begun = self.lock().exists();
@@ -157,10 +159,11 @@ impl RunFolder {
 
     /// That a run was begun here, by what else there is, and its configuration is not one any more.
     pub fn damaged(&self) -> Option<FolderError> {
-        let is_run =
-            self.lock().is_file() && (self.snapshots().is_dir() || self.rank(0).is_dir() || self.log().is_file());
+        let is_run = self.lock().is_file()
+            && (self.snapshots().is_dir() || self.log().is_file() || self.summary().is_file() || self.has_recorded());
         match self.read_configuration() {
             _ if !is_run || self.holds_run() => None,
+            Ok(text) if text.is_empty() => Some(self.bad_configuration("it is empty")),
             Ok(_) => Some(self.bad_configuration("it does not begin as runs write it")),
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 Some(self.refusal(format!("its {CONFIGURATION} is missing; {}", self.mend())))
@@ -179,8 +182,28 @@ impl RunFolder {
     /// What becomes of a run without its configuration.
     fn mend(&self) -> String {
         let copies =
-            if self.rank(0).is_dir() { " (each segment of the recording has its text, as atoll.config)" } else { "" };
-        format!("bring back a good copy of it{copies}, or begin anew with --out and --overwrite")
+            if self.has_recorded() { " (each segment of the recording has its text, as atoll.config)" } else { "" };
+        let anew = if self.has_lost_configuration() { ", or begin anew with --out and --overwrite" } else { "" };
+        format!("bring back a good copy of it{copies}{anew}")
+    }
+
+    /// Whether there is a segment of a recording.
+    fn has_recorded(&self) -> bool {
+        fs::read_dir(self.rank(0))
+            .is_ok_and(|all| all.flatten().any(|entry| entry.file_name().to_str().is_some_and(recording::is_segment)))
+    }
+
+    /// Whether nothing is left of the configuration that anybody can read.
+    fn has_lost_configuration(&self) -> bool {
+        match self.read_configuration() {
+            Ok(text) => text.is_empty(),
+            Err(error) => [ErrorKind::NotFound, ErrorKind::InvalidData].contains(&error.kind()),
+        }
+    }
+
+    /// Whether a run was begun here, whatever became of its configuration.
+    pub fn was_run(&self) -> bool {
+        self.holds_run() || self.damaged().is_some()
     }
 
     /// The configuration of the run that was begun here.

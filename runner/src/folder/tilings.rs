@@ -81,7 +81,7 @@ impl TilingsFile {
             let after = serde_json::from_slice(line).map(|Line { after, .. }| after);
             line.ends_with(b"\n") && after.map_or(true, |after| resumed.is_some_and(|resumed| after < resumed))
         };
-        match known {
+        match known.filter(|known| known.contains(&b'\n')) {
             Some(known) => {
                 let lines = known.split_inclusive(|&byte| byte == b'\n').enumerate();
                 for (_, line) in lines.take_while(|&(number, line)| number == 0 || is_before(line)) {

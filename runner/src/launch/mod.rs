@@ -33,7 +33,7 @@ const TIME_TO_SPEAK: Duration = Duration::from_secs(5);
 /// Whether a launcher of MPI started this process to join others.
 #[cfg(feature = "mpi")]
 pub(crate) fn is_launched() -> bool {
-    launched().is_some_and(|launched| launched.can_join_others())
+    launched().is_some_and(|launched| launched.is_joint)
 }
 
 /// Refuses a run that does not say on what, and would be made by each of the processes that a launcher of MPI started.
@@ -41,8 +41,8 @@ pub(crate) fn is_launched() -> bool {
 /// # Errors
 /// If it is such a one.
 pub(crate) fn check_alone(config: &Config) -> Result<(), RunError> {
-    match launched().filter(|launched| launched.can_join_others()) {
-        Some(launched) if config.run.transport.is_none() => {
+    match launched() {
+        Some(launched) if launched.is_joint && config.run.transport.is_none() => {
             // The launcher ends all when one has ended.
             if launched.rank != Rank(0) {
                 thread::sleep(TIME_TO_SPEAK);

@@ -106,7 +106,8 @@ impl Plan {
         if let Some(ended) = ended.as_ref().filter(|ended| !ended.interrupted && ended.steps == steps) {
             RunError::check_bodies(ended.bodies, ended.bodies_lost)?;
             let found = snapshot::find(&folder.snapshots(), &config.identity(tiles), tiles);
-            let goes_on = found.is_ok_and(|found| !found.snapshots.is_empty());
+            // Of those that are damaged the next try tells.
+            let goes_on = found.map_or(true, |found| !found.snapshots.is_empty());
             return Err(RunError::Complete { summary: folder.summary(), steps, goes_on });
         }
         // Before the first step there is nothing to go on from: it begins anew.
@@ -176,7 +177,7 @@ impl Plan {
     /// # Errors
     /// If not.
     pub fn check_overwriting(&self) -> Result<(), RunError> {
-        let overwrites = self.output.as_ref().is_some_and(|output| output.begins && output.folder.holds_run());
+        let overwrites = self.output.as_ref().is_some_and(|output| output.begins && output.folder.was_run());
         Ok(self.scene.file().filter(|_| overwrites).map_or(Ok(()), SceneFile::check_bodies)?)
     }
 

@@ -151,8 +151,7 @@ impl<'a> Meetings<'a> {
             match self.go_round(host, &held, transport).map_err(RankError::Transport)? {
                 Round::Over => break,
                 Round::Stopped => stopped = true,
-                Round::Answered => {}
-                Round::Waits => {}
+                Round::Answered | Round::Waits => {}
                 Round::Announced => commander.wait(world.step_count()),
                 Round::Told(words) => commander.hear(&words, world, transport, self.observer)?,
             }

@@ -143,12 +143,13 @@ fn a_page_is_told_what_is_refused_and_why_a_run_failed() {
     // A record that is damaged.
     let recorded = folder.path().join("recorded");
     let mut command = program::command();
-    program::run(
+    let ended = program::run(
         command
             .args(["run", "configs/quickstart.toml", "--record-every", "10", "--out"])
             .arg(&recorded)
             .args(small(20)),
     );
+    assert_eq!(ended.code, Some(0), "{ended}");
     let segment = recorded.join("rank-00000/steps-0000000000-0000000020.parquet");
     let mut bytes = std::fs::read(&segment).unwrap();
     bytes[40] ^= 1;

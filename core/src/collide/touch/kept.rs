@@ -1,9 +1,8 @@
 //! What is kept of a contact of the last step: whose bodies press and hardly move is held as it is, and who rolls as he rolls on.
 
-use super::{Approach, Side};
+use super::{Approach, ROLLING, Side, TOUCHING};
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::{Manifold, ManifoldPoint};
-use crate::collide::wide::pairs::{ROLLING, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::{dot, max, min};
 use crate::model::params::Exchange;

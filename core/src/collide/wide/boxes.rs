@@ -1,13 +1,13 @@
 //! The boxes of sixteen pairs: what `manifold/box_box.rs` does for two, in the same words and with the same bits.
 
 use super::manifolds::Manifolds;
-use super::moments::{Points, Search, Shaped, Shapes, negated, opposite};
+use super::moments::{Points, Search, Shaped, Shapes};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::box_box::PREFERENCE;
 use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
-use crate::parallel::vectors::{Vectors, absolute, less};
+use crate::parallel::vectors::{Vectors, absolute, less, negated};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -68,7 +68,7 @@ impl<V: Wide> Shapes<V> for Boxes {
         let reference = Vectors::pick(from_b, pairs.half[1], pairs.half[0]);
         let incident = Vectors::pick(from_b, pairs.half[0], pairs.half[1]);
         let turn = Vectors::new(turn.x, from_b.if_positive(negated(turn.y), turn.y));
-        let center = Vectors::pick(from_b, opposite(in_b), in_a);
+        let center = Vectors::pick(from_b, in_b.opposite(), in_a);
         let along = Vectors::pick(from_b, along_b, along_a);
         // The reference face, and a frame of normal `n` and tangent `t`, both along the axes.
         let by_x = less(along.y, along.x);
@@ -137,7 +137,7 @@ impl<V: Wide> Shapes<V> for Boxes {
         // Back to the frame of the world, and of body A.
         let back = Vectors::pick(from_b, rotation[1], rotation[0]);
         let normal = back.rotate(at.normal);
-        at.normal = Vectors::pick(from_b, opposite(normal), normal);
+        at.normal = Vectors::pick(from_b, normal.opposite(), normal);
         for anchor in &mut at.anchor {
             let from_center = back.rotate(*anchor);
             *anchor = Vectors::pick(from_b, offset.plus(from_center), from_center);

@@ -1,7 +1,7 @@
 //! Discs and polygons, sixteen pairs at once: what `manifold/convex.rs` does for one, in the same words and with the same bits.
 
 use super::manifolds::Manifolds;
-use super::moments::{Points, Search, Shaped, Shapes, opposite};
+use super::moments::{Points, Search, Shaped, Shapes};
 use super::outlines::{Polygon, WideOutlines};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
@@ -68,7 +68,7 @@ impl<V: Wide> Shapes<V> for Discs<V> {
         }
         let point = Vectors::pick(self.are_first, none, center.plus(turn.rotate(none)));
         let (outward, distance, _) = polygon.nearest(point);
-        let normal = Vectors::pick(self.are_first, opposite(outward), outward);
+        let normal = Vectors::pick(self.are_first, outward.opposite(), outward);
         let on_a = Vectors::pick(self.are_first, point, point.minus(outward.scaled(distance)));
         let separation = distance.sub(pairs.radius[0]).sub(pairs.radius[1]);
         let anchor = on_a.plus(normal.scaled(pairs.radius[0].add(half.mul(separation))));

@@ -17,13 +17,7 @@ pub(super) struct Manifolds<V> {
     pub(super) feature: [V; 2],
 }
 
-/// Each of two vectors, where a number is positive the first.
-#[inline(always)]
-pub(super) fn both<V: Wide>(positive: V, yes: &[Vectors<V>; 2], no: &[Vectors<V>; 2]) -> [Vectors<V>; 2] {
-    [Vectors::pick(positive, yes[0], no[0]), Vectors::pick(positive, yes[1], no[1])]
-}
-
-/// Each of two numbers, as [`both`].
+/// Each of two numbers: where another is positive the first, else the second.
 #[inline(always)]
 fn numbers<V: Wide>(positive: V, yes: &[V; 2], no: &[V; 2]) -> [V; 2] {
     [positive.if_positive(yes[0], no[0]), positive.if_positive(yes[1], no[1])]
@@ -46,7 +40,7 @@ impl<V: Wide> Manifolds<V> {
             two: positive.if_positive(yes.two, no.two),
             tells: positive.if_positive(yes.tells, no.tells),
             normal: Vectors::pick(positive, yes.normal, no.normal),
-            anchor: both(positive, &yes.anchor, &no.anchor),
+            anchor: Vectors::pick_both(positive, &yes.anchor, &no.anchor),
             separation: numbers(positive, &yes.separation, &no.separation),
             feature: numbers(positive, &yes.feature, &no.feature),
         }

@@ -3,17 +3,17 @@
 //!
 //! Where speeds overflow, or a corner may pass over another, it cannot tell, and leaves the pair to that.
 
-use super::manifolds::{Manifolds, both};
-use super::pairs::{Outlook, Pairs, ROLLING, TOUCHING, WidePairs};
+use super::manifolds::Manifolds;
+use super::pairs::{Outlook, Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
 use crate::collide::cull::passes;
 use crate::collide::manifold::chain::Lies;
-use crate::collide::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROUNDS};
+use crate::collide::touch::{CREEPING, DEEP, LEAST_WAY, MORE_ROUNDS, NEAR, PASSABLE, ROLLING, ROUNDS, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::model::piece::Piece;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
-use crate::parallel::vectors::{Vectors, absolute, less};
+use crate::parallel::vectors::{Vectors, absolute, less, negated};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -37,6 +37,15 @@ pub(super) trait Shapes<V> {
 
     /// Whether one of each two may be a disc, which rolls.
     const WITH_DISCS: bool = false;
+
+    /// How far a search for their touch goes at least past where nothing touches: see [`LEAST_WAY`].
+    #[inline(always)]
+    fn least_way(&self) -> V
+    where
+        V: Wide,
+    {
+        V::splat(LEAST_WAY)
+    }
 
     /// Their manifolds once B has come to `offset` from A, and both have turned so. Further ones than `reach` may give none.
     fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V>;
@@ -77,8 +86,8 @@ pub(in crate::collide) trait WidePieces: Shaped {
 /// What can be said of pairs whose contacts have up to two points.
 #[derive(Default, Debug)]
 pub(in crate::collide) struct PointOutlook<S> {
-    pub(super) pairs: S,
-    pub(super) points: Points,
+    pairs: S,
+    points: Points,
 }
 
 impl<S: Shaped> Outlook for PointOutlook<S> {
@@ -131,17 +140,6 @@ pub(in crate::collide) struct Points {
     points: [[Quad; WIDE]; 2],
 }
 
-/// With the sign that it has not.
-#[inline(always)]
-pub(super) fn negated<V: Wide>(x: V) -> V {
-    V::splat(-0.0).sub(x)
-}
-
-#[inline(always)]
-pub(super) fn opposite<V: Wide>(v: Vectors<V>) -> Vectors<V> {
-    Vectors::new(negated(v.x), negated(v.y))
-}
-
 impl<V: Wide> Moments<V> {
     /// `yes` where a number is positive, else `no`.
     #[inline(always)]
@@ -149,7 +147,7 @@ impl<V: Wide> Moments<V> {
         Self {
             time: positive.if_positive(yes.time, no.time),
             offset: Vectors::pick(positive, yes.offset, no.offset),
-            turning: both(positive, &yes.turning, &no.turning),
+            turning: Vectors::pick_both(positive, &yes.turning, &no.turning),
             manifolds: Manifolds::pick(positive, &yes.manifolds, &no.manifolds),
         }
     }
@@ -377,7 +375,7 @@ impl<V: Wide> Pairs<V> {
                 let whole = self.between.dot(self.between).sqrt().add(self.sweep(0).add(self.sweep(1)));
                 speed = speed.if_positive(speed, whole);
             }
-            let way = at.manifolds.tells.if_positive(separation.max(V::splat(LEAST_WAY)), separation);
+            let way = at.manifolds.tells.if_positive(separation.max(shapes.least_way()), separation);
             let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);
             at = Moments::pick(going, &next, &at);
             going = going.mul(at.manifolds.some);

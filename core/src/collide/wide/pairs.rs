@@ -1,10 +1,10 @@
-//! Sixteen pairs at once, at least one body of each being round: the contacts of what rolls, as most does in a pile, and of what
-//! touches within the step (`wide/touches.rs`).
+//! The bodies of sixteen pairs, whatever their shapes; and the contacts of those of which at least one is round: of what rolls, as most
+//! does in a pile, and of what touches within the step (`wide/touches.rs`).
 
 use super::moments::Search;
 use super::touches::Touches;
 use crate::collide::broad_phase::Pair;
-use crate::collide::touch::{pressed, scale_of};
+use crate::collide::touch::{ROLLING, TOUCHING, pressed, scale_of};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
@@ -13,13 +13,7 @@ use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
 
-/// Surfaces nearer than this touch, in m.
-pub(in crate::collide) const TOUCHING: f32 = 0.002;
-
-/// Who rolls comes no nearer than this in half a step, and goes no further away, in m.
-pub(in crate::collide) const ROLLING: f32 = 0.0005;
-
-/// Sixteen pairs of bodies A and B, one of which is round.
+/// Sixteen pairs of bodies A and B.
 #[derive(Default, Debug)]
 pub(in crate::collide) struct WidePairs {
     /// One where they pressed at each other in the last step, else zero.

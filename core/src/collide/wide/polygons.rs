@@ -1,7 +1,7 @@
 //! The convex pieces of sixteen pairs: what `manifold/convex.rs` does for two, in the same words and with the same bits.
 
 use super::manifolds::Manifolds;
-use super::moments::{Points, Search, Shaped, Shapes, WidePieces, opposite};
+use super::moments::{Points, Search, Shaped, Shapes, WidePieces};
 use super::outlines::{Face, Polygon, WideOutlines, clip};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
@@ -96,7 +96,7 @@ impl<V: Wide> Gap<V> {
         for (number, &point) in a.corners[..a.most].iter().enumerate() {
             let (normal, distance, at) = b.nearest(point);
             let feature = at.mul(V::splat(8.0)).add(V::splat(512.0 + number as f32));
-            least = Self::lesser(&least, &Self { distance, normal: opposite(normal), on_first: point, feature });
+            least = Self::lesser(&least, &Self { distance, normal: normal.opposite(), on_first: point, feature });
         }
         least
     }
@@ -155,7 +155,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let anchor = on_face.plus(n.scaled(radius.add(half.mul(separation))));
         at.separation[0] = is_end.if_positive(separation, at.separation[0]);
         at.anchor[0] = Vectors::pick(is_end, anchor, at.anchor[0]);
-        let mut normal = Vectors::pick(from_b, opposite(n), n);
+        let mut normal = Vectors::pick(from_b, n.opposite(), n);
         if apart_at_corners.any_positive() {
             let gap = Gap::between(a, b);
             let separation = gap.distance.sub(pairs.radius[0]).sub(pairs.radius[1]);

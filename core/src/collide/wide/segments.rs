@@ -2,16 +2,16 @@
 //! bits.
 
 use super::manifolds::Manifolds;
-use super::moments::{Points, Search, Shaped, Shapes, WidePieces, negated, opposite};
+use super::moments::{Points, Search, Shaped, Shapes, WidePieces};
 use super::outlines::{Face, Polygon, WideOutlines, clip};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::{BEYOND, FAR, Lies, SAME};
-use crate::collide::touch::lies;
+use crate::collide::touch::{LEAST_PART, LEAST_WAY, lies};
 use crate::model::contact::Contact;
 use crate::model::piece::{Joint, Piece};
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};
-use crate::parallel::vectors::{Vectors, less};
+use crate::parallel::vectors::{Vectors, less, negated};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 
@@ -320,7 +320,7 @@ impl<V: Wide> Segments<V> {
         let far = single.if_positive(zero, V::splat(SAME));
         for (number, (&end, joint)) in self.ends.iter().zip(&self.joints).enumerate() {
             let (outward, distance) = nearest_at[number];
-            let normal = opposite(outward);
+            let normal = outward.opposite();
             let limit = joint.limit;
             let from_n = turned(n, normal, limit);
             let goes_on = at_least(from_n, far).mul(at_least(normal.dot(limit), normal.dot(n)));
@@ -373,9 +373,14 @@ impl<V: Wide> Shapes<V> for Segments<V> {
     const WITH_DISCS: bool = true;
 
     #[inline(always)]
+    fn least_way(&self) -> V {
+        V::splat(LEAST_WAY).min(V::splat(LEAST_PART).mul(self.length))
+    }
+
+    #[inline(always)]
     fn manifolds(&self, pairs: &Pairs<V>, offset: Vectors<V>, turning: [Vectors<V>; 2], reach: V) -> Manifolds<V> {
         let rotation = [turning[0].rotate(pairs.rotation[0]), turning[1].rotate(pairs.rotation[1])];
-        let way = Vectors::pick(self.are_first, offset, opposite(offset));
+        let way = Vectors::pick(self.are_first, offset, offset.opposite());
         let own = Vectors::pick(self.are_first, rotation[0], rotation[1]);
         let (turn, seen) = (own.to(Vectors::pick(self.are_first, rotation[1], rotation[0])), own.unrotate(way));
         let other = self.outline.seen(turn, seen, self.outline.most);
@@ -383,7 +388,7 @@ impl<V: Wide> Shapes<V> for Segments<V> {
         let mut found = self.collide(&other, center, reach);
         // Back to the frame of the world, and of body A.
         let normal = own.rotate(found.normal);
-        found.normal = Vectors::pick(self.are_first, normal, opposite(normal));
+        found.normal = Vectors::pick(self.are_first, normal, normal.opposite());
         for anchor in &mut found.anchor {
             let from_center = own.rotate(*anchor);
             *anchor = Vectors::pick(self.are_first, from_center, from_center.plus(offset));

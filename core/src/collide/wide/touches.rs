@@ -3,20 +3,19 @@
 //!
 //! Where a center lies in a core, or speeds overflow, it says so, and leaves the pair to that.
 
-use super::manifolds::both;
-use super::pairs::{Pairs, TOUCHING};
+use super::pairs::Pairs;
 use crate::collide::cull::passes;
-use crate::collide::touch::{Course, DEEP, NEAR, ROUNDS};
+use crate::collide::touch::{Course, DEEP, NEAR, ROUNDS, TOUCHING};
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, less, tangent};
 use crate::tiling::blueprint::Setup;
 
 /// Manifolds of one point, and the moments in which they are those.
 #[derive(Clone, Copy)]
-pub(super) struct Moments<V> {
+struct RoundMoments<V> {
     /// From now, in s.
     time: V,
-    pub(super) normal: Vectors<V>,
+    normal: Vectors<V>,
     anchor: Vectors<V>,
     separation: V,
     /// At that time: from the center of A to that of B, how both have turned, and their rotations.
@@ -43,7 +42,7 @@ pub(super) struct Touches<V> {
     pub(super) now: V,
 }
 
-impl<V: Wide> Moments<V> {
+impl<V: Wide> RoundMoments<V> {
     /// `yes` where a number is positive, else `no`.
     #[inline(always)]
     fn pick(positive: V, yes: &Self, no: &Self) -> Self {
@@ -53,8 +52,8 @@ impl<V: Wide> Moments<V> {
             anchor: Vectors::pick(positive, yes.anchor, no.anchor),
             separation: positive.if_positive(yes.separation, no.separation),
             offset: Vectors::pick(positive, yes.offset, no.offset),
-            turning: both(positive, &yes.turning, &no.turning),
-            rotation: both(positive, &yes.rotation, &no.rotation),
+            turning: Vectors::pick_both(positive, &yes.turning, &no.turning),
+            rotation: Vectors::pick_both(positive, &yes.rotation, &no.rotation),
             // One that was not known is not forgotten.
             distance: positive.if_positive(yes.distance.min(no.distance), no.distance),
         }
@@ -86,7 +85,7 @@ impl<V: Wide> Touches<V> {
             unsure: positive.if_positive(yes.unsure, no.unsure),
             normal: Vectors::pick(positive, yes.normal, no.normal),
             offset: Vectors::pick(positive, yes.offset, no.offset),
-            rotation: both(positive, &yes.rotation, &no.rotation),
+            rotation: Vectors::pick_both(positive, &yes.rotation, &no.rotation),
             anchor: Vectors::pick(positive, yes.anchor, no.anchor),
             separation: positive.if_positive(yes.separation, no.separation),
             now: positive.if_positive(yes.now, no.now),
@@ -115,7 +114,7 @@ impl<V: Wide> Pairs<V> {
 
     /// What will be after some seconds if nothing else happens.
     #[inline(always)]
-    fn at(&self, time: V) -> Moments<V> {
+    fn at(&self, time: V) -> RoundMoments<V> {
         let (offset, turning) = self.moved(time);
         self.manifolds(time, offset, turning)
     }
@@ -133,14 +132,14 @@ impl<V: Wide> Pairs<V> {
     }
 
     #[inline(always)]
-    fn now(&self) -> Moments<V> {
+    fn now(&self) -> RoundMoments<V> {
         let identity = Vectors::new(V::splat(1.0), V::splat(0.0));
         self.manifolds(V::splat(0.0), self.offset, [identity; 2])
     }
 
     /// As in `manifold/round.rs`.
     #[inline(always)]
-    fn manifolds(&self, time: V, offset: Vectors<V>, turning: [Vectors<V>; 2]) -> Moments<V> {
+    fn manifolds(&self, time: V, offset: Vectors<V>, turning: [Vectors<V>; 2]) -> RoundMoments<V> {
         let (one, zero) = (V::splat(1.0), V::splat(0.0));
         let rotations = [turning[0].rotate(self.rotation[0]), turning[1].rotate(self.rotation[1])];
         let core = self.half[0].x;
@@ -158,7 +157,7 @@ impl<V: Wide> Pairs<V> {
         let out = core_radius.add(V::splat(0.5).mul(separation));
         let anchor = rotation.rotate(surface.plus(normal.scaled(out)));
         let from = offset.scaled(one.sub(self.not_round(0)));
-        Moments {
+        RoundMoments {
             time,
             normal: rotation.rotate(normal).scaled(way),
             anchor: from.plus(anchor),
@@ -273,7 +272,7 @@ impl<V: Wide> Pairs<V> {
     /// [`ahead`](Self::ahead); for the others the last that was looked at, or of circles, and of those that hardly turn, about that in
     /// which they are nearest.
     #[inline(always)]
-    fn first_touch(&self, now: &Moments<V>, asked: V, near: V, setup: &Setup) -> (Moments<V>, V) {
+    fn first_touch(&self, now: &RoundMoments<V>, asked: V, near: V, setup: &Setup) -> (RoundMoments<V>, V) {
         let (one, zero, dt) = (V::splat(1.0), V::splat(0.0), self.ahead(near, setup));
         let mixed = self.not_round(0).max(self.not_round(1)).mul(asked);
         // Two circles touch where the square of their centers' distance has come down to that of their radii's sum.
@@ -313,7 +312,7 @@ impl<V: Wide> Pairs<V> {
                 // Half as if the fastest corner led, half as if the nearest point did.
                 let speed = V::splat(0.5).mul(bound.add(self.closing(at.anchor, at.offset, at.normal).max(zero)));
                 let next = self.at(at.time.add(at.separation.div(speed).min(left)));
-                at = Moments::pick(going, &next, &at);
+                at = RoundMoments::pick(going, &next, &at);
                 let deep = less(at.separation, scale.mul(V::splat(DEEP))).mul(going);
                 let near = less(at.separation, scale.mul(V::splat(NEAR))).mul(going);
                 ending = ending.max(deep);
@@ -331,7 +330,7 @@ impl<V: Wide> Pairs<V> {
         }
         if exact.any_positive() {
             let then = self.at(last);
-            at = Moments::pick(exact, &then, &at);
+            at = RoundMoments::pick(exact, &then, &at);
         }
         (at, found)
     }

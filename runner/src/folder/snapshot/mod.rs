@@ -16,7 +16,7 @@ mod tests;
 
 pub(crate) use file::{SnapshotFile, SnapshotWriter};
 pub(crate) use set::Snapshot;
-pub(crate) use store::{Found, find, find_all, remove_after, remove_before};
+pub(crate) use store::{Found, find, find_all, is_folder, remove_after, remove_before};
 
 use std::path::{Path, PathBuf};
 use thiserror::Error;

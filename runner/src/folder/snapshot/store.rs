@@ -43,6 +43,11 @@ pub(super) fn complete_set(folder: &Path) -> Result<Option<Vec<PathBuf>>, Snapsh
     Ok(complete.map(|(_, files)| files.into_values().collect()))
 }
 
+/// Whether a folder of that name is that of a snapshot.
+pub(crate) fn is_folder(name: &str) -> bool {
+    step_of(Path::new(name)).is_some()
+}
+
 /// The folders of snapshots by step, ascending. None where there is no folder of snapshots at all.
 fn folders(snapshots: &Path) -> io::Result<BTreeMap<u64, PathBuf>> {
     let mut folders = BTreeMap::new();
