@@ -1,6 +1,6 @@
 //! Bodies that go further within a step than everything around them is wide pass through nothing, wherever tiles end.
 
-use atoll_core::{Exchange, Filter, Material, Path, Rot, Shape, Travel};
+use atoll_core::{Exchange, Filter, GlobalId, Material, Path, Rot, Shape, Travel};
 use atoll_tests::world::{Scene, noise};
 use glam::{DVec2, Vec2};
 
@@ -454,5 +454,34 @@ fn a_thin_plank_that_topples_gains_no_energy() {
             let lost = 10.0 * (begin - body.position.y);
             assert!(f64::from(gained) < 1.02 * lost + 0.03, "{length} m: {gained} of {lost} after step {step}");
         }
+    }
+}
+
+/// A segment that is shorter than a body goes while it is looked at is not passed over.
+#[test]
+fn chains_hold_small_bodies_however_finely_they_are_cut() {
+    let shapes = [Shape::circle(0.005), Shape::capsule(0.004, 0.004).unwrap()];
+    for length in [0.0005_f32, 0.001] {
+        let mut scene = Scene { half: DVec2::new(50.0, 5.0), ..Scene::new(DVec2::ZERO, -10.0) };
+        let count = (0.3 / length) as u32;
+        for number in 0..40 {
+            let corner = |i: u32| Vec2::new(length * i as f32, 0.0);
+            for i in 1..count {
+                let beside = [i - 1, i + 2].map(|i| Some(corner(i)));
+                scene.segment(DVec2::new(f64::from(2 * number) - 40.0, 0.0), [corner(i), corner(i + 1)], beside);
+            }
+        }
+        let kinds = shapes.clone().map(|shape| scene.kind(shape, Material::default()));
+        let all: Vec<GlobalId> = (0..40)
+            .map(|number: u32| {
+                let (way, height) = (-2.4 + 0.043 * number as f32, 0.009 + 0.0005 * f64::from(number));
+                let place = DVec2::new(f64::from(2 * number) - 39.85, height);
+                scene.body(kinds[number as usize % 2], place, Vec2::new(way.cos(), way.sin()) * 3.0)
+            })
+            .collect();
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        sim.run(2);
+        let through = all.iter().filter(|&&id| sim.body(id).position.y < 0.0).count();
+        assert_eq!(through, 0, "of {} through segments of {length} m", all.len());
     }
 }
