@@ -130,6 +130,7 @@ impl Arithmetic for f32 {
 /// Plain arrays: the reference, and what other processors run.
 ///
 /// With assertions, which is where little is optimized, kernels call it: unrolled into them it was most of what there was to compile.
+/// Elsewhere the compiler chooses what it unrolls, and what it leaves is a twentieth faster than all of it.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable(Row);
 
