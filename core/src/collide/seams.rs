@@ -6,8 +6,7 @@
 //! E. Catto, "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
 
 use crate::collide::narrow_phase::Contacts;
-use crate::collide::touch::TOUCHING;
-use crate::collide::touch::{self, Stopped};
+use crate::collide::touch::{self, Stopped, TOUCHING};
 use crate::model::contact::{Contact, PairKey, SlotKind};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{dot, max, min};

@@ -162,7 +162,8 @@ impl RunFolder {
         let is_run = self.lock().is_file()
             && (self.snapshots().is_dir() || self.log().is_file() || self.summary().is_file() || self.has_recorded());
         match self.read_configuration() {
-            _ if !is_run || self.holds_run() => None,
+            _ if !is_run => None,
+            Ok(text) if is_resolved(&text) => None,
             Ok(text) if text.is_empty() => Some(self.bad_configuration("it is empty")),
             Ok(_) => Some(self.bad_configuration("it does not begin as runs write it")),
             Err(error) if error.kind() == ErrorKind::NotFound => {

@@ -30,7 +30,7 @@ struct Moments<V> {
 }
 
 /// The shapes of sixteen pairs.
-pub(super) trait Shapes<V> {
+pub(super) trait Shapes<V: Wide> {
     /// Whether one of each two is a segment of a chain: who goes beyond that is let through, so that no step of a search may bring him
     /// there.
     const OF_SEGMENTS: bool = false;
@@ -40,10 +40,7 @@ pub(super) trait Shapes<V> {
 
     /// How far a search for their touch goes at least past where nothing touches: see [`LEAST_WAY`].
     #[inline(always)]
-    fn least_way(&self) -> V
-    where
-        V: Wide,
-    {
+    fn least_way(&self) -> V {
         V::splat(LEAST_WAY)
     }
 
