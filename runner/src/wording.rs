@@ -45,6 +45,20 @@ pub(crate) fn unmarked(mut text: String) -> String {
     text
 }
 
+/// What is wrong with a text that should be TOML, and in which line, from 1.
+pub(crate) fn toml_fault(text: &str, error: &toml::de::Error) -> (usize, String) {
+    let span = error.span().unwrap_or(0..0);
+    let start = span.start.min(text.len());
+    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let message = error.message().lines().collect::<Vec<_>>().join(", ");
+    let message = match text.get(span) {
+        Some(key) if message == "duplicate key" => format!("{key} is given twice; leave one of them out"),
+        _ if message.contains(" as i128") => "a whole number of at most 9223372036854775807 must stand here".to_owned(),
+        _ => message,
+    };
+    (line, message)
+}
+
 /// Words at least this similar (normalized Damerau-Levenshtein, 0 to 1) are offered as what was meant.
 const SIMILAR: f64 = 0.6;
 

@@ -281,6 +281,10 @@ pub(crate) fn named(text: &str) -> Option<String> {
 }
 
 fn read(text: &str) -> Result<Raw, String> {
+    // A list would be taken for all that a line may hold, in order.
+    if text.trim_start().starts_with('[') {
+        return Err("a list stands where an object, {...} must: each command is a line of its own".to_owned());
+    }
     // On one line, lines are of no use.
     let short = |error: serde_json::Error| {
         let text = error.to_string();

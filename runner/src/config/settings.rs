@@ -2,7 +2,7 @@
 
 use super::error::{ConfigError, Given, Origin};
 use super::spelling;
-use crate::wording::{exponential, nearest};
+use crate::wording::{exponential, nearest, toml_fault};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -110,8 +110,15 @@ impl Settings {
             let given = Given { origin: Origin::File(file.clone()), key, value: one_line(value) };
             ConfigError::UnknownKey { given, suggestion }
         };
-        let Value::Table(content) = content else { return Err(unknown(section.to_owned(), &content)) };
         let sections = || keys.iter().map(|key| key.split_once('.').map_or(*key, |(section, _)| section));
+        let Value::Table(content) = content else {
+            if sections().any(|known| known == section) {
+                let given = Given { origin: Origin::File(file), key: section.to_owned(), value: one_line(&content) };
+                let must = format!("a table; give its keys below a line [{section}]");
+                return Err(ConfigError::BadValue { given, must, suggestion: None });
+            }
+            return Err(unknown(section.to_owned(), &content));
+        };
         if !sections().any(|known| known == section) {
             let suggestion = nearest(sections(), section).map(|word| format!("[{word}]"));
             return Err(ConfigError::UnknownSection {
@@ -320,8 +327,6 @@ fn one_line(value: &Value) -> String {
 }
 
 fn syntax_error(file: &str, text: &str, error: &toml::de::Error) -> ConfigError {
-    let start = error.span().map_or(0, |span| span.start.min(text.len()));
-    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() + 1;
-    let message = error.message().lines().collect::<Vec<_>>().join(", ");
+    let (line, message) = toml_fault(text, error);
     ConfigError::Syntax { file: file.to_owned(), line, message }
 }

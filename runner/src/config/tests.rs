@@ -272,6 +272,7 @@ fn unknown_names_come_with_a_suggestion() {
         ("[sceen]\nkind = \"rooms\"", "test.toml: unknown section [sceen]; did you mean [scene]?"),
         ("[run]\nsubsteps = 4", "test.toml: run.substeps = 4: unknown key; did you mean physics.substeps?"),
         ("steps = 4", "test.toml: steps = 4: unknown key; did you mean run.steps?"),
+        ("scene = \"rooms\"", "test.toml: scene = \"rooms\": must be a table; give its keys below a line [scene]"),
         ("", &format!("test.toml: scene.kind is missing: must be {KINDS}")),
         ("[physics.more]\nx = 1\n[scene]\nkind = \"pile\"", "test.toml: physics.more = { x = 1 }: unknown key"),
     ] {

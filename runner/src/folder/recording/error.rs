@@ -91,12 +91,14 @@ pub enum RecordingError {
         reason: String,
     },
     /// There is no such record.
-    #[error("{} has no record of step {step}", .path.display())]
+    #[error("{} has no record of step {step}; the nearest is of step {nearest}", .path.display())]
     NoSuchStep {
         /// The folder of the run.
         path: PathBuf,
         /// The step asked for.
         step: u64,
+        /// The recorded one nearest to it.
+        nearest: u64,
     },
 }
 

@@ -267,7 +267,9 @@ impl Recording {
     ) -> Result<(), RecordingError> {
         rows.clear();
         if self.steps.binary_search(&step).is_err() {
-            return Err(RecordingError::NoSuchStep { path: self.folder.clone(), step });
+            let nearest = self.steps.iter().copied().min_by_key(|recorded| recorded.abs_diff(step));
+            let nearest = nearest.expect("a recording holds a record");
+            return Err(RecordingError::NoSuchStep { path: self.folder.clone(), step, nearest });
         }
         let parts = &self.parts[self.parts_of(step)];
         let count = parts.iter().try_fold(0_u64, |sum, part| sum.checked_add(part.rows));

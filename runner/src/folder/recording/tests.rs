@@ -113,7 +113,7 @@ fn a_segment_holds_ten_records_and_the_last_the_rest() {
         assert_eq!(sorted(read(&recording, step)), sorted(expected));
     }
     let error = recording.read(7, &mut Vec::new()).unwrap_err();
-    assert!(error.to_string().ends_with("has no record of step 7"), "{error}");
+    assert!(error.to_string().ends_with("has no record of step 7; the nearest is of step 5"), "{error}");
 }
 
 #[test]

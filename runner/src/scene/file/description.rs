@@ -5,6 +5,7 @@ use super::entries::{Entries, keep, place};
 use super::kinds::kinds;
 use super::row::FARTHEST;
 use super::statics::{Statics, statics};
+use crate::wording::toml_fault;
 use atoll_core::Kind;
 use glam::DVec2;
 use std::path::Path;
@@ -127,8 +128,6 @@ fn domain(entries: &mut Entries<'_>) -> Result<(DVec2, DVec2), SceneError> {
 }
 
 fn syntax_error(file: &Path, text: &str, error: &toml::de::Error) -> SceneError {
-    let start = error.span().map_or(0, |span| span.start.min(text.len()));
-    let line = text.as_bytes()[..start].iter().filter(|&&byte| byte == b'\n').count() as u64 + 1;
-    let message = error.message().lines().collect::<Vec<_>>().join(", ");
-    SceneError::bad(file, Place { line: Some(line), ..Place::default() }, message)
+    let (line, message) = toml_fault(text, error);
+    SceneError::bad(file, Place { line: Some(line as u64), ..Place::default() }, message)
 }
