@@ -2,6 +2,7 @@
 
 pub(crate) mod broad_phase;
 mod cull;
+pub(crate) mod hollows;
 pub(crate) mod manifold;
 pub(crate) mod narrow_phase;
 pub(crate) mod passage;

@@ -78,6 +78,15 @@ impl Piece {
         piece
     }
 
+    /// A segment that reaches so much further back from its start, or on from its end, where it is hollow.
+    pub(crate) fn lengthened(&self, at_end: bool, by: f32) -> Self {
+        let [to, from] = self.outline.edge(0);
+        let normal = self.outline.normal(0);
+        let out = Vec2::new(normal.y, -normal.x) * by;
+        let corners = if at_end { [to + out, from] } else { [to, from - out] };
+        Self { outline: Convex::new(&corners, &[normal, self.outline.normal(1)]), ..*self }
+    }
+
     /// Whether it is neither a disc nor a segment that is solid from one side.
     pub(crate) fn has_faces(&self) -> bool {
         self.outline.count() > 1 && self.side.is_none()

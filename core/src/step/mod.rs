@@ -7,7 +7,7 @@ pub(crate) mod standstill;
 
 use crate::collide::broad_phase::Field;
 use crate::collide::proxies::amid;
-use crate::collide::seams;
+use crate::collide::{hollows, seams};
 use crate::exchange::halo::{Carry, Halo, NotCarried, through};
 use crate::exchange::verdict::Verdict;
 use crate::exchange::{far, migrate};
@@ -226,6 +226,7 @@ fn collide(bench: &mut Bench<'_>) {
         let Detection { narrow_phase, proxies, pairs, .. } = &mut *b.detection;
         narrow_phase.find(b.tile, proxies, pairs, b.setup, b.team, &mut b.work.contacts);
         seams::mend(b.tile, &mut b.work.contacts, b.setup);
+        hollows::follow(b.tile, &mut b.work.contacts, b.setup);
     });
 }
 

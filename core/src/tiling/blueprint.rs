@@ -10,6 +10,7 @@ use crate::model::params::Params;
 use crate::model::path::{Course, Path};
 use crate::model::softness::Softness;
 use crate::parallel::lanes::LaneSet;
+use crate::tiling::chains::Chains;
 use crate::tiling::partition::Partition;
 use crate::tiling::terrain::{Terrain, ascend};
 use glam::{DVec2, Vec2};
@@ -158,6 +159,7 @@ pub(crate) struct Setup {
     pub(crate) sensors: bool,
     /// Whether there are shapes of several pieces.
     pub(crate) compounds: bool,
+    pub(crate) chains: Chains,
     /// For each dynamic kind how its bodies move by themselves ([`Dynamics::factors`]); empty where all do alike.
     pub(crate) factors: Vec<[f32; 4]>,
 }
@@ -212,6 +214,7 @@ impl Setup {
         let sensors = kinds.iter().any(|kind| kind.sensor);
         let compounds = kinds.iter().any(KindRow::is_compound);
         let factors = factors(&kinds[..dynamic_kinds], &params);
+        let chains = Chains::new(&kinds[dynamic_kinds..], &statics);
         Ok(Self {
             partition: blueprint.partition.clone(),
             halo_width,
@@ -227,6 +230,7 @@ impl Setup {
             filters,
             sensors,
             compounds,
+            chains,
             factors,
             kinds,
             dynamic_kinds,

@@ -1,6 +1,7 @@
 //! The domain cut into tiles: what stands in it for good, which point is whose, and what a tile holds.
 
 pub(crate) mod blueprint;
+pub(crate) mod chains;
 pub(crate) mod changes;
 mod memory;
 pub(crate) mod partition;

@@ -58,6 +58,27 @@ impl Contacts {
         without(&mut self.bodies, places);
     }
 
+    /// Adds some, sorted by their keys, to these and to a cache.
+    pub(in crate::collide) fn insert(&mut self, new: Vec<New>, cache: &mut ContactCache) {
+        fn with<T: Copy>(column: &mut Vec<T>, new: &[New], places: &[usize], of: impl Fn(&New) -> T) {
+            let mut end = column.len();
+            column.extend(new.iter().map(&of));
+            for (number, (new, &place)) in new.iter().zip(places).enumerate().rev() {
+                column.copy_within(place..end, place + number + 1);
+                column[place + number] = of(new);
+                end = place;
+            }
+        }
+        if new.is_empty() {
+            return;
+        }
+        let places: Vec<usize> = new.iter().map(|new| cache.keys.partition_point(|&key| key < new.key)).collect();
+        with(&mut cache.keys, &new, &places, |new| new.key);
+        with(&mut cache.contacts, &new, &places, |new| new.found.0);
+        with(&mut self.separation, &new, &places, |new| new.found.1);
+        with(&mut self.bodies, &new, &places, |new| new.bodies);
+    }
+
     /// Contacts of a tile, and border contacts, of which body A is owned: so that each is counted by one tile.
     pub(crate) fn count(&self, tile: &Tile) -> (u64, u64) {
         let (mut all, mut border) = (0, 0);
@@ -69,6 +90,14 @@ impl Contacts {
         }
         (all, border)
     }
+}
+
+/// A contact that is to be added.
+pub(in crate::collide) struct New {
+    pub(in crate::collide) key: PairKey,
+    pub(in crate::collide) bodies: Pair,
+    /// With the separation of its points now.
+    pub(in crate::collide) found: (Contact, [f32; 2]),
 }
 
 /// All that is found of contacts, a column for each.

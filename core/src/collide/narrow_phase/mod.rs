@@ -6,6 +6,7 @@ mod names;
 mod sorted;
 
 pub(crate) use contacts::Contacts;
+pub(in crate::collide) use contacts::New;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::piece_boxes::PieceBoxes;

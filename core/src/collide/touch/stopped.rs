@@ -4,9 +4,11 @@ use super::{Approach, Moment, NEAR, Side, TOUCHING};
 use crate::collide::broad_phase::Pair;
 use crate::model::contact::Contact;
 use crate::model::math::{cross, dot, max, min, turn};
+use crate::model::piece::Piece;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
+use std::cmp::Ordering;
 
 /// A search for a touch is begun so often, at most.
 const SEARCHES: usize = 8;
@@ -17,6 +19,8 @@ pub(in crate::collide) struct Stopped {
     time: f32,
     /// The same exactly, and how far they are apart, in m, if they touch already or do not at all.
     order: [f32; 2],
+    /// How fast they came nearer then, in m/s.
+    closing: f32,
     /// What holds the two off each other from then on, in m: the body that moves off the static, or B off A.
     lift: Vec2,
     /// From then on, of A and of B; where one of them is a static, whichever moves goes on so.
@@ -40,9 +44,8 @@ impl Stopped {
         if !pair.far(dt).is_finite() {
             return None;
         }
-        let (at, ways, order, separation, by);
+        let (at, ways, closing, order, separation, by);
         if let Some(then) = pair.meets(dt, setup) {
-            let closing;
             (ways, closing) = pair.stop(&then)?;
             separation = then.manifold.nearest()?.separation;
             let is_now = then.time == 0.0;
@@ -56,16 +59,32 @@ impl Stopped {
                 [at, pair.at(dt, f32::INFINITY)].map(|at| at.manifold.nearest().map(|point| point.separation));
             separation = min(now?, then?);
             ways = pair.ways();
+            closing = 0.0;
             order = [f32::INFINITY, separation];
             by = None;
         }
         let lift = pair.out(at.manifold.normal) * max(2.0 * pair.scale() * NEAR - separation, 0.0);
-        Some(Self { time: at.time, order, lift, ways, by })
+        Some(Self { time: at.time, order, closing, lift, ways, by })
     }
 
     /// Ascending from who stop each other first.
     pub(in crate::collide) fn order(&self) -> [f32; 2] {
         self.order
+    }
+
+    /// Who stop each other first.
+    pub(in crate::collide) fn sooner(&self, other: &Self) -> Ordering {
+        self.order[0].total_cmp(&other.order[0]).then(self.order[1].total_cmp(&other.order[1]))
+    }
+
+    /// How fast they came nearer as they touched, in m/s.
+    pub(in crate::collide) fn closing(&self) -> f32 {
+        self.closing
+    }
+
+    /// The velocity from then on of the one that moves, where the other is a static, in m/s.
+    pub(in crate::collide) fn velocity(&self) -> Vec2 {
+        self.ways[0].velocity
     }
 
     /// The contact that stops them, and the separation of its points now, if they touch within the step.
@@ -81,7 +100,27 @@ impl Stopped {
         (bodies, contact): (Pair, &Contact),
         setup: &Setup,
     ) -> Option<(Contact, [f32; 2])> {
-        let mut pair = Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup);
+        let pair = Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup);
+        self.touch_of(pair, Some(contact), setup)
+    }
+
+    /// The same with a segment of a chain, in the place of that which a static is.
+    pub(in crate::collide) fn touch_segment(
+        &self,
+        tile: &Tile,
+        (bodies, numbers): (Pair, [usize; 2]),
+        segment: &Piece,
+        setup: &Setup,
+    ) -> Option<(Contact, [f32; 2])> {
+        let mut pair = Approach::of_pieces(tile, bodies, numbers, setup);
+        let moves = [pair.a.moves(), pair.b.moves()];
+        for (piece, moves) in pair.pieces.as_mut()?.iter_mut().zip(moves) {
+            *piece = if moves { piece } else { segment };
+        }
+        self.touch_of(pair, None, setup)
+    }
+
+    fn touch_of(&self, mut pair: Approach<'_>, known: Option<&Contact>, setup: &Setup) -> Option<(Contact, [f32; 2])> {
         let (offset, turned) = (pair.offset, [pair.a.turning(self.time), pair.b.turning(self.time)]);
         pair.offset += pair.between * self.time;
         for ((side, turned), way) in [&mut pair.a, &mut pair.b].into_iter().zip(turned).zip(self.ways) {
@@ -93,7 +132,7 @@ impl Stopped {
         pair.offset += pair.out(self.lift);
         pair.between = pair.b.velocity - pair.a.velocity;
         let at = pair.meets(max(setup.params.dt - self.time, 0.0), setup)?;
-        let (found, mut separation) = pair.contact(&at, Some(contact), setup)?;
+        let (found, mut separation) = pair.contact(&at, known, setup)?;
         // As the rows of the solver will see the first part of the way.
         let moved = dot(pair.offset - offset, found.normal);
         for (now, point) in separation.iter_mut().zip(found.points()) {
