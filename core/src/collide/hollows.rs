@@ -65,11 +65,16 @@ fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup
     let (body, piece) = (pair[side], numbers[side]);
     let is_forward = dot(stopped.velocity() - tile.bodies.velocity[first.row], first.link.along) > 0.0;
     let (far, begin) = (touch::far(tile, pair, setup), found.len());
+    // A tile knows what its bodies may come to, and maybe more, which is not to show.
+    let (place, grown) =
+        (tile.bodies.position[body as usize], setup.grown_half_extents(&tile.bodies.get(body as usize)));
+    let (low, high) = (place - grown.as_dvec2(), place + grown.as_dvec2());
     // From the far end of the first to the near one of the next.
     let (mut here, mut length) = (first, 0.0);
     for _ in 0..MOST {
         length += here.link.length;
-        let Some(next) = here.next(tile, is_forward, setup) else { break };
+        let next = here.next(tile, is_forward, setup).filter(|next| next.link.meets(low, high));
+        let Some(next) = next else { break };
         if length - first.link.length > far || dot(next.link.normal, first.link.normal) < LEVEL {
             break;
         }

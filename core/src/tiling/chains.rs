@@ -43,6 +43,11 @@ impl<'a> Link<'a> {
         Some(Self { piece, along: (to - from) / length, normal, length, side, start, end })
     }
 
+    /// Whether it comes into a rectangle, or near that.
+    pub(crate) fn meets(&self, low: DVec2, high: DVec2) -> bool {
+        self.start.max(self.end).cmpge(low).all() && self.start.min(self.end).cmple(high).all()
+    }
+
     /// Whether it goes on with another.
     fn leads_to(&self, other: &Self) -> bool {
         let gap = (self.end - other.start).as_vec2();
