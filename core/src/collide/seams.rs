@@ -7,7 +7,7 @@
 
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::{self, Stopped, TOUCHING};
-use crate::model::contact::{Contact, PairKey, SlotKind};
+use crate::model::contact::{Contact, ContactPoint, PairKey, SlotKind};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{dot, max, min};
 use crate::model::piece::Piece;
@@ -100,7 +100,8 @@ struct Face<'a> {
     piece: Option<&'a Piece>,
     /// Out of it; in the frame of the body if it moves.
     normal: Vec2,
-    /// On it: from the center of the body if it moves, and else from that of the one which touches it.
+    /// On it, where it is touched first, and where at once: from the center of the body if it moves, and else from that of the one which
+    /// touches it.
     points: [Vec2; 2],
     count: usize,
     /// What stands out of a plane by less than this is not before it.
@@ -121,14 +122,15 @@ impl<'a> Face<'a> {
         };
         let (body, of, way, center) = if is_of_a { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
         let normal = contact.normal * way;
-        let points = contact.points.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
+        let (touched, count) = touched_first(contact);
+        let points = touched.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
         let kind = setup.kind(tile.bodies.kind[body as usize]);
         let face = Self {
             number,
             piece: None,
             normal,
             points,
-            count: contact.point_count(),
+            count,
             level: min(LEVEL, LEVEL_BY_SIZE * kind.inner_radius),
             is_stood_on: presses(contact, key) && kind.form != Form::Round,
         };
@@ -143,7 +145,8 @@ impl<'a> Face<'a> {
         let piece = &setup.kind(tile.bodies.kind[of as usize]).pieces[piece];
         let points = points.map(|point| rotation.unrotate(point));
         // In a crowd who overlaps is not let go.
-        let overlaps = contacts.separation[number][..face.count].iter().any(|&separation| separation < -TOUCHING);
+        let overlaps =
+            contacts.separation[number][..contact.point_count()].iter().any(|&separation| separation < -TOUCHING);
         let is_stood_on = face.is_stood_on || overlaps;
         Self { piece: Some(piece), normal: rotation.unrotate(normal), points, is_stood_on, ..face }
     }
@@ -168,6 +171,18 @@ impl<'a> Face<'a> {
         let (Some(piece), Some(first)) = (self.piece, first.piece) else { return true };
         let is_there = |&point: &Vec2| first.outline.nearest(point).1 < first.radius + self.level;
         !std::ptr::eq(piece, first) && self.points[..self.count].iter().all(is_there)
+    }
+}
+
+/// The points of a contact, that which is touched first before the other, and how many are touched as soon: what of an edge is yet to come down
+/// may come down elsewhere.
+fn touched_first(contact: &Contact) -> ([ContactPoint; 2], usize) {
+    match contact.points {
+        [one, _] if contact.point_count() == 1 => ([one; 2], 1),
+        [one, two] => {
+            let points = if two.separation < one.separation { [two, one] } else { [one, two] };
+            (points, if points[1].separation < points[0].separation + TOUCHING { 2 } else { 1 })
+        }
     }
 }
 
