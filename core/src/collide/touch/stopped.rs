@@ -147,7 +147,7 @@ impl Stopped {
 }
 
 impl Approach<'_> {
-    /// The moment in which they touch, if that is within so many seconds.
+    /// The moment in which they touch, if that is within so many seconds; [over a corner](Self::over_corner) that one passes.
     fn meets(&self, dt: f32, setup: &Setup) -> Option<Moment> {
         let reach = setup.params.speculative_distance + self.far(dt);
         let mut at = self.at(0.0, reach);
@@ -158,7 +158,7 @@ impl Approach<'_> {
             let nearest = at.manifold.nearest()?.separation;
             let is_distance = at.manifold.is_distance();
             if nearest < near && !is_distance {
-                return Some(at);
+                return Some(self.over_corner(at));
             }
             let touches;
             (at, touches) = self.first_touch(&at, reach, dt);
@@ -166,7 +166,7 @@ impl Approach<'_> {
                 return None;
             }
             if is_straight {
-                return Some(at);
+                return Some(self.over_corner(at));
             }
         }
         None
