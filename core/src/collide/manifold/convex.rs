@@ -66,10 +66,11 @@ fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) 
     if most_b - rounding > reach {
         return Manifold::EMPTY;
     }
+    let overlap = most_a <= 0.0 && most_b <= 0.0;
     let found = if most_b > most_a + PREFERENCE {
-        against_face(b, face_b, a, most_b, [radius_b, radius_a], true).map(Manifold::turned_round)
+        against_face(b, face_b, a, (most_b, overlap), [radius_b, radius_a], true).map(Manifold::turned_round)
     } else {
-        against_face(a, face_a, b, most_a, [radius_a, radius_b], false)
+        against_face(a, face_a, b, (most_a, overlap), [radius_a, radius_b], false)
     };
     found.unwrap_or_else(|| corners(a, b, [radius_a, radius_b]))
 }
@@ -80,12 +81,12 @@ fn of_point(on_a: Vec2, normal: Vec2, distance: f32, [radius_a, radius_b]: [f32;
     Manifold::single(normal, on_a + normal * (radius_a + 0.5 * separation), separation, feature)
 }
 
-/// What is between a face and the edge of the other that looks most against it, if that is over the face.
+/// What is between a face and the edge of the other that looks most against it, if that is over the face, or the two overlap.
 fn against_face(
     reference: &Convex,
     face: usize,
     other: &Convex,
-    height: f32,
+    (height, overlap): (f32, bool),
     radii: [f32; 2],
     is_b: bool,
 ) -> Option<Manifold> {
@@ -93,7 +94,7 @@ fn against_face(
     let features = if is_b { edge << 4 | face << 1 | 1 } else { face << 4 | edge << 1 } as u32;
     let manifold = clip(reference.edge(face), reference.normal(face), other.edge(edge), radii, features);
     // An end of a line has no width: those that overlap part there nevertheless.
-    if manifold.is_none() && height <= 0.0 {
+    if manifold.is_none() && overlap {
         let n = reference.normal(face);
         let ([corner, next], [from, to]) = (reference.edge(face), other.edge(edge));
         let deepest = if dot(to - from, n) < 0.0 { to } else { from };

@@ -145,8 +145,9 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
             feature: [features.add(first), features.add(one.sub(first))],
         };
         // An end of a line has no width: those that overlap part there nevertheless.
-        let is_end = clipped.none.mul(height.if_positive(zero, one));
-        let apart_at_corners = clipped.none.mul(height.if_positive(one, zero)).mul(at.some);
+        let widest = face_a.figure.max(face_b.figure);
+        let is_end = clipped.none.mul(widest.if_positive(zero, one));
+        let apart_at_corners = clipped.none.mul(widest.if_positive(one, zero)).mul(at.some);
         let slants = edge.ends[1].minus(edge.ends[0]).dot(n);
         let deepest = Vectors::pick(zero.sub(slants), edge.ends[1], edge.ends[0]);
         let apart = absolute(from.x.sub(to.x)).max(absolute(from.y.sub(to.y)));
