@@ -98,10 +98,19 @@ impl Scene {
 
     /// Adds a static box of the given whole sides, turned by `angle` radians.
     pub fn wall(&mut self, position: DVec2, (width, height): (f32, f32), angle: f32, material: Material) -> GlobalId {
+        let id = self.fixed(Shape::rectangle(width, height), position, material);
+        self.statics.last_mut().expect("it was added").rotation = Rot::from_angle(angle);
+        id
+    }
+
+    /// Adds a static of any shape.
+    ///
+    /// # Panics
+    /// If there are bodies.
+    pub fn fixed(&mut self, shape: Shape, position: DVec2, material: Material) -> GlobalId {
         assert!(self.bodies.is_empty(), "statics come before bodies");
         let id = GlobalId(self.statics.len() as u64);
-        let kind = Kind::new(Shape::rectangle(width, height), material);
-        self.statics.push(StaticBody { rotation: Rot::from_angle(angle), ..StaticBody::new(id, kind, position) });
+        self.statics.push(StaticBody::new(id, Kind::new(shape, material), position));
         id
     }
 

@@ -282,7 +282,7 @@ fn what_cannot_be_done_is_told_in_one_line_and_ends_the_run_or_not() {
         ),
         (
             "{\"step\": 3, \"impulse\": {\"id\": 60, \"x\": 3e38, \"y\": 0}}\n",
-            "line 2: step 3: body 60: velocities, impulses and forces must be finite numbers, and what they lead to",
+            "line 2: step 3: body 60: velocities, impulses and forces must be finite numbers, and lead to no more",
         ),
         ("{\"step\": 3, \"remve\": 40}\n", "c.jsonl: line 2: unknown field `remve`, expected one of"),
         ("{\"step\": 3, \"remove\": 41\n", "c.jsonl: line 2: EOF while parsing an object"),

@@ -7,26 +7,64 @@ use std::f32::consts::TAU;
 
 const MIDDLE: DVec2 = DVec2::new(7.0, -3.0);
 
-/// Defect: what slides over boxes set edge to edge, a tenth of a millimeter in each, stopped at the first seam.
+/// Defect: what slides over boxes set edge to edge, a tenth of a millimeter in each, stopped at the first seam; and so did a box whose corners are cut, or
+/// a box on triangles at 10 m/s, or a hexagon at 20 m/s.
 #[test]
-fn boxes_slide_over_the_seams_of_a_floor_of_boxes() {
+fn what_is_flat_slides_over_the_seams_of_a_floor() {
     let smooth = Material { friction: 0.0, ..Material::default() };
-    let trapezoid = [(-0.5, -0.25), (0.5, -0.25), (0.3, 0.25), (-0.3, 0.25)].map(Vec2::from);
-    for shape in [Shape::rectangle(1.0, 0.5), Shape::polygon(&trapezoid, 0.0).unwrap()] {
-        for speed in [0.5, 5.0, 12.0] {
-            let mut scene = Scene::new(MIDDLE, -10.0);
-            for k in 0..20 {
-                scene.wall(MIDDLE + DVec2::new(1.3 * f64::from(k) - 7.0, -0.5), (1.3, 1.0), 0.0, smooth);
+    let polygon = |corners: &[(f32, f32)]| {
+        let corners: Vec<Vec2> = corners.iter().copied().map(Vec2::from).collect();
+        Shape::polygon(&corners, 0.0).unwrap()
+    };
+    let cut = |by: f32| {
+        let (x, y) = (0.5 - by, 0.3 - by);
+        polygon(&[(-x, -0.3), (x, -0.3), (0.5, -y), (0.5, y), (x, 0.3), (-x, 0.3), (-0.5, y), (-0.5, -y)])
+    };
+    let leaning = [(-0.3, 0.0), (0.2, 0.0), (0.5, 0.4), (-0.35, 0.3)];
+    let shapes = [
+        Shape::rectangle(1.0, 0.5),
+        polygon(&[(-0.5, -0.25), (0.5, -0.25), (0.3, 0.25), (-0.3, 0.25)]),
+        polygon(&leaning),
+        cut(0.02),
+        cut(0.05),
+        polygon(&[(0.35, 0.0), (0.175, 0.3031), (-0.175, 0.3031), (-0.35, 0.0), (-0.175, -0.3031), (0.175, -0.3031)]),
+        Shape::compound([-0.25, 0.25].map(|x| part([x, 0.0, 0.5, 0.6])).to_vec()).unwrap(),
+    ];
+    let triangle = polygon(&[(-0.25, 0.0), (0.0, -1.0), (0.25, 0.0)]);
+    for floor in [Shape::rectangle(0.5, 1.0), triangle] {
+        for speed in [2.0, 10.0, 20.0] {
+            let mut scene = Scene { half: DVec2::splat(100.0), ..Scene::new(MIDDLE, -10.0) };
+            let kinds = shapes.clone().map(|shape| scene.kind(shape, smooth));
+            let place = |k: u64| MIDDLE + DVec2::new(20.0 * (k % 7) as f64 - 70.0, 3.0 * (k / 7) as f64);
+            let top = outline(&floor).map(|corner| corner.y).fold(f32::NEG_INFINITY, f32::max);
+            for (k, tile) in (0..56).flat_map(|k| (0..24).map(move |tile| (k, tile))) {
+                scene.fixed(floor.clone(), place(k) + DVec2::new(0.5 * f64::from(tile), -f64::from(top)), smooth);
             }
-            let kind = scene.kind(shape.clone(), smooth);
-            let id = scene.body(kind, MIDDLE + DVec2::new(-6.0, 0.25), Vec2::new(speed, 0.0));
+            let start = |k: u64| {
+                let lowest = outline(&shapes[k as usize % 7]).map(|corner| corner.y).fold(f32::INFINITY, f32::min);
+                place(k) + DVec2::new(1.0 + noise(3, k), -f64::from(lowest))
+            };
+            let ids: Vec<_> =
+                (0..56).map(|k| scene.body(kinds[k as usize % 7], start(k), Vec2::new(speed, 0.0))).collect();
             let mut sim = scene.start_on((1, 1), Exchange::Step);
-            sim.run((60.0 * 12.0 / speed).min(300.0) as u32);
-            let velocity = sim.body(id).velocity;
-            assert!((velocity.x - speed).abs() < 0.01 * speed, "{shape:?} at {speed} m/s comes to {velocity}");
-            assert!(velocity.y.abs() < 0.1, "{shape:?} at {speed} m/s comes to {velocity}");
+            sim.run((60.0 * 7.0 / speed) as u32);
+            for (k, id) in ids.into_iter().enumerate() {
+                let velocity = sim.body(id).velocity;
+                let is_held = (velocity.x - speed).abs() > 0.01 * speed || velocity.y.abs() > 0.1;
+                assert!(!is_held, "{:?} on {floor:?} at {speed} m/s comes to {velocity}", shapes[k % 7]);
+            }
         }
     }
+}
+
+/// A box at a place, as a part of a shape.
+fn part([x, y, width, height]: [f32; 4]) -> Part {
+    Part { shape: Shape::rectangle(width, height), position: Vec2::new(x, y), rotation: Rot::IDENTITY }
+}
+
+/// The corners of a shape that is not rounded.
+fn outline(shape: &Shape) -> impl Iterator<Item = Vec2> {
+    shape.outlines().into_iter().flat_map(|(corners, _)| corners)
 }
 
 /// Defect: what came down beside a seam met the side of the box behind it, on the way that the first one ends. A disc of 10 m/s was thrown
@@ -130,11 +168,6 @@ fn a_disc_meets_the_end_of_a_capsule_or_passes_by() {
 /// half of its speed. However the same L is cut, it is one body.
 #[test]
 fn an_l_is_one_body_however_it_is_cut() {
-    let part = |[x, y, width, height]: [f32; 4]| Part {
-        shape: Shape::rectangle(width, height),
-        position: Vec2::new(x, y),
-        rotation: Rot::IDENTITY,
-    };
     let across = [[0.0, -0.5, 2.0, 1.0], [-0.5, 1.0, 1.0, 2.0]].map(part);
     let along = [[-0.5, 0.5, 1.0, 3.0], [0.5, -0.5, 1.0, 1.0]].map(part);
     let end = |parts: &[Part], shape: &Shape, [speed, angle, before]: [f32; 3], (spin, is_second): (f32, bool)| {
@@ -180,11 +213,7 @@ fn an_l_is_one_body_however_it_is_cut() {
 /// thrown back, and what slid off a cliff gained energy.
 #[test]
 fn edges_of_chains_are_no_obstacles() {
-    let halves = [-0.75, 0.75].map(|x| Part {
-        shape: Shape::rectangle(1.5, 0.5),
-        position: Vec2::new(x, 0.0),
-        rotation: Rot::IDENTITY,
-    });
+    let halves = [-0.75, 0.75].map(|x| part([x, 0.0, 1.5, 0.5]));
     let shapes = [Shape::rectangle(3.0, 0.5), Shape::compound(halves.to_vec()).unwrap()];
     let slot = [(-9.0, 0.0), (-0.4, 0.0), (-0.4, -2.0), (0.4, -2.0), (0.4, 0.0), (9.0, 0.0)].map(Vec2::from);
     let cliff = [(-9.0, 0.0), (0.0, 0.0), (0.0, -9.0)].map(Vec2::from);

@@ -9,7 +9,7 @@ pub enum SetupError {
     /// A row of the table of kinds.
     #[error(
         "kind {}: sizes and density must be positive, damping and friction at least 0, restitution within 0 to 1, all of them \
-         finite, and neither so small nor so large that its mass or inertia is not", kind.0
+         finite, and neither so small that its mass or inertia is none nor so large that these are beyond 1e30", kind.0
     )]
     BadKind {
         /// Its row.
@@ -46,7 +46,8 @@ pub enum SetupError {
     },
     /// What is to be done to a body.
     #[error(
-        "body {id}: velocities, impulses and forces must be finite numbers, and what they lead to as well; give smaller ones"
+        "body {id}: velocities, impulses and forces must be finite numbers, and lead to no more than 1e9 m/s and rad/s; give \
+         smaller ones"
     )]
     NotFinite {
         /// Its name.

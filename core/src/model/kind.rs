@@ -154,6 +154,9 @@ impl Form {
     }
 }
 
+/// No body has more mass, in kg, or a greater moment of inertia, in kg m^2: their momenta and energies must be numbers.
+const MOST_MASS: f32 = 1e30;
+
 /// A kind with everything the step derives from it.
 #[derive(Clone, Debug)]
 pub(crate) struct KindRow {
@@ -197,7 +200,8 @@ impl KindRow {
         let mass = kind.material.density * kind.shape.area();
         let inertia = mass * kind.shape.inertia_per_mass();
         let (inv_mass, inv_inertia) = (1.0 / mass, 1.0 / inertia);
-        if !(inv_mass.is_finite() && inv_inertia.is_finite() && inv_mass > 0.0 && inv_inertia > 0.0) {
+        let is_inverse = |inverse: f32| inverse.is_finite() && inverse >= 1.0 / MOST_MASS;
+        if !(is_inverse(inv_mass) && is_inverse(inv_inertia)) {
             return Err(SetupError::BadKind { kind: id });
         }
         Ok(Self {

@@ -1,6 +1,7 @@
 //! Every number that a step depends on, with unit, default and meaning.
 
 use crate::model::error::SetupError;
+use crate::model::path::Path;
 use glam::Vec2;
 
 /// When tiles speak to each other within a step.
@@ -214,7 +215,8 @@ impl Params {
             |name, value: f32| require(name, value, value >= 0.0 && value.is_finite(), "at least 0 and finite");
         positive("dt", self.dt)?;
         require("substeps", self.substeps as f32, (1..=64).contains(&self.substeps), "within 1 to 64")?;
-        require("gravity", self.gravity.length(), self.gravity.is_finite(), "finite")?;
+        let is_gravity = self.gravity.is_finite() && f64::from(self.gravity.abs().max_element()) <= Path::FASTEST;
+        require("gravity", self.gravity.length(), is_gravity, "finite, and at most 1e9 m/s^2 along an axis")?;
         not_negative("linear_damping", self.linear_damping)?;
         not_negative("angular_damping", self.angular_damping)?;
         require("max_linear_speed", self.max_linear_speed, self.max_linear_speed > 0.0, "positive")?;

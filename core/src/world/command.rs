@@ -10,6 +10,7 @@ use crate::model::id::{GlobalId, KindId};
 use crate::model::kind::{Kind, KindRow};
 use crate::model::math::cross;
 use crate::model::params::Params;
+use crate::model::path::Path;
 use glam::{DVec2, Vec2};
 use std::sync::Arc;
 
@@ -122,7 +123,10 @@ impl World {
     pub fn check(&self, command: &Command) -> Result<(), SetupError> {
         let finite = |id: GlobalId, are: bool| if are { Ok(()) } else { Err(SetupError::NotFinite { id }) };
         match *command {
-            Command::Add(body) => self.setup.check_body(&body),
+            Command::Add(body) => {
+                finite(body.id, !is_too_fast(&body))?;
+                self.setup.check_body(&body)
+            }
             Command::SetVelocity { id, velocity, angular_velocity } => {
                 finite(id, velocity.is_finite() && angular_velocity.is_finite())
             }
@@ -149,7 +153,7 @@ impl World {
     /// out. A force leaves it as it is until the next step.
     ///
     /// # Errors
-    /// If the velocities that it leads to, a force within one step, are not finite.
+    /// If the velocities that it leads to, a force within one step, are beyond [`Path::FASTEST`].
     pub fn outcome(&self, command: &Command, body: Body) -> Result<Body, SetupError> {
         let kind = self.setup.kind(body.kind);
         let mut after = body;
@@ -167,7 +171,7 @@ impl World {
         }
         after.angular_velocity = self.setup.kind(after.kind).turning(after.angular_velocity);
         match command {
-            _ if !after.is_finite() => Err(SetupError::NotFinite { id: body.id }),
+            _ if !after.is_finite() || is_too_fast(&after) => Err(SetupError::NotFinite { id: body.id }),
             Command::Force { .. } => Ok(body),
             _ => Ok(after),
         }
@@ -184,6 +188,11 @@ impl World {
         self.tiles[tile as usize].change_at(at, body);
         Ok(true)
     }
+}
+
+/// Whether it goes or turns faster than anything here may.
+fn is_too_fast(body: &Body) -> bool {
+    f64::from(body.velocity.abs().max_element().max(body.angular_velocity.abs())) > Path::FASTEST
 }
 
 /// What an impulse does to a body.

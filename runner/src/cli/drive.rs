@@ -38,7 +38,7 @@ impl Said {
         let step = match word(number, &text, self.until) {
             Ok(Word::Until(until)) => {
                 // Who goes on to a step that is made is told anew where the run waits.
-                if until <= self.until {
+                if self.waited_after.is_some_and(|made| until <= made) {
                     self.waited_after = None;
                 }
                 self.until = self.until.max(until);

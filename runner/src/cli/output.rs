@@ -1,5 +1,6 @@
 //! What is written when all is done: to standard output, and to files, each whole or not at all.
 
+use crate::config::Config;
 use crate::error::RunError;
 use crate::folder::RunFolder;
 use crate::folder::durable::{follow, is_stream, temporary, write_durably};
@@ -65,7 +66,10 @@ impl Kept<'_> {
         if self.commands.and_then(|file| file.canonicalize().ok()).is_some_and(|file| places.contains(&file)) {
             return Some("the file of this run's commands".to_owned());
         }
-        let scene: Vec<PathBuf> = self.scene.iter().filter_map(|file| file.canonicalize().ok()).collect();
+        let begun = self.runs.iter().filter_map(|run| Config::load_begun(&RunFolder::new("", run).configuration()).ok());
+        let of_runs: Vec<PathBuf> = begun.flat_map(|config| config.scene_files()).collect();
+        let scene: Vec<PathBuf> =
+            self.scene.iter().chain(&of_runs).filter_map(|file| file.canonicalize().ok()).collect();
         if places.iter().any(|place| scene.contains(place)) {
             return Some("a file of the scene of this run".to_owned());
         }

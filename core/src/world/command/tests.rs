@@ -315,7 +315,8 @@ fn what_cannot_be_done_changes_nothing() {
         (Command::SetVelocity { id, velocity: nan, angular_velocity: 0.0 }, SetupError::NotFinite { id }),
         (Command::Impulse { id, impulse: nan, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: nan, torque: 0.0, steps: 1 }, SetupError::NotFinite { id }),
-        // What they lead to is not finite.
+        // What they lead to is not finite, or faster than anything may be.
+        (Command::SetVelocity { id, velocity: Vec2::X * 2e9, angular_velocity: 0.0 }, SetupError::NotFinite { id }),
         (Command::Impulse { id, impulse: Vec2::X * 2e38, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (
             Command::Impulse { id, impulse: Vec2::X, at: Some(DVec2::Y * 1e300), angular: 0.0 },

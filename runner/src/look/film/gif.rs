@@ -6,7 +6,7 @@ use crate::look::picture::Image;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Programs show what lasts shorter, in hundredths of a second, much longer.
@@ -15,7 +15,9 @@ const SHORTEST: u64 = 2;
 /// A GIF that is being written.
 pub(super) struct Gif {
     unfinished: Unfinished,
-    encoder: Encoder<BufWriter<File>>,
+    file: File,
+    /// What it writes is taken to the file picture by picture: where it is dropped it would panic at a file that takes no more.
+    encoder: Encoder<Vec<u8>>,
     /// Pictures in a second.
     rate: f64,
     added: u64,
@@ -37,10 +39,10 @@ impl Gif {
             return Err(io::Error::other("a GIF is at most 65,535 pixels wide and high"));
         };
         let (unfinished, file) = Unfinished::file(path)?;
-        let mut encoder = Encoder::new(BufWriter::with_capacity(1 << 16, file), width, height, &[]).map_err(plain)?;
+        let mut encoder = Encoder::new(Vec::new(), width, height, &[]).map_err(plain)?;
         encoder.set_repeat(Repeat::Infinite).map_err(plain)?;
         let shown = Vec::new();
-        Ok(Self { unfinished, encoder, rate, added: 0, shown, palette: Palette::default(), indices: Vec::new() })
+        Ok(Self { unfinished, file, encoder, rate, added: 0, shown, palette: Palette::default(), indices: Vec::new() })
     }
 
     pub(super) fn add(&mut self, image: &Image) -> io::Result<()> {
@@ -77,6 +79,8 @@ impl Gif {
                 ..Frame::default()
             })
             .map_err(plain)?;
+        self.file.write_all(self.encoder.get_ref())?;
+        self.encoder.get_mut().clear();
         self.shown.clone_from(&image.pixels);
         self.added += 1;
         Ok(())
@@ -110,10 +114,10 @@ impl Gif {
         if self.added == 0 {
             return Err(nothing_added());
         }
-        let mut writer = self.encoder.into_inner().map_err(plain)?;
-        writer.flush()?;
-        writer.get_ref().sync_all()?;
-        drop(writer);
+        let (mut file, end) = (self.file, self.encoder.into_inner().map_err(plain)?);
+        file.write_all(&end)?;
+        file.sync_all()?;
+        drop(file);
         self.unfinished.complete()
     }
 }

@@ -115,7 +115,7 @@ impl Log {
         Ok(log)
     }
 
-    /// Opens the files, those that are new with a first row.
+    /// Opens the files, those that are new with a first row where the run begins.
     fn open(
         &mut self,
         found: Found,
@@ -133,14 +133,15 @@ impl Log {
             };
             let mut file = open().map_err(|error| not_written(&path, &error))?;
             let last = rows.and_then(|rows| rows.steps).map(|(_, last)| last);
-            match last {
-                None => file.add(start).map_err(|error| not_written(&path, &error))?,
+            match (last, resumed) {
+                (None, None) => file.add(start).map_err(|error| not_written(&path, &error))?,
+                // What the step before it did is no longer known.
+                (None, Some(from)) => observer.note(&format!("{}: no rows up to step {from}", path.display())),
                 // Of a step after which a refused command ended the run there is none.
-                Some(last) if resumed.is_some_and(|resumed| last < resumed - resumed % self.every) => {
-                    let from = resumed.unwrap_or_default();
+                (Some(last), Some(from)) if last < from - from % self.every => {
                     observer.note(&format!("{}: no rows from step {last} to {from}", path.display()));
                 }
-                Some(_) => {}
+                (Some(_), _) => {}
             }
             if let Some(handle) = file.to_sync().map_err(|error| not_written(&path, &error))? {
                 to_sync.push((path, handle));
