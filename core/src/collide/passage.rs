@@ -1,6 +1,7 @@
 //! How far a body can go on its way through a step before it is too deep in another.
 
 use crate::collide::manifold::convex::collide;
+use crate::collide::manifold::scale_of;
 use crate::model::kind::KindRow;
 use crate::model::math::{Rot, dot, max, min};
 use crate::model::piece::Piece;
@@ -80,10 +81,12 @@ impl<'a> Passage<'a> {
     /// As [`free_part`](Self::free_part), of a piece of each. `bound` tells how much nearer they can come along a normal on the whole way.
     fn free_part_of(&self, pieces: [&Piece; 2], other: &Self, offset: Vec2, bound: impl Fn(Vec2) -> f32) -> f32 {
         let depth = DEPTH * self.kind.inner_radius;
+        let scale = scale_of([self.kind, other.kind].map(|kind| kind.bounding_radius));
         let (mut part, mut deepest) = (0.0, depth);
         for _ in 0..MOST_LOOKS {
             let rotations = [self.rotation_at(part), other.rotation_at(part)];
-            let manifold = collide(pieces, rotations, offset + (other.way - self.way) * part, f32::INFINITY, None);
+            let manifold =
+                collide(pieces, rotations, offset + (other.way - self.way) * part, (f32::INFINITY, scale), None);
             let Some(nearest) = manifold.nearest() else { return 1.0 };
             if part == 0.0 {
                 deepest = depth + max(-nearest.separation, 0.0);

@@ -20,12 +20,11 @@ pub(super) use straight::Course;
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::manifold::chain::Lies;
-use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex};
+use crate::collide::manifold::{Manifold, ManifoldPoint, collide, convex, scale_of};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{Rot, clamp, cross, dot, max, min, right_perp, tangent, turn};
 use crate::model::piece::Piece;
-use crate::parallel::lanes::Arithmetic;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
 use glam::Vec2;
@@ -34,16 +33,6 @@ use glam::Vec2;
 /// less: see [`scale_of`].
 pub(super) const NEAR: f32 = 0.0002;
 pub(super) const DEEP: f32 = -0.01;
-
-/// One by this bounding radius, in m.
-const PER_ROOMY: f32 = 8.0;
-
-/// What is near, or touches, is so as seen from the smaller of two bodies, if that is small: which part of [`NEAR`], [`DEEP`], [`TOUCHING`] and
-/// [`ROLLING`] counts, by their bounding radii.
-#[inline(always)]
-pub(super) fn scale_of<V: Arithmetic>([a, b]: [V; 2]) -> V {
-    a.min(b).mul(V::splat(PER_ROOMY)).min(V::splat(1.0))
-}
 
 /// Surfaces nearer than this touch, in m.
 pub(super) const TOUCHING: f32 = 0.002;
@@ -319,7 +308,7 @@ impl<'a> Approach<'a> {
         let manifold = match self.pieces {
             None => collide(self.a.kind, rotation_a, self.b.kind, rotation_b, offset, reach),
             Some(pieces) => {
-                let found = convex::collide(pieces, [rotation_a, rotation_b], offset, reach, self.lies);
+                let found = convex::collide(pieces, [rotation_a, rotation_b], offset, (reach, self.scale()), self.lies);
                 found.named(self.features)
             }
         };

@@ -66,7 +66,8 @@ impl Kept<'_> {
         if self.commands.and_then(|file| file.canonicalize().ok()).is_some_and(|file| places.contains(&file)) {
             return Some("the file of this run's commands".to_owned());
         }
-        let begun = self.runs.iter().filter_map(|run| Config::load_begun(&RunFolder::new("", run).configuration()).ok());
+        let begun =
+            self.runs.iter().filter_map(|run| Config::load_begun(&RunFolder::new("", run).configuration()).ok());
         let of_runs: Vec<PathBuf> = begun.flat_map(|config| config.scene_files()).collect();
         let scene: Vec<PathBuf> =
             self.scene.iter().chain(&of_runs).filter_map(|file| file.canonicalize().ok()).collect();

@@ -4,6 +4,7 @@ use super::Plan;
 use crate::config::{OutputConfig, TransportKind};
 use crate::folder::Ended;
 use atoll_core::{Blueprint, Exchange, Ghosts, Kind, Shape, TileId};
+use glam::Vec2;
 use std::thread;
 
 /// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
@@ -90,6 +91,13 @@ fn physical(blueprint: &Blueprint) -> Vec<String> {
             "restitution is {restitution}, and with {by} bounces over borders of tiles may gain energy: set {mend}, or use one tile"
         ));
     }
+    if is_frozen && params.gravity != Vec2::ZERO && blueprint.partition.tiles() > 1 {
+        notes.push(
+            "with ghosts = \"frozen\" tiles push each other's bodies without being pushed: what lies over their borders may be thrown up, all the \
+             more where it is heavy or as large as a tile; set ghosts=dynamic, or use one tile"
+                .to_owned(),
+        );
+    }
     let masses = || blueprint.kinds.iter().map(|kind| kind.material.density * kind.shape.area());
     let (lightest, heaviest) = (masses().fold(f32::INFINITY, f32::min), masses().fold(0.0, f32::max));
     if heaviest > MASS_RATIO * lightest {
@@ -142,6 +150,8 @@ mod tests {
         assert!(bouncing(1.0, &[("tiles", "1x1")]).is_empty());
         let notes = bouncing(0.5, &[("ghosts", "frozen"), ("tiles", "2x2")]);
         assert!(notes.len() == 1 && notes[0].starts_with("restitution is 0.5, and with ghosts"), "{notes:?}");
+        let notes = plan(&[("ghosts", "frozen"), ("tiles", "2x2"), ("gravity", "[0, -10]")]).notes();
+        assert!(notes.len() == 1 && notes[0].starts_with("with ghosts = \"frozen\" tiles push"), "{notes:?}");
         let mut heavy = plan(&[]);
         heavy.blueprint.kinds[1].material.density *= 1e6;
         let notes = heavy.notes();

@@ -26,7 +26,14 @@ fn larger(v: Vec2) -> f32 {
 }
 
 #[inline(always)]
-pub(super) fn collide(half_a: Vec2, rot_a: Rot, half_b: Vec2, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
+pub(super) fn collide(
+    half_a: Vec2,
+    rot_a: Rot,
+    half_b: Vec2,
+    rot_b: Rot,
+    offset: Vec2,
+    (reach, scale): (f32, f32),
+) -> Manifold {
     let turn = rot_a.to(rot_b);
     let (in_a, in_b) = (rot_a.unrotate(offset), rot_b.unrotate(offset));
     let along_a = separations(half_a, half_b, turn, in_a);
@@ -35,7 +42,7 @@ pub(super) fn collide(half_a: Vec2, rot_a: Rot, half_b: Vec2, rot_b: Rot, offset
     if most_a > reach || most_b > reach {
         return Manifold::EMPTY;
     }
-    if most_b > most_a + PREFERENCE {
+    if most_b > most_a + PREFERENCE * scale {
         let back = Rot { c: turn.c, s: -turn.s };
         let mut manifold = against_face(half_b, half_a, back, -in_b, along_b, true);
         manifold.normal = -rot_b.rotate(manifold.normal);

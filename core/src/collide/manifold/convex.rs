@@ -12,14 +12,15 @@ use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::{Piece, Side};
 use glam::Vec2;
 
-/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. Where one is
+/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. `scale` is that of their
+/// bodies ([`scale_of`](super::scale_of)). Where one is
 /// a segment of a chain, `lies` tells how far behind it the other may be that has lain on its face.
 #[inline(never)]
 pub(in crate::collide) fn collide(
     [a, b]: [&Piece; 2],
     [rot_a, rot_b]: [Rot; 2],
     offset: Vec2,
-    reach: f32,
+    (reach, scale): (f32, f32),
     lies: Lies,
 ) -> Manifold {
     match (a.side, b.side) {
@@ -27,7 +28,7 @@ pub(in crate::collide) fn collide(
         (Some(side), None) => on_segment([a, b], side, [rot_a, rot_b], offset, reach, lies),
         (None, None) => {
             let other = b.outline.seen(rot_a.to(rot_b), rot_a.unrotate(offset));
-            polygons(&a.outline, &other, [a.radius, b.radius], reach).rotated(rot_a)
+            polygons(&a.outline, &other, [a.radius, b.radius], (reach, scale)).rotated(rot_a)
         }
     }
 }
@@ -48,7 +49,7 @@ fn on_segment(
     chain::collide(&segment.outline, side, (&other, piece.radius, center), reach, lies).rotated(rot_segment)
 }
 
-fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) -> Manifold {
+fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], (reach, scale): (f32, f32)) -> Manifold {
     if b.count() == 1 {
         let (normal, distance, _) = a.nearest(b.corner(0));
         return of_point(b.corner(0) - normal * distance, normal, distance, [radius_a, radius_b], 0);
@@ -67,7 +68,7 @@ fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], reach: f32) 
         return Manifold::EMPTY;
     }
     let overlap = most_a <= 0.0 && most_b <= 0.0;
-    let found = if most_b > most_a + PREFERENCE {
+    let found = if most_b > most_a + PREFERENCE * scale {
         against_face(b, face_b, a, (most_b, overlap), [radius_b, radius_a], true).map(Manifold::turned_round)
     } else {
         against_face(a, face_a, b, (most_a, overlap), [radius_a, radius_b], false)

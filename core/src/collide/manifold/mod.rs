@@ -13,6 +13,7 @@ mod tests;
 use crate::model::contact::ContactPoint;
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::Rot;
+use crate::parallel::lanes::Arithmetic;
 use glam::Vec2;
 
 /// A point of a manifold.
@@ -96,11 +97,22 @@ impl Manifold {
     }
 }
 
+/// One by this bounding radius, in m.
+const PER_ROOMY: f32 = 8.0;
+
+/// What is near, touches, or counts as one is so as seen from the smaller of two bodies, if that is small: which part of such a length
+/// counts, by their bounding radii.
+#[inline(always)]
+pub(in crate::collide) fn scale_of<V: Arithmetic>([a, b]: [V; 2]) -> V {
+    a.min(b).mul(V::splat(PER_ROOMY)).min(V::splat(1.0))
+}
+
 /// The manifold of two bodies, circles or boxes, whose surfaces are nearer than `reach`; further ones may give none.
 #[inline(always)]
 pub(crate) fn collide(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: Vec2, reach: f32) -> Manifold {
+    let scale = scale_of([a.bounding_radius, b.bounding_radius]);
     match (a.form, b.form) {
-        (Form::Box, Form::Box) => box_box::collide(a.extent, rot_a, b.extent, rot_b, offset, reach),
+        (Form::Box, Form::Box) => box_box::collide(a.extent, rot_a, b.extent, rot_b, offset, (reach, scale)),
         _ => round::collide(a, rot_a, b, rot_b, offset),
     }
 }
@@ -110,10 +122,11 @@ pub(crate) fn nearest(a: &KindRow, rot_a: Rot, b: &KindRow, rot_b: Rot, offset: 
     if a.form.is_simple() && b.form.is_simple() {
         return collide(a, rot_a, b, rot_b, offset, reach);
     }
+    let scale = scale_of([a.bounding_radius, b.bounding_radius]);
     let pairs = a.pieces.iter().flat_map(|a| b.pieces.iter().map(move |b| [a, b]));
     let mut least = (f32::INFINITY, Manifold::EMPTY);
     for pair in pairs {
-        let manifold = convex::collide(pair, [rot_a, rot_b], offset, reach, None);
+        let manifold = convex::collide(pair, [rot_a, rot_b], offset, (reach, scale), None);
         if let Some(nearest) = manifold.nearest()
             && nearest.separation < least.0
         {

@@ -1,6 +1,6 @@
 //! Manifolds against the distance of outlines, found by trying every edge against every edge.
 
-use super::{Manifold, collide, convex};
+use super::{Manifold, collide, convex, scale_of};
 use crate::model::id::KindId;
 use crate::model::kind::{Kind, KindRow, Material};
 use crate::model::math::Rot;
@@ -33,7 +33,7 @@ impl Two {
     fn within(&self, reach: f32) -> Manifold {
         let (a, b) = (row(&self.a), row(&self.b));
         if !(a.form.is_simple() && b.form.is_simple()) {
-            convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, reach, None)
+            self.of_pieces_within(reach)
         } else {
             collide(&a, self.rot_a, &b, self.rot_b, self.offset, reach)
         }
@@ -41,8 +41,14 @@ impl Two {
 
     /// As if both were made of pieces.
     fn of_pieces(&self) -> Manifold {
+        self.of_pieces_within(f32::INFINITY)
+    }
+
+    fn of_pieces_within(&self, reach: f32) -> Manifold {
         let (a, b) = (row(&self.a), row(&self.b));
-        convex::collide([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b], self.offset, f32::INFINITY, None)
+        let (pieces, rotations) = ([&a.pieces[0], &b.pieces[0]], [self.rot_a, self.rot_b]);
+        let scale = scale_of([a.bounding_radius, b.bounding_radius]);
+        convex::collide(pieces, rotations, self.offset, (reach, scale), None)
     }
 
     fn swapped(&self) -> Self {
@@ -372,7 +378,7 @@ fn who_touches_a_segment_is_near_it() {
             let offset = Rot::from_angle(random.next() * 6.3).rotate(Vec2::new(5.0 * random.next(), 0.0));
             let lies = (random.next() < 0.5).then_some(0.01);
             let pieces = [&segment[0], &piece.pieces[0]];
-            let manifold = convex::collide(pieces, [Rot::IDENTITY, rotation], offset, f32::INFINITY, lies);
+            let manifold = convex::collide(pieces, [Rot::IDENTITY, rotation], offset, (f32::INFINITY, 1.0), lies);
             let Some(nearest) = manifold.nearest().filter(|_| !manifold.is_distance()) else { continue };
             let apart = |part: f32| {
                 let seen = rotation.unrotate(from + (to - from) * part - offset).abs() - Vec2::new(0.5 * long, core);
@@ -417,7 +423,7 @@ fn who_lies_on_a_chain_of_short_segments_is_held_by_each() {
             let ground = &crate::model::piece::pieces(&Shape::Segment(segment))[0];
             let offset = Vec2::new(0.0, height) - middle;
             let rotations = [Rot::IDENTITY, Rot::from_angle(f32::to_radians(degrees))];
-            let manifold = convex::collide([ground, piece], rotations, offset, f32::INFINITY, Some(0.01));
+            let manifold = convex::collide([ground, piece], rotations, offset, (f32::INFINITY, 1.0), Some(0.01));
             let touches = !manifold.is_distance() && manifold.nearest().is_some_and(|nearest| nearest.separation < 0.0);
             // Where the center is behind, those segments hold it that are below that.
             let is_below = from.x <= 0.0 && 0.0 <= to.x;

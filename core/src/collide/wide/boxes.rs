@@ -64,7 +64,7 @@ impl<V: Wide> Shapes<V> for Boxes {
         let (most_a, most_b) = (along_a.x.max(along_a.y), along_b.x.max(along_b.y));
         let beyond = less(reach, most_a).max(less(reach, most_b));
         // The reference box, at the origin and unturned, and the incident box.
-        let from_b = less(most_a.add(V::splat(PREFERENCE)), most_b);
+        let from_b = less(most_a.add(V::splat(PREFERENCE).mul(pairs.scale())), most_b);
         let reference = Vectors::pick(from_b, pairs.half[1], pairs.half[0]);
         let incident = Vectors::pick(from_b, pairs.half[0], pairs.half[1]);
         let turn = Vectors::new(turn.x, from_b.if_positive(negated(turn.y), turn.y));

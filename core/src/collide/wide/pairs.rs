@@ -4,7 +4,8 @@
 use super::moments::Search;
 use super::touches::Touches;
 use crate::collide::broad_phase::Pair;
-use crate::collide::touch::{ROLLING, TOUCHING, pressed, scale_of};
+use crate::collide::manifold::scale_of;
+use crate::collide::touch::{ROLLING, TOUCHING, pressed};
 use crate::model::contact::{Contact, ContactPoint};
 use crate::model::math::Rot;
 use crate::parallel::lanes::{Quad, WIDE, Wide, WideRow};

@@ -116,7 +116,7 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let rounding = pairs.radius[0].add(pairs.radius[1]);
         let (face_a, face_b) = (a.separate(b), b.separate(a));
         let beyond = less(reach, face_a.figure.sub(rounding)).max(less(reach, face_b.figure.sub(rounding)));
-        let from_b = less(face_a.figure.add(V::splat(PREFERENCE)), face_b.figure);
+        let from_b = less(face_a.figure.add(V::splat(PREFERENCE).mul(pairs.scale())), face_b.figure);
         let reference = Face::pick(from_b, &face_b, &face_a);
         let (height, n) = (reference.figure, reference.normal);
         // The edge of the other that looks most against it.
