@@ -8,6 +8,7 @@ use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::{Contacts, New};
 use crate::collide::touch::{self, Stopped};
 use crate::model::contact::{PairKey, Slot, SlotKind};
+use crate::model::kind::Form;
 use crate::model::math::{dot, max};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::chains::Link;
@@ -49,10 +50,12 @@ fn any_may_pass(tile: &Tile, setup: &Setup) -> bool {
 fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup, found: &mut Vec<New>) {
     let met = run.clone().filter_map(|number| {
         let (key, pair) = (tile.contacts.keys[number], contacts.bodies[number]);
-        let ground = Ground::new(tile, key.high().index(tile.owned, tile.ghosts()), setup)?;
-        if ground.link.length >= touch::far(tile, pair, setup) {
+        let row = key.high().index(tile.owned, tile.ghosts());
+        let kind = setup.kind(tile.bodies.kind[row]);
+        if kind.form != Form::Segment || 2.0 * kind.bounding_radius >= touch::far(tile, pair, setup) {
             return None;
         }
+        let ground = Ground::new(tile, row, setup)?;
         let stopped = Stopped::new(tile, (pair, &tile.contacts.contacts[number]), setup)?;
         stopped.by().is_some().then_some((number, ground, stopped))
     });

@@ -216,7 +216,12 @@ impl Params {
         positive("dt", self.dt)?;
         require("substeps", self.substeps as f32, (1..=64).contains(&self.substeps), "within 1 to 64")?;
         let is_gravity = self.gravity.is_finite() && f64::from(self.gravity.abs().max_element()) <= Path::FASTEST;
-        require("gravity", self.gravity.abs().max_element(), is_gravity, "finite, and at most 1e9 m/s^2 along an axis")?;
+        require(
+            "gravity",
+            self.gravity.abs().max_element(),
+            is_gravity,
+            "finite, and at most 1e9 m/s^2 along an axis",
+        )?;
         not_negative("linear_damping", self.linear_damping)?;
         not_negative("angular_damping", self.angular_damping)?;
         require("max_linear_speed", self.max_linear_speed, self.max_linear_speed > 0.0, "positive")?;
