@@ -60,7 +60,7 @@ impl Plan {
         }));
         let lost = goes_on.map(|output| output.folder.log()).filter(|log| !log.exists());
         notes.extend(lost.zip(self.found.snapshots.first()).map(|(log, snapshot)| {
-            format!("{} is not there: its rows begin at step {}", log.display(), snapshot.step())
+            format!("{} is not there: its rows begin after step {}", log.display(), snapshot.step())
         }));
         notes
     }

@@ -135,8 +135,8 @@ impl Log {
             let last = rows.and_then(|rows| rows.steps).map(|(_, last)| last);
             match (last, resumed) {
                 (None, None) => file.add(start).map_err(|error| not_written(&path, &error))?,
-                // What the step before it did is no longer known.
-                (None, Some(from)) => observer.note(&format!("{}: no rows up to step {from}", path.display())),
+                // A row tells of the step before it as well, of which nothing is known any more.
+                (None, Some(_)) => {}
                 // Of a step after which a refused command ended the run there is none.
                 (Some(last), Some(from)) if last < from - from % self.every => {
                     observer.note(&format!("{}: no rows from step {last} to {from}", path.display()));
