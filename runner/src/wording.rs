@@ -53,7 +53,7 @@ pub(crate) fn toml_fault(text: &str, error: &toml::de::Error) -> (usize, String)
     let message = error.message().lines().collect::<Vec<_>>().join(", ");
     let message = match text.get(span) {
         Some(key) if message == "duplicate key" => format!("{key} is given twice; leave one of them out"),
-        _ if message.contains(" as i128") => "a whole number of at most 9223372036854775807 must stand here".to_owned(),
+        _ if message.contains(" as i128") => "a whole number that 64 bits have room for must stand here".to_owned(),
         _ => message,
     };
     (line, message)

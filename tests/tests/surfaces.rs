@@ -7,8 +7,8 @@ use std::f32::consts::TAU;
 
 const MIDDLE: DVec2 = DVec2::new(7.0, -3.0);
 
-/// Defect: what slides over boxes set edge to edge, a tenth of a millimeter in each, stopped at the first seam; and so did a box whose corners are cut, or
-/// a box on triangles at 10 m/s, or a hexagon at 20 m/s.
+/// Defect: what slides over boxes set edge to edge, and sinks in by a tenth of a millimeter, stopped at the first seam; and so did a box whose corners
+/// are cut, or a box on triangles at 10 m/s, or a hexagon at 20 m/s.
 #[test]
 fn what_is_flat_slides_over_the_seams_of_a_floor() {
     let smooth = Material { friction: 0.0, ..Material::default() };
@@ -31,14 +31,15 @@ fn what_is_flat_slides_over_the_seams_of_a_floor() {
         Shape::compound([-0.25, 0.25].map(|x| part([x, 0.0, 0.5, 0.6])).to_vec()).unwrap(),
     ];
     let triangle = polygon(&[(-0.25, 0.0), (0.0, -1.0), (0.25, 0.0)]);
-    for floor in [Shape::rectangle(0.5, 1.0), triangle] {
-        for speed in [2.0, 10.0, 20.0] {
+    for (floor, width) in [(Shape::rectangle(1.3, 1.0), 1.3), (Shape::rectangle(0.5, 1.0), 0.5), (triangle, 0.5)] {
+        for speed in [0.5, 2.0, 10.0, 20.0] {
             let mut scene = Scene { half: DVec2::splat(100.0), ..Scene::new(MIDDLE, -10.0) };
             let kinds = shapes.clone().map(|shape| scene.kind(shape, smooth));
             let place = |k: u64| MIDDLE + DVec2::new(20.0 * (k % 7) as f64 - 70.0, 3.0 * (k / 7) as f64);
             let top = outline(&floor).map(|corner| corner.y).fold(f32::NEG_INFINITY, f32::max);
-            for (k, tile) in (0..56).flat_map(|k| (0..24).map(move |tile| (k, tile))) {
-                scene.fixed(floor.clone(), place(k) + DVec2::new(0.5 * f64::from(tile), -f64::from(top)), smooth);
+            let tiles = (12.0 / width) as u64;
+            for (k, tile) in (0..56).flat_map(|k| (0..tiles).map(move |tile| (k, tile))) {
+                scene.fixed(floor.clone(), place(k) + DVec2::new(width * tile as f64, -f64::from(top)), smooth);
             }
             let start = |k: u64| {
                 let lowest = outline(&shapes[k as usize % 7]).map(|corner| corner.y).fold(f32::INFINITY, f32::min);
@@ -47,7 +48,7 @@ fn what_is_flat_slides_over_the_seams_of_a_floor() {
             let ids: Vec<_> =
                 (0..56).map(|k| scene.body(kinds[k as usize % 7], start(k), Vec2::new(speed, 0.0))).collect();
             let mut sim = scene.start_on((1, 1), Exchange::Step);
-            sim.run((60.0 * 7.0 / speed) as u32);
+            sim.run((60.0 * 7.0 / speed).min(300.0) as u32);
             for (k, id) in ids.into_iter().enumerate() {
                 let velocity = sim.body(id).velocity;
                 let is_held = (velocity.x - speed).abs() > 0.01 * speed || velocity.y.abs() > 0.1;

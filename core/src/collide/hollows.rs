@@ -6,7 +6,7 @@
 
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::{Contacts, New};
-use crate::collide::touch::{self, Stopped};
+use crate::collide::touch::{self, Stopped, sooner};
 use crate::model::contact::{PairKey, Slot, SlotKind};
 use crate::model::kind::Form;
 use crate::model::math::{dot, max};
@@ -19,7 +19,10 @@ use std::ops::Range;
 const MOST: usize = 64;
 
 /// Segments count as long as their normals and that of the first one have a greater cosine.
-const LEVEL: f32 = 0.2;
+const LEAST_COSINE: f32 = 0.2;
+
+/// What rises above the first one by more than this part of its length is none of a hollow; what leans in by less is level with it.
+const SLOPE: f32 = 1e-4;
 
 /// Adds the contacts of a tile's bodies with the segments that they come to along others within the step. Time grows with the segments that
 /// fast bodies pass.
@@ -42,7 +45,7 @@ pub(crate) fn follow(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
 /// Whether a body may go further than a segment of a hollow is long: looser than what is asked of each.
 fn any_may_pass(tile: &Tile, setup: &Setup) -> bool {
     let (Fastest { spin, way }, shortest) = (tile.counts.fastest, setup.chains.shortest_in_hollow);
-    let far = 2.0 * way + setup.slimness.longest_arm * spin * setup.params.dt;
+    let far = 2.0 * way + 1.01 * setup.slimness.longest_arm * spin * setup.params.dt;
     shortest.is_finite() && (setup.any_drives() || far > shortest)
 }
 
@@ -59,7 +62,9 @@ fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup
         let stopped = Stopped::new(tile, (pair, &tile.contacts.contacts[number]), setup)?;
         stopped.by().is_some().then_some((number, ground, stopped))
     });
-    let Some((number, first, stopped)) = met.min_by(|(.., one), (.., two)| one.sooner(two)) else { return };
+    let Some((number, first, stopped)) = met.min_by(|(.., one), (.., two)| sooner(one.order(), two.order())) else {
+        return;
+    };
     let (pair, numbers) = (contacts.bodies[number], tile.contacts.contacts[number].piece_numbers());
     if bounces(tile, pair, &stopped, setup) {
         return;
@@ -78,16 +83,20 @@ fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup
         length += here.link.length;
         let next = here.next(tile, is_forward, setup).filter(|next| next.link.meets(low, high));
         let Some(next) = next else { break };
-        if length - first.link.length > far || dot(next.link.normal, first.link.normal) < LEVEL {
+        let lengthened = next.link.piece.lengthened(!is_forward, length);
+        let turned = dot(next.link.normal, first.link.normal);
+        let lean = dot(next.link.normal, first.link.along) * if is_forward { -1.0 } else { 1.0 };
+        if length - first.link.length > far || turned < LEAST_COSINE || lean < -SLOPE {
             break;
         }
         let slot = Slot::from_index(next.row, tile.owned, tile.ghosts());
         let key = PairKey::new(tile.contacts.keys[number].low(), slot);
+        let is_known = || tile.contacts.keys[run.clone()].binary_search(&key).is_ok();
         let touches = || setup.kind(tile.bodies.kind[next.row]).touches(setup.kind(tile.bodies.kind[body as usize]));
-        if tile.contacts.keys[run.clone()].binary_search(&key).is_err() && touches() {
+        // What is level it touches on its free way, or not at all.
+        if lean > SLOPE && !is_known() && touches() {
             let bodies = next.pair_with(tile, body);
             let numbers = bodies.map(|row| if row == body { piece } else { 0 });
-            let lengthened = next.link.piece.lengthened(!is_forward, length);
             let new = stopped.touch_segment(tile, (bodies, numbers), &lengthened, setup);
             found.extend(new.map(|found| New { key, bodies, found }));
         }
@@ -118,12 +127,10 @@ impl<'a> Ground<'a> {
 
     /// What it goes on with, if nothing juts out there.
     fn next(&self, tile: &Tile, is_forward: bool, setup: &'a Setup) -> Option<Self> {
-        let first = tile.owned + tile.ghosts();
-        let neighbour = setup.chains.neighbour_of(tile.statics[self.row - first], is_forward)?;
-        let place = tile.statics.binary_search(&neighbour).ok()?;
-        let next = Self::new(tile, first + place, setup)?;
+        let neighbour = setup.chains.neighbour_of(setup.row_of_static(tile.bodies.kind[self.row])?, is_forward)?;
+        let next = Self::new(tile, tile.index_of_static(neighbour, setup)?, setup)?;
         let (one, two) = if is_forward { (self, &next) } else { (&next, self) };
-        one.link.is_level_with(&two.link).then_some(next)
+        one.link.goes_on_with(&two.link).then_some(next)
     }
 
     /// It and another body, in the order of their names.

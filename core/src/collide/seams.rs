@@ -5,6 +5,7 @@
 //! Sources for what goes wrong where each is seen alone: G. van den Bergen, "Collision Detection in Interactive 3D Environments", 2003;
 //! E. Catto, "Ghost Collisions", 2020, who needs the edges of a mesh, which boxes set side by side do not have.
 
+use crate::collide::manifold::scale_of;
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::{self, Stopped, TOUCHING};
 use crate::model::contact::{Contact, ContactPoint, PairKey, SlotKind};
@@ -33,7 +34,8 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
         let (key, bodies) = (tile.contacts.keys[run.start], contacts.bodies[run.start]);
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
         // Who goes no further passes over corners that lie no deeper in it.
-        let may_catch = || is_with_static(key) || touch::far(tile, bodies, setup) >= TOUCHING;
+        let touching = TOUCHING * scale_of(kinds.map(|kind| kind.bounding_radius));
+        let may_catch = || is_with_static(key) || touch::far(tile, bodies, setup) >= touching;
         if may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) && may_catch() {
             mend_run(tile, contacts, (run, surfaces(key, kinds)), setup, &mut gone);
         }
@@ -100,8 +102,8 @@ struct Face<'a> {
     piece: Option<&'a Piece>,
     /// Out of it; in the frame of the body if it moves.
     normal: Vec2,
-    /// On it, where it is touched first, and where at once: from the center of the body if it moves, and else from that of the one which
-    /// touches it.
+    /// On it, the one touched first, and then the other: `count` of them are touched together. From the center of the body if it moves, and
+    /// else from that of the one which touches it.
     points: [Vec2; 2],
     count: usize,
     /// What stands out of a plane by less than this is not before it.
@@ -122,7 +124,9 @@ impl<'a> Face<'a> {
         };
         let (body, of, way, center) = if is_of_a { (b, a, 1.0, Vec2::ZERO) } else { (a, b, -1.0, contact.offset) };
         let normal = contact.normal * way;
-        let (touched, count) = touched_first(contact);
+        let kinds = [a, b].map(|body| setup.kind(tile.bodies.kind[body as usize]));
+        let touching = TOUCHING * scale_of(kinds.map(|kind| kind.bounding_radius));
+        let (touched, count) = touched_first(contact, touching);
         let points = touched.map(|point| point.anchor - normal * (0.5 * point.separation) - center);
         let kind = setup.kind(tile.bodies.kind[body as usize]);
         let face = Self {
@@ -146,7 +150,7 @@ impl<'a> Face<'a> {
         let points = points.map(|point| rotation.unrotate(point));
         // In a crowd who overlaps is not let go.
         let overlaps =
-            contacts.separation[number][..contact.point_count()].iter().any(|&separation| separation < -TOUCHING);
+            contacts.separation[number][..contact.point_count()].iter().any(|&separation| separation < -touching);
         let is_stood_on = face.is_stood_on || overlaps;
         Self { piece: Some(piece), normal: rotation.unrotate(normal), points, is_stood_on, ..face }
     }
@@ -174,14 +178,14 @@ impl<'a> Face<'a> {
     }
 }
 
-/// The points of a contact, that which is touched first before the other, and how many are touched as soon: what of an edge is yet to come down
-/// may come down elsewhere.
-fn touched_first(contact: &Contact) -> ([ContactPoint; 2], usize) {
+/// The points of a contact, the one touched first before the other, and how many are touched together, nearer to each other than what
+/// touches: what of an edge is yet to come down may come down elsewhere.
+fn touched_first(contact: &Contact, touching: f32) -> ([ContactPoint; 2], usize) {
     match contact.points {
         [one, _] if contact.point_count() == 1 => ([one; 2], 1),
         [one, two] => {
             let points = if two.separation < one.separation { [two, one] } else { [one, two] };
-            (points, if points[1].separation < points[0].separation + TOUCHING { 2 } else { 1 })
+            (points, if points[1].separation < points[0].separation + touching { 2 } else { 1 })
         }
     }
 }
@@ -257,7 +261,7 @@ fn mend_run(
     let stopped = |number: usize| all[number - run.start].as_ref();
     let order = |one: usize, two: usize| {
         let [one, two] = [one, two].map(|number| stopped(number).map_or([f32::INFINITY; 2], Stopped::order));
-        one[0].total_cmp(&two[0]).then(one[1].total_cmp(&two[1]))
+        touch::sooner(one, two)
     };
     let sooner = |one: &usize, two: &usize| order(*one, *two).then(one.cmp(two));
     let mut behind = Vec::new();

@@ -15,7 +15,7 @@ mod straight;
 use kept::is_shared;
 pub(super) use kept::{pressed, recycle};
 pub(super) use meeting::{Meeting, Met, meet};
-pub(super) use stopped::Stopped;
+pub(super) use stopped::{Stopped, sooner};
 pub(super) use straight::Course;
 
 use crate::collide::broad_phase::Pair;

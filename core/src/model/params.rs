@@ -1,7 +1,6 @@
 //! Every number that a step depends on, with unit, default and meaning.
 
 use crate::model::error::SetupError;
-use crate::model::path::Path;
 use glam::Vec2;
 
 /// When tiles speak to each other within a step.
@@ -96,6 +95,9 @@ pub enum Ghosts {
     /// Read-only: infinite mass, constant velocity (the report's). For comparison: it doubles border impulses.
     Frozen,
 }
+
+/// Along an axis, in m/s^2: what falls for long must have speeds that are numbers.
+const MOST_GRAVITY: f32 = 1e9;
 
 /// The parameters of a step. `Default` is the setting of the scenes: 60 Hz, 4 substeps, no gravity.
 #[derive(Clone, PartialEq, Debug)]
@@ -215,7 +217,7 @@ impl Params {
             |name, value: f32| require(name, value, value >= 0.0 && value.is_finite(), "at least 0 and finite");
         positive("dt", self.dt)?;
         require("substeps", self.substeps as f32, (1..=64).contains(&self.substeps), "within 1 to 64")?;
-        let is_gravity = self.gravity.is_finite() && f64::from(self.gravity.abs().max_element()) <= Path::FASTEST;
+        let is_gravity = self.gravity.is_finite() && self.gravity.abs().max_element() <= MOST_GRAVITY;
         require(
             "gravity",
             self.gravity.abs().max_element(),

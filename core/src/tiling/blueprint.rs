@@ -315,6 +315,11 @@ impl Setup {
         &self.kinds[kind.0 as usize]
     }
 
+    /// The row of the static of this kind, if it is one's.
+    pub(crate) fn row_of_static(&self, kind: KindId) -> Option<u32> {
+        kind.0.checked_sub(self.dynamic_kinds as u32)
+    }
+
     /// How much a body's AABB is grown on each side: as far as it may come within a step. That is limited, but for where it goes
     /// further by itself. In meters.
     #[inline(always)]

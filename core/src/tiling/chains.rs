@@ -12,7 +12,7 @@ const SAME: f32 = 1e-3;
 /// Segments whose rows follow each other, and loops.
 #[derive(Clone, Debug)]
 pub(crate) struct Chains {
-    /// The shortest that is in a hollow, in m; infinite if there is none.
+    /// The shortest beside which another leans in, in m; infinite if there is none.
     pub(crate) shortest_in_hollow: f32,
     /// The first and the last row of chains that lead back to where they begin, ascending.
     loops: Vec<[u32; 2]>,
@@ -56,7 +56,7 @@ impl<'a> Link<'a> {
     }
 
     /// The same, and nothing juts out between them.
-    pub(crate) fn is_level_with(&self, next: &Self) -> bool {
+    pub(crate) fn goes_on_with(&self, next: &Self) -> bool {
         self.side.end == Joint::Concave && next.side.start == Joint::Concave && self.leads_to(next)
     }
 }
@@ -80,23 +80,25 @@ impl Chains {
                 end(first, before, row);
                 first = link.map(|link| (row, link));
             }
-            before = link;
-            let is_hollow = |link: Link<'_>| [link.side.start, link.side.end].contains(&Joint::Concave);
-            if let Some(link) = link.filter(|&link| is_hollow(link)) {
-                chains.shortest_in_hollow = min(chains.shortest_in_hollow, link.length);
+            if let Some((link, before)) = link.zip(before)
+                && before.leads_to(&link)
+                && dot(link.normal, before.along) < 0.0
+            {
+                chains.shortest_in_hollow = min(chains.shortest_in_hollow, min(link.length, before.length));
             }
+            before = link;
         }
         end(first, before, kinds.len() as u32);
         chains
     }
 
     /// The row of what comes after that in a row, or before it, if they are of one chain.
-    pub(crate) fn neighbour_of(&self, row: u32, is_after: bool) -> Option<u32> {
-        let (end, begin) = if is_after { (1, 0) } else { (0, 1) };
+    pub(crate) fn neighbour_of(&self, row: u32, is_forward: bool) -> Option<u32> {
+        let (end, begin) = if is_forward { (1, 0) } else { (0, 1) };
         if let Ok(place) = self.loops.binary_search_by_key(&row, |ends| ends[end]) {
             return Some(self.loops[place][begin]);
         }
-        if is_after { row.checked_add(1) } else { row.checked_sub(1) }
+        if is_forward { row.checked_add(1) } else { row.checked_sub(1) }
     }
 }
 
@@ -138,6 +140,6 @@ mod tests {
         assert_eq!((chains.neighbour_of(0, false), chains.neighbour_of(4, false)), (None, Some(3)));
         assert_eq!(chains.shortest_in_hollow, 0.5);
         let links = [3, 4, 5].map(|row| Link::new(&kinds[row], &statics[row]).unwrap());
-        assert_eq!((links[1].is_level_with(&links[2]), links[0].is_level_with(&links[1])), (true, false));
+        assert_eq!((links[1].goes_on_with(&links[2]), links[0].goes_on_with(&links[1])), (true, false));
     }
 }

@@ -256,6 +256,17 @@ impl Tile {
         Some(first + statics.iter().position(|&name| name == id)?)
     }
 
+    /// Index into [`Tile::bodies`] of the static in a row of the setup, if the tile knows it in this step.
+    pub(crate) fn index_of_static(&self, row: u32, setup: &Setup) -> Option<usize> {
+        let first = self.owned + self.ghosts();
+        if let Ok(place) = self.statics.binary_search(&row) {
+            return Some(first + place);
+        }
+        // What only lies on somebody's way is behind those.
+        let (kind, rest) = (setup.statics.get(row as usize)?.kind, first + self.statics.len());
+        Some(rest + self.bodies.kind.get(rest..)?.iter().position(|&other| other == kind)?)
+    }
+
     /// The names of a contact's bodies, the lower first, and whether the slot order is the other way round.
     #[inline(always)]
     pub(crate) fn pair_of(&self, key: PairKey) -> (GlobalId, GlobalId) {

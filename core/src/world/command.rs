@@ -171,7 +171,9 @@ impl World {
         }
         after.angular_velocity = self.setup.kind(after.kind).turning(after.angular_velocity);
         match command {
-            _ if !after.is_finite() || is_too_fast(&after) => Err(SetupError::NotFinite { id: body.id }),
+            _ if !after.is_finite() || is_too_fast(&after) && !is_too_fast(&body) => {
+                Err(SetupError::NotFinite { id: body.id })
+            }
             Command::Force { .. } => Ok(body),
             _ => Ok(after),
         }

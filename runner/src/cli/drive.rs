@@ -199,6 +199,11 @@ mod tests {
         driver.lock().hear(1, "{\"until\": 0}".to_owned());
         assert_eq!(driver.next(0, Duration::from_secs(60)), Next::Announce);
         assert_eq!(driver.next(0, Duration::from_millis(1)), Next::Wait);
+        // One that goes on with a run begins later.
+        let resumed = Driver::default();
+        assert_eq!(resumed.next(5, Duration::from_secs(60)), Next::Announce);
+        resumed.lock().hear(1, "{\"until\": 5}".to_owned());
+        assert_eq!(resumed.next(5, Duration::from_secs(60)), Next::Announce);
         driver.lock().hear(1, "{\"until\": 7}".to_owned());
         assert!(!driver.calls(6) && driver.calls(7));
         assert_eq!(driver.next(0, Duration::ZERO), Next::GoOn);

@@ -111,22 +111,20 @@ impl Settings {
             ConfigError::UnknownKey { given, suggestion }
         };
         let sections = || keys.iter().map(|key| key.split_once('.').map_or(*key, |(section, _)| section));
-        let Value::Table(content) = content else {
-            if sections().any(|known| known == section) {
-                let given = Given { origin: Origin::File(file), key: section.to_owned(), value: one_line(&content) };
+        let is_known = sections().any(|known| known == section);
+        let content = match content {
+            Value::Table(content) if is_known => content,
+            Value::Table(_) => {
+                let suggestion = nearest(sections(), section).map(|word| format!("[{word}]"));
+                return Err(ConfigError::UnknownSection { file, section: section.to_owned(), suggestion });
+            }
+            value if is_known => {
+                let given = Given { origin: Origin::File(file), key: section.to_owned(), value: one_line(&value) };
                 let must = format!("a table; give its keys below a line [{section}]");
                 return Err(ConfigError::BadValue { given, must, suggestion: None });
             }
-            return Err(unknown(section.to_owned(), &content));
+            value => return Err(unknown(section.to_owned(), &value)),
         };
-        if !sections().any(|known| known == section) {
-            let suggestion = nearest(sections(), section).map(|word| format!("[{word}]"));
-            return Err(ConfigError::UnknownSection {
-                file: self.file.clone(),
-                section: section.to_owned(),
-                suggestion,
-            });
-        }
         for (name, value) in content {
             let path = format!("{section}.{name}");
             let key = keys.iter().find(|&&key| key == path).ok_or_else(|| unknown(path, &value))?;

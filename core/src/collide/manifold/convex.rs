@@ -12,9 +12,9 @@ use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::{Piece, Side};
 use glam::Vec2;
 
-/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. `scale` is that of their
-/// bodies ([`scale_of`](super::scale_of)). Where one is
-/// a segment of a chain, `lies` tells how far behind it the other may be that has lain on its face.
+/// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. `scale` is that
+/// of their bodies ([`scale_of`](super::scale_of)). Where one is a segment of a chain, `lies` tells how far behind it the other may be that
+/// has lain on its face.
 #[inline(never)]
 pub(in crate::collide) fn collide(
     [a, b]: [&Piece; 2],

@@ -174,3 +174,39 @@ impl Found {
         self.bodies.truncate(self.len);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::contact::Slot;
+    use proptest::prelude::*;
+
+    /// The key of body 0 and another.
+    fn key(other: u32) -> PairKey {
+        PairKey::new(Slot::from_index(0, 1000, 0), Slot::from_index(other as usize, 1000, 0))
+    }
+
+    proptest! {
+        /// As if all had been sorted.
+        #[test]
+        fn who_is_inserted_stands_where_its_key_does(others in proptest::collection::btree_set(1_u32..60, 0..40), new: [bool; 60]) {
+            let (new, known): (Vec<u32>, Vec<u32>) = others.iter().partition(|&&other| new[other as usize]);
+            let mut contacts = Contacts::default();
+            let mut cache = ContactCache::default();
+            for &other in &known {
+                cache.keys.push(key(other));
+                cache.contacts.push(Contact { offset: glam::Vec2::splat(other as f32), ..Contact::zeroed() });
+                contacts.separation.push([other as f32; 2]);
+                contacts.bodies.push([0, other]);
+            }
+            let found = |other: u32| (Contact { offset: glam::Vec2::splat(other as f32), ..Contact::zeroed() }, [other as f32; 2]);
+            let new = new.iter().map(|&other| New { key: key(other), bodies: [0, other], found: found(other) });
+            contacts.insert(new.collect(), &mut cache);
+            let all: Vec<u32> = others.into_iter().collect();
+            prop_assert_eq!(&cache.keys, &all.iter().map(|&other| key(other)).collect::<Vec<_>>());
+            prop_assert_eq!(&contacts.bodies, &all.iter().map(|&other| [0, other]).collect::<Vec<_>>());
+            prop_assert!(contacts.separation.iter().zip(&all).all(|(separation, &other)| separation[0] == other as f32));
+            prop_assert!(cache.contacts.iter().zip(&all).all(|(contact, &other)| contact.offset.x == other as f32));
+        }
+    }
+}

@@ -45,12 +45,14 @@ impl Stopped {
             return None;
         }
         let (at, ways, closing, order, separation, by);
-        if let Some(then) = pair.meets(dt, setup) {
-            (ways, closing) = pair.stop(&then)?;
+        if let Some(met) = pair.meets(dt, setup) {
+            let nearest = met.manifold.nearest()?;
+            let (speed, is_now) = (max(pair.closing(&met, nearest.anchor), 0.0), met.time == 0.0);
+            let left = if is_now || speed == 0.0 { 0.0 } else { nearest.separation / speed };
+            order = [met.time + left, if is_now { nearest.separation } else { 0.0 }];
+            let then = pair.over_corner(met);
             separation = then.manifold.nearest()?.separation;
-            let is_now = then.time == 0.0;
-            let left = if is_now || closing == 0.0 { 0.0 } else { separation / closing };
-            order = [then.time + left, if is_now { separation } else { 0.0 }];
+            (ways, closing) = pair.stop(&then)?;
             by = pair.contact(&then, Some(contact), setup);
             at = then;
         } else {
@@ -70,11 +72,6 @@ impl Stopped {
     /// Ascending from who stop each other first.
     pub(in crate::collide) fn order(&self) -> [f32; 2] {
         self.order
-    }
-
-    /// Who stop each other first.
-    pub(in crate::collide) fn sooner(&self, other: &Self) -> Ordering {
-        self.order[0].total_cmp(&other.order[0]).then(self.order[1].total_cmp(&other.order[1]))
     }
 
     /// How fast they came nearer as they touched, in m/s.
@@ -131,7 +128,7 @@ impl Stopped {
         }
         pair.offset += pair.out(self.lift);
         pair.between = pair.b.velocity - pair.a.velocity;
-        let at = pair.meets(max(setup.params.dt - self.time, 0.0), setup)?;
+        let at = pair.over_corner(pair.meets(max(setup.params.dt - self.time, 0.0), setup)?);
         let (found, mut separation) = pair.contact(&at, known, setup)?;
         // As the rows of the solver will see the first part of the way.
         let moved = dot(pair.offset - offset, found.normal);
@@ -146,8 +143,13 @@ impl Stopped {
     }
 }
 
+/// Which of two [orders](Stopped::order) is the sooner one.
+pub(in crate::collide) fn sooner(one: [f32; 2], other: [f32; 2]) -> Ordering {
+    one[0].total_cmp(&other[0]).then(one[1].total_cmp(&other[1]))
+}
+
 impl Approach<'_> {
-    /// The moment in which they touch, if that is within so many seconds; [over a corner](Self::over_corner) that one passes.
+    /// The moment in which they touch, if that is within so many seconds.
     fn meets(&self, dt: f32, setup: &Setup) -> Option<Moment> {
         let reach = setup.params.speculative_distance + self.far(dt);
         let mut at = self.at(0.0, reach);
@@ -158,7 +160,7 @@ impl Approach<'_> {
             let nearest = at.manifold.nearest()?.separation;
             let is_distance = at.manifold.is_distance();
             if nearest < near && !is_distance {
-                return Some(self.over_corner(at));
+                return Some(at);
             }
             let touches;
             (at, touches) = self.first_touch(&at, reach, dt);
@@ -166,7 +168,7 @@ impl Approach<'_> {
                 return None;
             }
             if is_straight {
-                return Some(self.over_corner(at));
+                return Some(at);
             }
         }
         None

@@ -316,6 +316,7 @@ fn what_cannot_be_done_changes_nothing() {
         (Command::Impulse { id, impulse: nan, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (Command::Force { id, force: nan, torque: 0.0, steps: 1 }, SetupError::NotFinite { id }),
         // What they lead to is not finite, or faster than anything may be.
+        (Command::Add(Body { velocity: Vec2::X * 2e9, ..bad }), SetupError::NotFinite { id: bad.id }),
         (Command::SetVelocity { id, velocity: Vec2::X * 2e9, angular_velocity: 0.0 }, SetupError::NotFinite { id }),
         (Command::Impulse { id, impulse: Vec2::X * 2e38, at: None, angular: 0.0 }, SetupError::NotFinite { id }),
         (

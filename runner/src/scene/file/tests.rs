@@ -331,6 +331,11 @@ fn a_scene_that_cannot_be_is_refused_in_one_line() {
         ("count = 3", "xxh3 = \"0\"", "[bodies], xxh3 = \"0\": must be 32 hexadecimal digits"),
         ("count = 3", "xxh3 = \"0123456789abcdef0123456789abcdef\"", "bodies.csv: its xxh3 is "),
         ("count = 3", "count = 3\ncount = 3", "world.toml, line 29: count is given twice"),
+        (
+            "count = 3",
+            "count = 99999999999999999999",
+            "world.toml, line 28: a whole number that 64 bits have room for must",
+        ),
         ("count = 3", "count = ", "world.toml, line 28: "),
         (
             "\n[[kinds]]\nname = \"crate\"",
