@@ -260,10 +260,30 @@ impl<'a> Approach<'a> {
         if has_short_edge && reach(0, across) + reach(1, -across) - dot(at.offset, across) > little {
             return at;
         }
-        let mut over = Manifold { normal: across, ..Manifold::EMPTY };
-        over.push(ManifoldPoint { separation: -overlap, ..one });
-        let over = Moment { manifold: over, ..at };
-        if self.closing(&over, one.anchor) < 0.25 * closing { over } else { at }
+        let over = |normal: Vec2, overlap: f32| {
+            let mut manifold = Manifold { normal, ..Manifold::EMPTY };
+            manifold.push(ManifoldPoint { separation: -overlap, ..one });
+            let over = Moment { manifold, ..at };
+            (self.closing(&over, one.anchor) < 0.25 * closing).then_some(over)
+        };
+        if let Some(over) = over(across, overlap) {
+            return over;
+        }
+        // Where corners are not square, it may be another face of one of them that is glided along: the one that it is least behind.
+        let (mut best, mut least) = (at, little);
+        for side in [0, 1] {
+            for face in pieces[side].outline.normals() {
+                let out = rotations[side].rotate(face);
+                let normal = if side == 0 { out } else { -out };
+                let overlap = reach(0, normal) + reach(1, -normal) - dot(at.offset, normal);
+                if overlap < least
+                    && let Some(over) = over(normal, overlap)
+                {
+                    (best, least) = (over, overlap);
+                }
+            }
+        }
+        best
     }
 
     /// Whether none of the pieces is a segment, which is solid from one side alone.
