@@ -45,7 +45,7 @@ pub(super) const ROUNDS: usize = 3;
 
 /// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m: of what is shorter by no
 /// more than a part, so as not to go past all of it.
-pub(super) const MORE_ROUNDS: usize = 12;
+pub(super) const MORE_ROUNDS: usize = 32;
 pub(super) const LEAST_WAY: f32 = 0.002;
 pub(super) const LEAST_PART: f32 = 0.5;
 
@@ -367,7 +367,9 @@ impl<'a> Approach<'a> {
             // What is apart along a direction stays so for as long as nothing moves further along it.
             let bound = -dot(self.between, at.manifold.normal) + sweep;
             let left = dt - at.time;
-            if bound * left < nearest.separation {
+            // Who is beside an end already may go away from that, and come to the face.
+            let is_beside = at.manifold.is_distance() && nearest.separation <= 0.0;
+            if bound * left < nearest.separation && !is_beside {
                 return (at, false);
             }
             if is_straight {
@@ -378,10 +380,10 @@ impl<'a> Approach<'a> {
             let closing = if is_let_through { bound } else { max(self.closing(&at, nearest.anchor), 0.0) };
             let speed = 0.5 * (bound + closing);
             // Who is let through may go away from where he is nearest, and still come to the face.
-            let speed = if speed > 0.0 { speed } else { dot(self.between, self.between).sqrt() + sweep };
-            let least = if at.manifold.is_distance() { self.least_way() } else { nearest.separation };
-            let way = max(nearest.separation, least);
-            at = self.at(at.time + min(way / speed, left), reach);
+            let whole = dot(self.between, self.between).sqrt() + sweep;
+            let time = nearest.separation / if speed > 0.0 { speed } else { whole };
+            let time = if at.manifold.is_distance() { max(time, self.least_way() / whole) } else { time };
+            at = self.at(at.time + min(time, left), reach);
             if at.manifold.is_distance() {
                 continue;
             }

@@ -334,8 +334,11 @@ impl<V: Wide> Pairs<V> {
     #[inline(always)]
     fn come_near(&self, at: &Moments<V>, dt: V) -> V {
         let (_, separation) = at.manifolds.least();
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let way = self.bound_along(at.manifolds.normal).mul(dt.sub(at.time));
-        less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
+        // Who is beside an end already may go away from that, and come to the face.
+        let is_beside = at.manifolds.tells.mul(separation.if_positive(zero, one));
+        less(way, separation).if_positive(zero, one).max(is_beside)
     }
 
     /// One for those of which one corner runs into another, at such a speed, that it overlaps by so little that it may pass over it: see
@@ -367,13 +370,14 @@ impl<V: Wide> Pairs<V> {
             // Half as if the fastest corner led, half as if the nearest point did; or all as if that corner did.
             let closing = self.closing(anchor, at.offset, at.manifolds.normal).max(zero);
             let closing = if S::OF_SEGMENTS { bound } else { closing };
-            let mut speed = V::splat(0.5).mul(bound.add(closing));
+            let speed = V::splat(0.5).mul(bound.add(closing));
+            let mut time = separation.div(speed);
             if S::OF_SEGMENTS {
                 let whole = self.between.dot(self.between).sqrt().add(self.sweep(0).add(self.sweep(1)));
-                speed = speed.if_positive(speed, whole);
+                time = separation.div(speed.if_positive(speed, whole));
+                time = at.manifolds.tells.if_positive(time.max(shapes.least_way().div(whole)), time);
             }
-            let way = at.manifolds.tells.if_positive(separation.max(shapes.least_way()), separation);
-            let next = self.moments(shapes, at.time.add(way.div(speed).min(left)), reach);
+            let next = self.moments(shapes, at.time.add(time.min(left)), reach);
             at = Moments::pick(going, &next, &at);
             going = going.mul(at.manifolds.some);
             let (_, separation) = at.manifolds.least();
