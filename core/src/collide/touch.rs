@@ -45,7 +45,7 @@ pub(super) const ROUNDS: usize = 3;
 
 /// The same against segments of chains; and how far it goes there, at least, past ends where nothing touches, in m: of what is shorter by no
 /// more than a part, so as not to go past all of it.
-pub(super) const MORE_ROUNDS: usize = 32;
+pub(super) const MORE_ROUNDS: usize = 12;
 pub(super) const LEAST_WAY: f32 = 0.002;
 pub(super) const LEAST_PART: f32 = 0.5;
 
@@ -367,9 +367,7 @@ impl<'a> Approach<'a> {
             // What is apart along a direction stays so for as long as nothing moves further along it.
             let bound = -dot(self.between, at.manifold.normal) + sweep;
             let left = dt - at.time;
-            // Who is beside an end already may go away from that, and come to the face.
-            let is_beside = at.manifold.is_distance() && nearest.separation <= 0.0;
-            if bound * left < nearest.separation && !is_beside {
+            if bound * left < nearest.separation {
                 return (at, false);
             }
             if is_straight {

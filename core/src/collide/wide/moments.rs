@@ -334,11 +334,8 @@ impl<V: Wide> Pairs<V> {
     #[inline(always)]
     fn come_near(&self, at: &Moments<V>, dt: V) -> V {
         let (_, separation) = at.manifolds.least();
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let way = self.bound_along(at.manifolds.normal).mul(dt.sub(at.time));
-        // Who is beside an end already may go away from that, and come to the face.
-        let is_beside = at.manifolds.tells.mul(separation.if_positive(zero, one));
-        less(way, separation).if_positive(zero, one).max(is_beside)
+        less(way, separation).if_positive(V::splat(0.0), V::splat(1.0))
     }
 
     /// One for those of which one corner runs into another, at such a speed, that it overlaps by so little that it may pass over it: see
