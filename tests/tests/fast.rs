@@ -486,6 +486,30 @@ fn chains_hold_small_bodies_however_finely_they_are_cut() {
     }
 }
 
+/// Defect: what came down at a slant stepped over segments shorter than itself, as a step of the search was as long as the way was slanting.
+#[test]
+fn chains_hold_what_comes_down_at_a_slant() {
+    for (radius, length, speed, slant) in [(0.01_f32, 0.005_f32, 20.0_f32, 0.1_f32), (0.002, 0.002, 5.0, 0.3)] {
+        let mut scene = Scene { half: DVec2::new(6.0, 2.0), ..Scene::new(DVec2::ZERO, 0.0) };
+        let corner = |i: u32| Vec2::new(length * i as f32 - 5.0, 0.0);
+        for i in 1..(10.0 / length) as u32 {
+            scene.segment(DVec2::ZERO, [corner(i), corner(i + 1)], [Some(corner(i - 1)), Some(corner(i + 2))]);
+        }
+        let kind = scene.kind(Shape::circle(radius), Material { friction: 0.0, ..Material::default() });
+        let way = Rot::from_angle(-slant).rotate(Vec2::X) * speed;
+        let all: Vec<GlobalId> = (0..80_u64)
+            .map(|k| {
+                let above = f64::from(way.y.abs()) / 60.0 * noise(3, k);
+                scene.body(kind, DVec2::new(0.1 * k as f64 - 4.0, f64::from(radius) + above), way)
+            })
+            .collect();
+        let mut sim = scene.start_on((1, 1), Exchange::Step);
+        sim.run(3);
+        let through = all.iter().filter(|&&id| sim.body(id).position.y < 0.0).count();
+        assert_eq!(through, 0, "discs of {radius} m through segments of {length} m");
+    }
+}
+
 /// Segments that are shorter than what goes along them does in a step do not hold it one after the other; nor where it goes through several tiles in a
 /// step, and lies beyond those that know its segments.
 #[test]
