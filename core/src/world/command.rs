@@ -139,7 +139,14 @@ impl World {
                 if self.setup.has_kind(kind) { Ok(()) } else { Err(SetupError::BadBody { id, fault }) }
             }
             Command::AddKind(ref kind) => self.setup.check_kind(kind),
-            Command::SetGravity(gravity) => Params { gravity, ..self.setup.params.clone() }.check(),
+            Command::SetGravity(gravity) => {
+                let value = f64::from(gravity.abs().max_element());
+                if value > MOST_GRAVITY {
+                    let must = "at most 1e9 m/s^2 along an axis";
+                    return Err(SetupError::BadParam { name: "gravity", value, must });
+                }
+                Params { gravity, ..self.setup.params.clone() }.check()
+            }
             Command::Remove(_) | Command::Wake(_) => Ok(()),
         }
     }
@@ -191,6 +198,9 @@ impl World {
         Ok(true)
     }
 }
+
+/// Gravity that comes while a run goes on, along an axis, in m/s^2: what falls for long must have speeds that are numbers.
+const MOST_GRAVITY: f64 = 1e9;
 
 /// Whether it goes or turns faster than anything here may.
 fn is_too_fast(body: &Body) -> bool {
