@@ -32,7 +32,7 @@ fn what_is_flat_slides_over_the_seams_of_a_floor() {
     ];
     let triangle = polygon(&[(-0.25, 0.0), (0.0, -1.0), (0.25, 0.0)]);
     for (floor, width) in [(Shape::rectangle(1.3, 1.0), 1.3), (Shape::rectangle(0.5, 1.0), 0.5), (triangle, 0.5)] {
-        for speed in [0.5, 2.0, 10.0, 20.0] {
+        for speed in [0.5, 2.0, 5.0, 12.0, 20.0] {
             let mut scene = Scene { half: DVec2::splat(100.0), ..Scene::new(MIDDLE, -10.0) };
             let kinds = shapes.clone().map(|shape| scene.kind(shape, smooth));
             let place = |k: u64| MIDDLE + DVec2::new(20.0 * (k % 7) as f64 - 70.0, 3.0 * (k / 7) as f64);

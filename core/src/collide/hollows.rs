@@ -7,7 +7,7 @@
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::{Contacts, New};
 use crate::collide::touch::{self, Stopped, sooner};
-use crate::model::contact::{PairKey, Slot, SlotKind};
+use crate::model::contact::{PairKey, Slot};
 use crate::model::kind::Form;
 use crate::model::math::{dot, max};
 use crate::tiling::blueprint::Setup;
@@ -33,8 +33,7 @@ pub(crate) fn follow(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let (mut found, mut first) = (Vec::new(), 0);
     while first < tile.contacts.len() {
         let key = tile.contacts.keys[first];
-        let is_of_one =
-            |other: &PairKey| other.low() == key.low() && matches!(other.high().kind(), SlotKind::Static(_));
+        let is_of_one = |other: &PairKey| other.low() == key.low() && other.is_with_static();
         let count = tile.contacts.keys[first..].iter().take_while(|&other| is_of_one(other)).count();
         follow_run(tile, contacts, first..first + count, setup, &mut found);
         first += count.max(1);

@@ -8,7 +8,7 @@
 use crate::collide::manifold::scale_of;
 use crate::collide::narrow_phase::Contacts;
 use crate::collide::touch::{self, Stopped, TOUCHING};
-use crate::model::contact::{Contact, ContactPoint, PairKey, SlotKind};
+use crate::model::contact::{Contact, ContactPoint, PairKey};
 use crate::model::kind::{Form, KindRow};
 use crate::model::math::{dot, max, min};
 use crate::model::piece::Piece;
@@ -34,8 +34,8 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
         let (key, bodies) = (tile.contacts.keys[run.start], contacts.bodies[run.start]);
         let kinds = bodies.map(|body| setup.kind(tile.bodies.kind[body as usize]));
         // Who goes no further passes over corners that lie no deeper in it.
-        let touching = TOUCHING * scale_of(kinds.map(|kind| kind.bounding_radius));
-        let may_catch = || is_with_static(key) || touch::far(tile, bodies, setup) >= touching;
+        let touching = || TOUCHING * scale_of(kinds.map(|kind| kind.bounding_radius));
+        let may_catch = || key.is_with_static() || touch::far(tile, bodies, setup) >= touching();
         if may_be_behind(&tile.contacts.contacts[run.clone()], key, kinds) && may_catch() {
             mend_run(tile, contacts, (run, surfaces(key, kinds)), setup, &mut gone);
         }
@@ -49,15 +49,10 @@ pub(crate) fn mend(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
 /// former are a body's last.
 fn next_of_several(tile: &Tile, from: usize) -> Option<Range<usize>> {
     let keys = &tile.contacts.keys[from..];
-    let are_of_one = |one: &PairKey, two: &PairKey| one.low() == two.low() && (one == two || is_with_static(*one));
+    let are_of_one = |one: &PairKey, two: &PairKey| one.low() == two.low() && (one == two || one.is_with_static());
     let first = keys.windows(2).position(|two| are_of_one(&two[0], &two[1]))?;
     let count = keys[first..].iter().take_while(|key| are_of_one(&keys[first], key)).count();
     Some(from + first..from + first + count)
-}
-
-/// Whether one of the bodies is a static.
-fn is_with_static(key: PairKey) -> bool {
-    matches!(key.high().kind(), SlotKind::Static(_))
 }
 
 /// Whose surface it is that is touched.
@@ -71,7 +66,7 @@ enum Surface {
 
 /// On whose surfaces a run of contacts is looked at, from the names and the kinds of the first two.
 fn surfaces(key: PairKey, kinds: [&KindRow; 2]) -> &'static [Surface] {
-    match (is_with_static(key), kinds.map(KindRow::is_compound)) {
+    match (key.is_with_static(), kinds.map(KindRow::is_compound)) {
         (true, _) => &[Surface::Static],
         (_, [true, true]) => &[Surface::A, Surface::B],
         (_, [true, false]) => &[Surface::A],

@@ -202,6 +202,12 @@ impl PairKey {
         matches!(self.low().kind(), SlotKind::Owned(_))
     }
 
+    /// Whether the higher one is a static.
+    #[inline(always)]
+    pub(crate) fn is_with_static(self) -> bool {
+        matches!(self.high().kind(), SlotKind::Static(_))
+    }
+
     /// Whether the bodies belong to two tiles, of which this is one: then both remember the contact.
     #[inline(always)]
     pub(crate) fn is_border(self) -> bool {

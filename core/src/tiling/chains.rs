@@ -76,12 +76,12 @@ impl Chains {
         };
         for ((row, kind), body) in (0..).zip(kinds).zip(statics) {
             let link = Link::new(kind, body);
-            if !link.zip(before).is_some_and(|(link, before)| before.leads_to(&link)) {
+            let joined = link.zip(before).filter(|(link, before)| before.leads_to(link));
+            if joined.is_none() {
                 end(first, before, row);
                 first = link.map(|link| (row, link));
             }
-            if let Some((link, before)) = link.zip(before)
-                && before.leads_to(&link)
+            if let Some((link, before)) = joined
                 && dot(link.normal, before.along) < 0.0
             {
                 chains.shortest_in_hollow = min(chains.shortest_in_hollow, min(link.length, before.length));
@@ -92,7 +92,7 @@ impl Chains {
         chains
     }
 
-    /// The row of what comes after that in a row, or before it, if they are of one chain.
+    /// The row of what comes after that in a row, or before it, if they are of one chain: whether they are, where they lie tells.
     pub(crate) fn neighbour_of(&self, row: u32, is_forward: bool) -> Option<u32> {
         let (end, begin) = if is_forward { (1, 0) } else { (0, 1) };
         if let Ok(place) = self.loops.binary_search_by_key(&row, |ends| ends[end]) {

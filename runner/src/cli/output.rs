@@ -45,16 +45,26 @@ impl Kept<'_> {
         &self,
         options: impl IntoIterator<Item = (&'static str, Option<&'a Path>)>,
     ) -> Result<(), RunError> {
-        for (option, path) in options {
-            if let Some((path, what)) = path.and_then(|path| Some((path, self.at(path)?))) {
+        let given: Vec<_> = options.into_iter().filter_map(|(option, path)| Some((option, path?))).collect();
+        let scenes = if given.is_empty() { Vec::new() } else { self.scenes() };
+        for (option, path) in given {
+            if let Some(what) = self.at(path, &scenes) {
                 return Err(RunError::TakenOutput { option, path: path.to_owned(), what });
             }
         }
         Ok(())
     }
 
+    /// Where the files of scenes are, also of those of runs that are there.
+    fn scenes(&self) -> Vec<PathBuf> {
+        let begun =
+            self.runs.iter().filter_map(|run| Config::load_begun(&RunFolder::new("", run).configuration()).ok());
+        let of_runs = begun.flat_map(|config| config.scene_files());
+        self.scene.iter().cloned().chain(of_runs).filter_map(|file| file.canonicalize().ok()).collect()
+    }
+
     /// What is to be kept at a path, if anything is. Where the path's folder is not there, nothing is.
-    fn at(&self, path: &Path) -> Option<String> {
+    fn at(&self, path: &Path, scenes: &[PathBuf]) -> Option<String> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // The name itself, and what it leads to.
         let named = folder.canonicalize().ok().zip(path.file_name()).map(|(folder, name)| folder.join(name));
@@ -66,12 +76,7 @@ impl Kept<'_> {
         if self.commands.and_then(|file| file.canonicalize().ok()).is_some_and(|file| places.contains(&file)) {
             return Some("the file of this run's commands".to_owned());
         }
-        let begun =
-            self.runs.iter().filter_map(|run| Config::load_begun(&RunFolder::new("", run).configuration()).ok());
-        let of_runs: Vec<PathBuf> = begun.flat_map(|config| config.scene_files()).collect();
-        let scene: Vec<PathBuf> =
-            self.scene.iter().chain(&of_runs).filter_map(|file| file.canonicalize().ok()).collect();
-        if places.iter().any(|place| scene.contains(place)) {
+        if places.iter().any(|place| scenes.contains(place)) {
             return Some("a file of the scene of this run".to_owned());
         }
         let runs: Vec<PathBuf> = self.runs.iter().filter_map(|run| run.canonicalize().ok()).collect();

@@ -69,6 +69,7 @@ fn what_cannot_be_read_is_told_in_one_line() {
     for (text, expected) in [
         ("", "EOF while parsing a value, at column 0"),
         ("{", "EOF while parsing an object"),
+        ("[1]", "a list stands where an object, {...} must"),
         (r#"[{"step": 1, "remove": 3}]"#, "a list stands where an object, {...} must: each"),
         ("3", "3 stands where an object, {...} must"),
         (r#"{"step": 1, "impulse": 3}"#, "3 stands where an object, {...} must"),
