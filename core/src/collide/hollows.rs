@@ -13,6 +13,7 @@ use crate::model::math::{dot, max};
 use crate::tiling::blueprint::Setup;
 use crate::tiling::chains::Link;
 use crate::tiling::tile::{Fastest, Tile};
+use std::iter::successors;
 use std::ops::Range;
 
 /// Segments after the first one, at most.
@@ -30,15 +31,20 @@ pub(crate) fn follow(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     if !any_may_pass(tile, setup) {
         return;
     }
-    let (mut found, mut first) = (Vec::new(), 0);
+    let (mut found, mut orders, mut first) = (Vec::new(), Vec::new(), 0);
     while first < tile.contacts.len() {
         let key = tile.contacts.keys[first];
         let is_of_one = |other: &PairKey| other.low() == key.low() && other.is_with_static();
         let count = tile.contacts.keys[first..].iter().take_while(|&other| is_of_one(other)).count();
-        follow_run(tile, contacts, first..first + count, setup, &mut found);
+        follow_run(tile, contacts, first..first + count, setup, &mut found, &mut orders);
         first += count.max(1);
     }
     contacts.insert(found, &mut tile.contacts);
+    let keys = &tile.contacts.keys;
+    let places = |key: &PairKey| {
+        keys.partition_point(|other| other < key) as u32..keys.partition_point(|other| other <= key) as u32
+    };
+    contacts.turns.extend(orders.iter().map(|order: &Vec<PairKey>| order.iter().flat_map(places).collect()));
 }
 
 /// Whether a body may go further than a segment of a hollow is long: looser than what is asked of each.
@@ -48,8 +54,16 @@ fn any_may_pass(tile: &Tile, setup: &Setup) -> bool {
     shortest.is_finite() && (setup.any_drives() || far > shortest)
 }
 
-/// Looks for those of one body, whose contacts with statics these are.
-fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup, found: &mut Vec<New>) {
+/// Looks for those of one body, whose contacts with statics these are; and the order in which it comes to them, if it is not that of their
+/// names: whoever is turned by the last one first loses more.
+fn follow_run(
+    tile: &Tile,
+    contacts: &Contacts,
+    run: Range<usize>,
+    setup: &Setup,
+    found: &mut Vec<New>,
+    orders: &mut Vec<Vec<PairKey>>,
+) {
     let met = run.clone().filter_map(|number| {
         let (key, pair) = (tile.contacts.keys[number], contacts.bodies[number]);
         let row = key.high().index(tile.owned, tile.ghosts());
@@ -76,6 +90,17 @@ fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup
     let (place, grown) =
         (tile.bodies.position[body as usize], setup.grown_half_extents(&tile.bodies.get(body as usize)));
     let (low, high) = (place - grown.as_dvec2(), place + grown.as_dvec2());
+    let key_of = |ground: &Ground<'_>| {
+        let slot = Slot::from_index(ground.row, tile.owned, tile.ghosts());
+        PairKey::new(tile.contacts.keys[number].low(), slot)
+    };
+    let is_known = |key: &PairKey| tile.contacts.keys[run.clone()].binary_search(key).is_ok();
+    let turns_by = |ground: &Ground<'_>| dot(ground.link.normal, first.link.normal);
+    // First those that it leaves.
+    let behind = successors(Some(first), |here| here.next(tile, !is_forward, setup));
+    let near = behind.take(MOST).take_while(|ground| turns_by(ground) >= LEAST_COSINE);
+    let mut order: Vec<PairKey> = near.map(|ground| key_of(&ground)).take_while(is_known).collect();
+    order.reverse();
     // From the far end of the first to the near one of the next.
     let (mut here, mut length) = (first, 0.0);
     for _ in 0..MOST {
@@ -83,25 +108,29 @@ fn follow_run(tile: &Tile, contacts: &Contacts, run: Range<usize>, setup: &Setup
         let next = here.next(tile, is_forward, setup).filter(|next| next.link.meets(low, high));
         let Some(next) = next else { break };
         let lengthened = next.link.piece.lengthened(!is_forward, length);
-        let turned = dot(next.link.normal, first.link.normal);
         let lean = dot(next.link.normal, first.link.along) * if is_forward { -1.0 } else { 1.0 };
-        if length - first.link.length > far || turned < LEAST_COSINE || lean < -SLOPE {
+        if length - first.link.length > far || turns_by(&next) < LEAST_COSINE || lean < -SLOPE {
             break;
         }
-        let slot = Slot::from_index(next.row, tile.owned, tile.ghosts());
-        let key = PairKey::new(tile.contacts.keys[number].low(), slot);
-        let is_known = || tile.contacts.keys[run.clone()].binary_search(&key).is_ok();
+        let (key, is_known) = (key_of(&next), is_known(&key_of(&next)));
         let touches = || setup.kind(tile.bodies.kind[next.row]).touches(setup.kind(tile.bodies.kind[body as usize]));
         // What is level it touches on its free way, or not at all.
-        if lean > SLOPE && !is_known() && touches() {
+        if lean > SLOPE && !is_known && touches() {
             let bodies = next.pair_with(tile, body);
             let numbers = bodies.map(|row| if row == body { piece } else { 0 });
             let new = stopped.touch_segment(tile, (bodies, numbers), &lengthened, setup);
             found.extend(new.map(|found| New { key, bodies, found }));
         }
+        // Of a loop that is all but flat, some might come twice.
+        if (is_known || found.last().is_some_and(|new| new.key == key)) && !order.contains(&key) {
+            order.push(key);
+        }
         here = next;
     }
     found[begin..].sort_by_key(|new| new.key);
+    if !order.is_sorted() {
+        orders.push(order);
+    }
 }
 
 /// Whether two bodies bounce off each other rather than that one glides on.

@@ -2,7 +2,7 @@
 
 use super::batches::Batches;
 use super::index::SolverIndex;
-use crate::collide::broad_phase::Pair;
+use crate::collide::narrow_phase::Contacts;
 use crate::parallel::team::Team;
 
 /// Colors that are told apart by a bit of a mask. The contacts beyond, of a body with more contacts than this, are the
@@ -22,7 +22,8 @@ pub(crate) struct Coloring {
 impl Coloring {
     /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet. `place` gives for
     /// each body of the tile its place among the solver's.
-    pub(crate) fn color(&mut self, batches: &Batches, contacts: &[Pair], place: &[SolverIndex], team: Team) {
+    pub(crate) fn color(&mut self, batches: &Batches, contacts: &Contacts, place: &[SolverIndex], team: Team) {
+        let Contacts { bodies: contacts, turns, .. } = contacts;
         self.taken.clear();
         self.taken.resize(batches.all.last().map_or(0, |batch| batch.bodies.end), 0);
         self.color.clear();
@@ -53,6 +54,25 @@ impl Coloring {
             each.for_each(color_batch);
         } else {
             team.for_each(each.by_ref().collect(), color_batch);
+        }
+        self.take_turns(batches, turns);
+    }
+
+    /// Deals the colors of some contacts of one body with statics to these in turn: in a mirror image the order of statics is another,
+    /// and that in which a body comes to them is not.
+    fn take_turns(&mut self, batches: &Batches, turns: &[Vec<u32>]) {
+        if turns.is_empty() {
+            return;
+        }
+        // Those that sleep are in no batch.
+        let mut places = vec![u32::MAX; batches.contacts.iter().max().map_or(0, |&most| most as usize + 1)];
+        (0..).zip(&batches.contacts).for_each(|(place, &contact)| places[contact as usize] = place);
+        for turn in turns {
+            let places =
+                turn.iter().filter_map(|&contact| places.get(contact as usize)).filter(|&&place| place != u32::MAX);
+            let mut colors: Vec<u8> = places.clone().map(|&place| self.color[place as usize]).collect();
+            colors.sort_unstable();
+            places.zip(colors).for_each(|(&place, color)| self.color[place as usize] = color);
         }
     }
 }

@@ -153,7 +153,7 @@ impl Solver {
     /// Colors the contacts and gives each its place, as long as they do not have both. Returns how many colors there are.
     pub(crate) fn color(&mut self, tile: &Tile, contacts: &Contacts, team: Team) -> u64 {
         if self.colors == 0 {
-            self.coloring.color(&self.batches, &contacts.bodies, self.bodies.places(), team);
+            self.coloring.color(&self.batches, contacts, self.bodies.places(), team);
         }
         let known = &tile.contacts.contacts;
         if self.colors == 0 || !self.groups.fit(known) {

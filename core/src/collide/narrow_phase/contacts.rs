@@ -14,14 +14,24 @@ pub(crate) struct Contacts {
     pub(crate) separation: Vec<[f32; 2]>,
     /// The indices of body A, the one with the lower GlobalId, and body B.
     pub(crate) bodies: Vec<Pair>,
-    /// The same of those that were found before.
-    pub(super) before: Vec<Pair>,
+    /// The places of those that a body has with statics, where it comes to them in another order than theirs: in this one they are solved.
+    pub(crate) turns: Vec<Vec<u32>>,
+    /// The bodies of those that were found before, and whether any of these had another order.
+    before: Vec<Pair>,
+    had_turns: bool,
 }
 
 impl Contacts {
-    /// Whether they are between the same bodies as those that were found before, as what rests has them.
+    /// Before others are found.
+    pub(super) fn begin(&mut self) {
+        std::mem::swap(&mut self.bodies, &mut self.before);
+        self.had_turns = !self.turns.is_empty();
+        self.turns.clear();
+    }
+
+    /// Whether they are between the same bodies as those that were found before, and solved in the same order, as what rests has them.
     pub(crate) fn are_between_the_same(&self) -> bool {
-        self.bodies == self.before
+        self.bodies == self.before && self.turns.is_empty() && !self.had_turns
     }
 
     /// Puts together what was found in several parts, one after another.

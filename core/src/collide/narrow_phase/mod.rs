@@ -60,7 +60,7 @@ impl NarrowPhase {
         self.sorted.find(tile, proxies, candidates, setup, team);
         self.mark_newcomers(tile);
         self.boxes.place(tile, self.sorted.pairs(), setup, team);
-        std::mem::swap(&mut contacts.bodies, &mut contacts.before);
+        contacts.begin();
         let Self { sorted, by_name, boxes, found, parts } = self;
         let (sorted, among) = (sorted.pairs(), FindAmong { sorted: sorted.pairs(), by_name, boxes, tile, setup });
         if team.pieces(sorted.len(), GRAIN) > 1 {
