@@ -30,7 +30,7 @@ impl AnswersFile {
     /// said until then stays, and what comes after is said again. A path of `-` is standard output.
     ///
     /// # Errors
-    /// What the system says.
+    /// What the system says; [`InvalidData`](ErrorKind::InvalidData) of a file to be continued that has other lines than answers.
     pub(crate) fn open(path: &Path, from: u64, is_begun: bool) -> io::Result<Self> {
         if path == Path::new("-") {
             return Ok(Self { path: PathBuf::from("standard output"), to: To::Stdout(io::stdout()) });
@@ -49,13 +49,21 @@ impl AnswersFile {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(String::new()),
             text => text?,
         };
-        let stays = |line: &&str| {
-            let head: Result<Head, _> = serde_json::from_str(line);
-            let is_event = |head: &Head| head.began.is_some() || head.entered.is_some();
-            line.ends_with('\n')
-                && head.is_ok_and(|head| head.step < from || head.step == from && (is_begun || is_event(&head)))
-        };
-        Ok(text.split_inclusive('\n').take_while(stays).collect())
+        let mut kept = String::new();
+        for (line, number) in text.split_inclusive('\n').zip(1..) {
+            // A run that was killed may have been writing the last one.
+            let Ok(head) = serde_json::from_str::<Head>(line) else {
+                if line.ends_with('\n') {
+                    return Err(io::Error::new(ErrorKind::InvalidData, format!("line {number} is no answer")));
+                }
+                break;
+            };
+            let is_event = head.began.is_some() || head.entered.is_some();
+            if line.ends_with('\n') && (head.step < from || head.step == from && (is_begun || is_event)) {
+                kept.push_str(line);
+            }
+        }
+        Ok(kept)
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -90,6 +98,8 @@ mod tests {
         let mut file = AnswersFile::open(&path, 5, false).unwrap();
         file.add("{\"step\":5}\n").unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), [said.concat(), "{\"step\":5}\n".to_owned()].concat());
+        std::fs::write(&path, "What to buy\n- bread").unwrap();
+        assert_eq!(AnswersFile::open(&path, 5, false).err().unwrap().to_string(), "line 1 is no answer");
         drop(AnswersFile::open(&path, 0, false).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
     }
