@@ -136,7 +136,7 @@ fn follow_run(
 /// Whether two bodies bounce off each other rather than that one glides on.
 fn bounces(tile: &Tile, pair: Pair, stopped: &Stopped, setup: &Setup) -> bool {
     let restitution = pair.map(|body| setup.kind(tile.bodies.kind[body as usize]).material.restitution);
-    max(restitution[0], restitution[1]) > 0.0 && stopped.closing() > setup.params.restitution_threshold
+    max(restitution[0], restitution[1]) > 0.0 && stopped.closing() > setup.params.least_bounce()
 }
 
 /// A segment among the bodies of a tile.

@@ -1,6 +1,7 @@
 //! Every number that a step depends on, with unit, default and meaning.
 
 use crate::model::error::SetupError;
+use crate::model::math::max;
 use glam::Vec2;
 
 /// When tiles speak to each other within a step.
@@ -206,7 +207,15 @@ impl Default for Params {
     }
 }
 
+/// Nothing bounces that comes nearer at less than this, in m/s: bodies at rest that touch have such speeds, and pass on a blow.
+const SLIGHT: f32 = 1e-5;
+
 impl Params {
+    /// What bounces comes nearer at more than this, in m/s.
+    pub(crate) fn least_bounce(&self) -> f32 {
+        max(self.restitution_threshold, SLIGHT)
+    }
+
     /// Refuses what no step can be made with.
     pub fn check(&self) -> Result<(), SetupError> {
         let positive = |name, value: f32| require(name, value, value > 0.0 && value.is_finite(), "positive and finite");

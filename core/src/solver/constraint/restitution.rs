@@ -22,9 +22,6 @@ const PASSES_OFF_STATICS: usize = 200;
 /// The part of the speed at which a contact closed that a pass may leave wrong.
 const EXACT: f32 = 1e-5;
 
-/// Nothing bounces that comes nearer at less than this, in m/s: bodies at rest that touch have such speeds, and pass on a blow.
-const SLIGHT: f32 = 1e-5;
-
 /// What takes so many times the speed at which bodies came nearer is more than that takes, however the solver rounds.
 const SURELY: f32 = 1.001;
 
@@ -42,7 +39,7 @@ impl Groups {
         self.bouncing.clear();
         self.bounces_at_once.clear();
         self.energies.clear();
-        let threshold = max(source.setup.params.restitution_threshold, SLIGHT);
+        let threshold = source.setup.params.least_bounce();
         for (i, contact) in source.tile.contacts.contacts.iter().enumerate() {
             let kinds = source.kinds_of(i);
             let restitution = max(kinds[0].material.restitution, kinds[1].material.restitution);
