@@ -21,6 +21,9 @@ pub(in crate::collide) const FAR: f32 = 0.05;
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
 pub(in crate::collide) const BEYOND: f32 = 1e-5;
 
+/// What comes out at a joint along a normal that is turned by more than this from that of a segment does not touch it there, in rad.
+pub(in crate::collide) const ASLANT: f32 = 0.01;
+
 /// How far the whole of a piece may be behind a segment that it lies on, in m; none for one that does not.
 pub(in crate::collide) type Lies = Option<f32>;
 
@@ -82,8 +85,8 @@ pub(super) fn collide(
         return over;
     }
     let (mut touched, mut nearest): (AtEnd, AtEnd) = (None, None);
-    // How far from a joint what comes out there rather along the normal of the next segment.
-    let mut beyond = f32::NEG_INFINITY;
+    // How far from a joint what comes out there rather along the normal of the next segment; and where it does along its own.
+    let (mut beyond, mut leaves) = (f32::NEG_INFINITY, [false; 2]);
     for (number, end, joint) in [(0, from, side.start), (1, to, side.end)] {
         let (outward, distance, _) = other.nearest(end);
         let normal = -outward;
@@ -92,8 +95,11 @@ pub(super) fn collide(
         let may = match joint {
             Joint::Free(limit) => is_out(limit) && is_between(normal, [n, limit], [far, -far]),
             Joint::Convex { normal: limit, is_end } => {
-                if turned(n, normal, limit) >= far && dot(normal, limit) >= dot(normal, n) {
+                let turn = turned(n, normal, limit);
+                if turn >= far && dot(normal, limit) >= dot(normal, n) {
                     beyond = max(beyond, distance);
+                } else {
+                    leaves[number as usize] = turn >= ASLANT && lowest <= radius && distance > lowest;
                 }
                 is_end && is_out(limit) && is_between(normal, [n, limit], [far, far])
             }
@@ -111,9 +117,11 @@ pub(super) fn collide(
         }
     }
     let is_far = |manifold: &Manifold| manifold.nearest().is_some_and(|nearest| nearest.separation > FAR);
+    // There the next segment has it, or this one from the joint.
+    let over = over.and_then(|over| over.without(|anchor| is_at_left_end(dot(anchor - from, along), length, leaves)));
     match (over, touched.filter(|(_, at_end)| !is_far(at_end)), nearest) {
         // What lies over an edge is deep in the wall below it, and touches what is before the edge.
-        (Some(_), None, Some((_, nearest))) if lowest <= 0.0 && beyond > lowest => nearest,
+        (Some(_), None, Some((_, nearest))) if lowest <= radius && beyond > lowest => nearest,
         // Both are ways out.
         (Some(over), Some((distance, at_end)), _) => {
             if lowest <= 0.0 && distance <= lowest {
@@ -129,6 +137,11 @@ pub(super) fn collide(
         (None, None, Some((_, nearest))) => nearest,
         (None, None, None) => touched.map_or(Manifold::EMPTY, |(_, at_end)| at_end),
     }
+}
+
+/// Whether a place along a segment is an end that something leaves.
+fn is_at_left_end(place: f32, length: f32, [start, end]: [bool; 2]) -> bool {
+    start && place <= BEYOND * length || end && place >= length - BEYOND * length
 }
 
 /// Whether the corners and edges of a piece come between the ends of a segment at one of some heights over it. The segment is told by where it

@@ -46,6 +46,19 @@ impl<V: Wide> Manifolds<V> {
         }
     }
 
+    /// The same without the points that are gone, where these are positive.
+    #[inline(always)]
+    pub(super) fn without(&self, gone: [V; 2]) -> Self {
+        let zero = V::splat(0.0);
+        let left = Self {
+            two: gone[0].max(gone[1]).if_positive(zero, self.two),
+            some: gone[0].if_positive(gone[1].if_positive(zero, self.two), self.some),
+            ..*self
+        };
+        let second = Self::single(left.some, self.normal, self.anchor[1], self.separation[1], self.feature[1]);
+        Self::pick(gone[0], &second, &left)
+    }
+
     /// Anchor and separation of the point with the least.
     #[inline(always)]
     pub(super) fn nearest(&self) -> (Vectors<V>, V) {

@@ -6,7 +6,7 @@ use super::moments::{Points, Search, Shaped, Shapes, WidePieces};
 use super::outlines::{Face, Polygon, WideOutlines, clip};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::chain::{BEYOND, FAR, Lies, SAME};
+use crate::collide::manifold::chain::{ASLANT, BEYOND, FAR, Lies, SAME};
 use crate::collide::touch::{LEAST_PART, LEAST_WAY, lies};
 use crate::model::contact::Contact;
 use crate::model::piece::{Joint, Piece};
@@ -302,6 +302,14 @@ impl<V: Wide> Segments<V> {
         found
     }
 
+    /// Whether a point is an end that something leaves.
+    #[inline(always)]
+    fn is_at_left_end(&self, point: Vectors<V>, [start, end]: [V; 2]) -> V {
+        let place = point.minus(self.ends[0]).dot(self.along);
+        let margin = V::splat(BEYOND).mul(self.length);
+        start.mul(at_least(margin, place)).max(end.mul(at_least(place, self.length.sub(margin))))
+    }
+
     /// The same of those whose ends count, from the direction and the distance of the piece at these; `over` is what is along the normal.
     #[inline(always)]
     fn at_ends(
@@ -315,8 +323,9 @@ impl<V: Wide> Segments<V> {
         let n = self.n;
         let (zero, half) = (V::splat(0.0), V::splat(0.5));
         let (mut touched, mut nearest) = (AtEnd::none(), AtEnd::none());
-        // How far from a joint what comes out there rather along the normal of the next segment.
-        let mut beyond = V::splat(f32::NEG_INFINITY);
+        let is_near = at_least(self.radius, lowest);
+        // How far from a joint what comes out there rather along the normal of the next segment; and where it does along its own.
+        let (mut beyond, mut leaves) = (V::splat(f32::NEG_INFINITY), [zero; 2]);
         let far = single.if_positive(zero, V::splat(SAME));
         for (number, (&end, joint)) in self.ends.iter().zip(&self.joints).enumerate() {
             let (outward, distance) = nearest_at[number];
@@ -325,6 +334,8 @@ impl<V: Wide> Segments<V> {
             let from_n = turned(n, normal, limit);
             let goes_on = at_least(from_n, far).mul(at_least(normal.dot(limit), normal.dot(n)));
             beyond = goes_on.mul(joint.juts_out).if_positive(beyond.max(distance), beyond);
+            let is_aslant = at_least(from_n, V::splat(ASLANT)).mul(is_near).mul(less(lowest, distance));
+            leaves[number] = goes_on.if_positive(zero, is_aslant.mul(joint.juts_out));
             let is_out = is_before.max(at_least(center.minus(end).dot(limit), zero));
             let from_limit = joint.juts_out.if_positive(far, zero.sub(far));
             let is_between = at_least(from_n, far).mul(at_least(turned(limit, normal, n), from_limit));
@@ -337,17 +348,19 @@ impl<V: Wide> Segments<V> {
             // Whoever is on the solid side, but for a joint, is let through.
             nearest.take(is_before, distance, &found);
         }
+        // There the next segment has it, or this one from the joint.
+        let over =
+            &over.without([self.is_at_left_end(over.anchor[0], leaves), self.is_at_left_end(over.anchor[1], leaves)]);
         let (has_over, has_nearest) = (over.some, nearest.found.some);
         let is_touched = touched.found.some.mul(not(is_far(&touched.found)));
-        let is_deep = at_least(zero, lowest);
         // What lies over an edge is deep in the wall below it, and touches what is before the edge; and along the segment's normal what
         // reaches beyond it may be nearer than what is over it.
-        let is_below = is_deep.mul(less(lowest, beyond));
+        let is_below = is_near.mul(less(lowest, beyond));
         let is_nearer = is_far(over).mul(is_far(&nearest.found));
         let only_nearest = not(is_touched).mul(has_nearest);
         let tells = only_nearest.mul(has_over.if_positive(is_below.max(is_nearer), V::splat(1.0)));
         // Both are ways out.
-        let is_way_out = has_over.mul(is_deep).mul(at_least(lowest, touched.distance));
+        let is_way_out = has_over.mul(at_least(zero, lowest)).mul(at_least(lowest, touched.distance));
         let takes_over = has_over.mul(not(is_touched).max(is_way_out));
         let found = Manifolds::pick(takes_over, over, &touched.found);
         let mut found = Manifolds::pick(tells, &nearest.found, &found);
