@@ -4,16 +4,13 @@
 //! All are rounded: a disc is a corner, a capsule a line, each with a radius around it. Sources as for boxes (`box_box.rs`); the radius
 //! around polygons as in Box2D (E. Catto).
 
-use super::box_box::PREFERENCE;
+use super::box_box::{EQUAL, PREFERENCE};
 use super::chain::{self, Lies};
 use super::{Manifold, ManifoldPoint};
 use crate::model::convex::Convex;
 use crate::model::math::{Rot, clamp, dot, min};
 use crate::model::piece::{Piece, Side};
 use glam::Vec2;
-
-/// Faces look at each other whose normals have a lesser cosine.
-pub(in crate::collide) const OPPOSED: f32 = -0.9;
 
 /// The manifold of two pieces whose surfaces are nearer than `reach`, of B at `offset` from A; further ones may give none. `scale` is that
 /// of their bodies ([`scale_of`](super::scale_of)). Where one is a segment of a chain, `lies` tells how far behind it the other may be that
@@ -71,10 +68,8 @@ fn polygons(a: &Convex, b: &Convex, [radius_a, radius_b]: [f32; 2], (reach, scal
         return Manifold::EMPTY;
     }
     let overlap = most_a <= 0.0 && most_b <= 0.0;
-    // Who is apart along the one's face alone is measured from that, if the other does not look at it.
-    let is_aside = || dot(a.normal(face_a), b.normal(face_b)) > OPPOSED;
-    let is_of_b = most_b > most_a + PREFERENCE * scale || (most_a <= 0.0 && most_b > 0.0 && is_aside());
-    let found = if is_of_b {
+    let are_equal = dot(a.normal(face_a), b.normal(face_b)) < -EQUAL;
+    let found = if most_b > most_a + if are_equal { PREFERENCE * scale } else { 0.0 } {
         against_face(b, face_b, a, (most_b, overlap), [radius_b, radius_a], true).map(Manifold::turned_round)
     } else {
         against_face(a, face_a, b, (most_a, overlap), [radius_a, radius_b], false)

@@ -13,6 +13,9 @@ use std::cmp::Ordering;
 /// A search for a touch is begun so often, at most.
 const SEARCHES: usize = 8;
 
+/// Who is held off a surface by more than this is not held off it on a bow, in m.
+const MOST_BOW: f32 = 0.008;
+
 /// How two bodies go on from the moment in which they touch: along each other, as if both were smooth and nothing bounced.
 pub(in crate::collide) struct Stopped {
     /// That moment, from now, in s, as near as it was looked for; now, if they do not touch within the step.
@@ -65,7 +68,12 @@ impl Stopped {
             order = [f32::INFINITY, separation];
             by = None;
         }
-        let lift = pair.out(at.manifold.normal) * max(2.0 * pair.scale() * NEAR - separation, 0.0);
+        // Who turns as he glides along comes down on a bow, and not straight.
+        let sinks = |way: &Way| (cross(way.velocity, at.manifold.normal) * way.angular_velocity).abs();
+        let bow = max(sinks(&ways[0]), sinks(&ways[1])) * (dt - at.time) * (dt - at.time);
+        let scale = pair.scale();
+        let above = scale * (2.0 * NEAR) + min(bow, scale * MOST_BOW);
+        let lift = pair.out(at.manifold.normal) * max(above - separation, 0.0);
         Some(Self { time: at.time, order, closing, lift, ways, by })
     }
 

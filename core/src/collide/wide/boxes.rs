@@ -4,7 +4,7 @@ use super::manifolds::Manifolds;
 use super::moments::{Points, Search, Shaped, Shapes};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::box_box::PREFERENCE;
+use crate::collide::manifold::box_box::{EQUAL, PREFERENCE};
 use crate::model::contact::Contact;
 use crate::parallel::lanes::Wide;
 use crate::parallel::vectors::{Vectors, absolute, less, negated};
@@ -64,7 +64,11 @@ impl<V: Wide> Shapes<V> for Boxes {
         let (most_a, most_b) = (along_a.x.max(along_a.y), along_b.x.max(along_b.y));
         let beyond = less(reach, most_a).max(less(reach, most_b));
         // The reference box, at the origin and unturned, and the incident box.
-        let from_b = less(most_a.add(V::splat(PREFERENCE).mul(pairs.scale())), most_b);
+        let [of_x_a, of_x_b] = [less(along_a.y, along_a.x), less(along_b.y, along_b.x)];
+        let are_of_one_axis = of_x_a.if_positive(of_x_b, one.sub(of_x_b));
+        let cosine = are_of_one_axis.if_positive(absolute(turn.x), absolute(turn.y));
+        let preference = less(V::splat(EQUAL), cosine).if_positive(V::splat(PREFERENCE).mul(pairs.scale()), zero);
+        let from_b = less(most_a.add(preference), most_b);
         let reference = Vectors::pick(from_b, pairs.half[1], pairs.half[0]);
         let incident = Vectors::pick(from_b, pairs.half[0], pairs.half[1]);
         let turn = Vectors::new(turn.x, from_b.if_positive(negated(turn.y), turn.y));

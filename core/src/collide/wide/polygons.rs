@@ -5,9 +5,8 @@ use super::moments::{Points, Search, Shaped, Shapes, WidePieces};
 use super::outlines::{Face, Polygon, WideOutlines, clip};
 use super::pairs::{Pairs, WidePairs};
 use crate::collide::broad_phase::Pair;
-use crate::collide::manifold::box_box::PREFERENCE;
+use crate::collide::manifold::box_box::{EQUAL, PREFERENCE};
 use crate::collide::manifold::chain::Lies;
-use crate::collide::manifold::convex::OPPOSED;
 use crate::model::contact::Contact;
 use crate::model::piece::Piece;
 use crate::parallel::lanes::Wide;
@@ -117,10 +116,9 @@ impl<V: Wide> Shapes<V> for Polygons<V> {
         let rounding = pairs.radius[0].add(pairs.radius[1]);
         let (face_a, face_b) = (a.separate(b), b.separate(a));
         let beyond = less(reach, face_a.figure.sub(rounding)).max(less(reach, face_b.figure.sub(rounding)));
-        let is_aside = less(V::splat(OPPOSED), face_a.normal.dot(face_b.normal));
-        let is_apart_in_b = face_b.figure.if_positive(face_a.figure.if_positive(zero, one), zero);
-        let from_b = less(face_a.figure.add(V::splat(PREFERENCE).mul(pairs.scale())), face_b.figure);
-        let from_b = from_b.max(is_apart_in_b.mul(is_aside));
+        let are_equal = less(face_a.normal.dot(face_b.normal), V::splat(-EQUAL));
+        let preference = are_equal.if_positive(V::splat(PREFERENCE).mul(pairs.scale()), zero);
+        let from_b = less(face_a.figure.add(preference), face_b.figure);
         let reference = Face::pick(from_b, &face_b, &face_a);
         let (height, n) = (reference.figure, reference.normal);
         // The edge of the other that looks most against it.
