@@ -251,8 +251,14 @@ fn mend_run(
     if !all.any(|(surface, face)| surface.firsts(face).next().is_some()) {
         return;
     }
+    let stop = |number: usize| Stopped::new(tile, (contacts.bodies[number], &tile.contacts.contacts[number]), setup);
+    let mut all: Vec<Option<Stopped>> = run.clone().map(stop).collect();
+    let of_statics = tile.contacts.keys[run.start].is_with_static();
+    if of_statics && hold_at_corners(tile, contacts, run.clone(), &mut all, setup) {
+        let faces = run.clone().map(|number| Face::new(tile, contacts, number, Surface::Static, setup));
+        surfaces = vec![Touched::new(faces.collect())];
+    }
     let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
-    let all: Vec<Option<Stopped>> = run.clone().map(|number| Stopped::new(tile, contact(number), setup)).collect();
     let stopped = |number: usize| all[number - run.start].as_ref();
     let order = |one: usize, two: usize| {
         let [one, two] = [one, two].map(|number| stopped(number).map_or([f32::INFINITY; 2], Stopped::order));
@@ -287,4 +293,43 @@ fn mend_run(
             None => gone.push(other),
         }
     }
+}
+
+/// Holds those that would pass over the corner of a static into another of a run's, which goes on there. Whether there is any.
+fn hold_at_corners(
+    tile: &mut Tile,
+    contacts: &mut Contacts,
+    run: Range<usize>,
+    all: &mut [Option<Stopped>],
+    setup: &Setup,
+) -> bool {
+    let passes = |number: &usize| all[number - run.start].as_ref().is_some_and(Stopped::passes);
+    let into_another = |&number: &usize| {
+        let face = Face::new(tile, contacts, number, Surface::Static, setup);
+        let beyond = face.points[0] + face.normal * (2.0 * face.level);
+        run.clone().any(|other| other != number && is_in_static(tile, contacts, other, (beyond, face.level), setup))
+    };
+    let held = run.clone().filter(passes).filter(into_another).filter_map(|number| {
+        let of = (contacts.bodies[number], &tile.contacts.contacts[number]);
+        let stopped = Stopped::at_corner(tile, of, setup)?;
+        stopped.by().map(|by| (number, stopped, by))
+    });
+    let held: Vec<_> = held.collect();
+    let is_any = !held.is_empty();
+    for (number, stopped, by) in held {
+        (tile.contacts.contacts[number], contacts.separation[number]) = by;
+        all[number - run.start] = Some(stopped);
+    }
+    is_any
+}
+
+/// Whether a point, from the center of the body, is in the static of a contact, or nearer to it than so much.
+fn is_in_static(tile: &Tile, contacts: &Contacts, number: usize, (point, near): (Vec2, f32), setup: &Setup) -> bool {
+    let (pair, numbers) = (contacts.bodies[number], tile.contacts.contacts[number].piece_numbers());
+    let side = usize::from(pair[1] as usize >= tile.owned + tile.ghosts());
+    let [of, body] = [pair[side], pair[1 - side]].map(|row| row as usize);
+    let piece = &setup.kind(tile.bodies.kind[of]).pieces[numbers[side]];
+    let center = (tile.bodies.position[of] - tile.bodies.position[body]).as_vec2();
+    let seen = tile.bodies.rotation[of].unrotate(point - center);
+    piece.side.is_none() && piece.outline.nearest(seen).1 <= piece.radius + near
 }

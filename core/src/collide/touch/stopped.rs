@@ -13,7 +13,7 @@ use std::cmp::Ordering;
 /// A search for a touch is begun so often, at most.
 const SEARCHES: usize = 8;
 
-/// Who is held off a surface by more than this is not held off it on a bow, in m.
+/// A bow leads no further off a straight way than this, in m.
 const MOST_BOW: f32 = 0.008;
 
 /// How two bodies go on from the moment in which they touch: along each other, as if both were smooth and nothing bounced.
@@ -30,6 +30,8 @@ pub(in crate::collide) struct Stopped {
     ways: [Way; 2],
     /// The contact that stops them, and the separation of its points now.
     by: Option<(Contact, [f32; 2])>,
+    /// Whether a corner [passes over](Approach::over_corner) another.
+    passes: bool,
 }
 
 /// How a body moves on.
@@ -41,19 +43,29 @@ struct Way {
 
 impl Stopped {
     /// The bodies of a pair that has such a contact. None where nothing is known of them.
-    pub(in crate::collide) fn new(tile: &Tile, (bodies, contact): (Pair, &Contact), setup: &Setup) -> Option<Self> {
+    pub(in crate::collide) fn new(tile: &Tile, of: (Pair, &Contact), setup: &Setup) -> Option<Self> {
+        Self::look(tile, of, true, setup)
+    }
+
+    /// The same where no corner passes over another.
+    pub(in crate::collide) fn at_corner(tile: &Tile, of: (Pair, &Contact), setup: &Setup) -> Option<Self> {
+        Self::look(tile, of, false, setup)
+    }
+
+    fn look(tile: &Tile, (bodies, contact): (Pair, &Contact), may_pass: bool, setup: &Setup) -> Option<Self> {
         let (pair, dt) = (Approach::of_pieces(tile, bodies, contact.piece_numbers(), setup), setup.params.dt);
         // Speeds that overflow tell of no other moment.
         if !pair.far(dt).is_finite() {
             return None;
         }
-        let (at, ways, closing, order, separation, by);
+        let (at, ways, closing, order, separation, by, passes);
         if let Some(met) = pair.meets(dt, setup) {
             let nearest = met.manifold.nearest()?;
             let (speed, is_now) = (max(pair.closing(&met, nearest.anchor), 0.0), met.time == 0.0);
             let left = if is_now || speed == 0.0 { 0.0 } else { nearest.separation / speed };
             order = [met.time + left, if is_now { nearest.separation } else { 0.0 }];
-            let then = pair.over_corner(met);
+            let then = if may_pass { pair.over_corner(met) } else { met };
+            passes = then.manifold.normal != met.manifold.normal;
             separation = then.manifold.nearest()?.separation;
             (ways, closing) = pair.stop(&then)?;
             by = pair.contact(&then, Some(contact), setup);
@@ -66,7 +78,7 @@ impl Stopped {
             ways = pair.ways();
             closing = 0.0;
             order = [f32::INFINITY, separation];
-            by = None;
+            (by, passes) = (None, false);
         }
         // Who turns as he glides along comes down on a bow, and not straight.
         let sinks = |way: &Way| (cross(way.velocity, at.manifold.normal) * way.angular_velocity).abs();
@@ -74,7 +86,7 @@ impl Stopped {
         let scale = pair.scale();
         let above = scale * (2.0 * NEAR) + min(bow, scale * MOST_BOW);
         let lift = pair.out(at.manifold.normal) * max(above - separation, 0.0);
-        Some(Self { time: at.time, order, closing, lift, ways, by })
+        Some(Self { time: at.time, order, closing, lift, ways, by, passes })
     }
 
     /// Ascending from who stop each other first.
@@ -85,6 +97,11 @@ impl Stopped {
     /// How fast they came nearer as they touched, in m/s.
     pub(in crate::collide) fn closing(&self) -> f32 {
         self.closing
+    }
+
+    /// Whether a corner passes over another, as if there were nothing beside it.
+    pub(in crate::collide) fn passes(&self) -> bool {
+        self.passes
     }
 
     /// The velocity from then on of the one that moves, where the other is a static, in m/s.
