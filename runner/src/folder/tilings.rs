@@ -142,7 +142,10 @@ impl Tilings {
         // A run that was killed may leave half of a line.
         let bad = text.split_inclusive('\n').nth(all.len()).filter(|line| line.ends_with('\n') || is_empty);
         let bad = bad.map(|_| format!("line {} cannot be read", all.len() + 1));
-        let damage = missing.or(bad).or_else(|| is_empty.then(|| "it is empty".to_owned()));
+        // As where it was lost, and the run went on.
+        let late =
+            all.first().filter(|(after, _)| *after > 0).map(|(after, _)| format!("it begins after step {after}"));
+        let damage = missing.or(bad).or_else(|| is_empty.then(|| "it is empty".to_owned())).or(late);
         Self { all, damage: damage.map(|reason| told(path, &reason)) }
     }
 
@@ -232,6 +235,9 @@ mod tests {
         TilingsFile::start(path.clone(), &all[3], Some(64)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"{\"after\":0,\"levels\":\"aa\"}\n\xff\n");
         assert!(damage().unwrap().contains("line 2 cannot be read"));
+        fs::remove_file(&path).unwrap();
+        TilingsFile::start(path.clone(), &all[3], Some(64)).unwrap();
+        assert!(damage().unwrap().contains("tilings.jsonl: it begins after step 64, so tiles"));
         fs::write(&path, "{\"after\":0,\"levels\":\"q\"}\n").unwrap();
         assert!(damage().unwrap().contains("line 1 cannot be read, so tiles are not shown as they were"));
     }

@@ -5,6 +5,7 @@ use crate::config::{OutputConfig, TransportKind};
 use crate::folder::Ended;
 use atoll_core::{Blueprint, Exchange, Ghosts, Kind, Shape, TileId};
 use glam::Vec2;
+use std::path::Path;
 use std::thread;
 
 /// From this restitution on, what exchange "step" gets wrong at borders is more than a bounce loses.
@@ -58,10 +59,21 @@ impl Plan {
                 None => format!("{folder} holds no complete snapshot yet: beginning anew"),
             }
         }));
-        let lost = goes_on.map(|output| output.folder.log()).filter(|log| !log.exists());
-        notes.extend(lost.zip(self.found.snapshots.first()).map(|(log, snapshot)| {
-            format!("{} is not there: its rows begin after step {}", log.display(), snapshot.step())
-        }));
+        let partition = &self.blueprint.partition;
+        let follow = partition.levels().is_some() || partition.cuts().is_some();
+        if let Some((output, snapshot)) = goes_on.zip(self.found.snapshots.first()) {
+            let tilings = follow.then(|| (output.folder.tilings(), "its tiles begin"));
+            let answers = self.commands.answers.clone().filter(|path| path != Path::new("-"));
+            let answers = answers.map(|path| (path, "its answers begin"));
+            for (path, what) in [(output.folder.log(), "its rows begin")].into_iter().chain(tilings).chain(answers) {
+                let is = match path.metadata() {
+                    Err(_) => "is not there",
+                    Ok(metadata) if metadata.is_file() && metadata.len() == 0 => "is empty",
+                    Ok(_) => continue,
+                };
+                notes.push(format!("{} {is}: {what} after step {}", path.display(), snapshot.step()));
+            }
+        }
         notes
     }
 }
