@@ -121,8 +121,7 @@ fn follow_run(
             let new = stopped.touch_segment(tile, (bodies, numbers), &lengthened, setup);
             found.extend(new.map(|found| New { key, bodies, found }));
         }
-        // Of a loop that is all but flat, some might come twice.
-        if (is_known || found.last().is_some_and(|new| new.key == key)) && !order.contains(&key) {
+        if is_known || found.last().is_some_and(|new| new.key == key) {
             order.push(key);
         }
         here = next;

@@ -303,7 +303,7 @@ fn hold_at_corners(
     all: &mut [Option<Stopped>],
     setup: &Setup,
 ) -> bool {
-    let passes = |number: &usize| all[number - run.start].as_ref().is_some_and(Stopped::passes);
+    let passes = |number: &usize| all[number - run.start].as_ref().is_some_and(Stopped::passes_over_corner);
     let into_another = |&number: &usize| {
         let face = Face::new(tile, contacts, number, Surface::Static, setup);
         let beyond = face.points[0] + face.normal * (2.0 * face.level);

@@ -4,13 +4,14 @@ use super::batches::Batches;
 use super::index::SolverIndex;
 use crate::collide::narrow_phase::Contacts;
 use crate::parallel::team::Team;
+use std::collections::BTreeSet;
 
 /// Colors that are told apart by a bit of a mask. The contacts beyond, of a body with more contacts than this, are the
-/// overflow: each is a color of its own.
+/// overflow: each is a color of its own, in their order.
 pub(crate) const COLORS: usize = 64;
 
-/// The color of each contact, `COLORS` for the overflow. An island's colors are a function of its contacts and their
-/// canonical order alone, whatever batch it is in.
+/// The color of each contact, `COLORS` for the overflow. An island's colors are a function of its contacts, their
+/// canonical order and the turns that bodies take alone, whatever batch it is in.
 #[derive(Default, Debug)]
 pub(crate) struct Coloring {
     /// In the order of [`Batches::contacts`].
@@ -23,7 +24,7 @@ impl Coloring {
     /// Gives each contact, in canonical order, the lowest color that neither of its bodies has yet. `place` gives for
     /// each body of the tile its place among the solver's.
     pub(crate) fn color(&mut self, batches: &Batches, contacts: &Contacts, place: &[SolverIndex], team: Team) {
-        let Contacts { bodies: contacts, turns, .. } = contacts;
+        let Contacts { bodies, turns, .. } = contacts;
         self.taken.clear();
         self.taken.resize(batches.all.last().map_or(0, |batch| batch.bodies.end), 0);
         self.color.clear();
@@ -40,7 +41,7 @@ impl Coloring {
             const STATICS: u32 = 0;
             let local = |body: u32| place[body as usize].within(base, STATICS) as usize;
             for (&contact, color) in own.iter().zip(color) {
-                let [a, b] = contacts[contact as usize].map(local);
+                let [a, b] = bodies[contact as usize].map(local);
                 let free = (taken[a] | taken[b]).trailing_ones();
                 if free < COLORS as u32 {
                     taken[a] |= 1 << free;
@@ -59,7 +60,7 @@ impl Coloring {
     }
 
     /// Deals the colors of some contacts of one body with statics to these in turn: in a mirror image the order of statics is another,
-    /// and that in which a body comes to them is not.
+    /// and that in which a body comes to them is not. What overflows stays in its order.
     fn take_turns(&mut self, batches: &Batches, turns: &[Vec<u32>]) {
         if turns.is_empty() {
             return;
@@ -70,6 +71,7 @@ impl Coloring {
         for turn in turns {
             let places =
                 turn.iter().filter_map(|&contact| places.get(contact as usize)).filter(|&&place| place != u32::MAX);
+            debug_assert!(turn.iter().collect::<BTreeSet<_>>().len() == turn.len(), "each has one color");
             let mut colors: Vec<u8> = places.clone().map(|&place| self.color[place as usize]).collect();
             colors.sort_unstable();
             places.zip(colors).for_each(|(&place, color)| self.color[place as usize] = color);

@@ -9,6 +9,7 @@
 //! # Order
 //!
 //! Contacts are colored greedily in canonical order; contacts of one color share no body and fill groups of sixteen lanes.
+//! Who comes to many segments of a hollow has their colors in the order in which it does (see [`Contacts::turns`]).
 //! An island's colors follow from its contacts alone, and islands share nothing. So the order in which any body meets
 //! its contacts does not depend on how islands are put into batches, on lanes, or on threads: `serial`, `islands`,
 //! `coloring` and `auto` give the same bits.

@@ -52,11 +52,10 @@ impl AnswersFile {
         let mut kept = String::new();
         for (line, number) in text.split_inclusive('\n').zip(1..) {
             // A run that was killed may have been writing the last one.
-            let Ok(head) = serde_json::from_str::<Head>(line) else {
-                if line.ends_with('\n') {
-                    return Err(io::Error::new(ErrorKind::InvalidData, format!("line {number} is no answer")));
-                }
-                break;
+            let head = match serde_json::from_str::<Head>(line) {
+                Ok(head) => head,
+                Err(error) if error.is_eof() && !line.ends_with('\n') => break,
+                Err(_) => return Err(io::Error::new(ErrorKind::InvalidData, format!("line {number} is no answer"))),
             };
             let is_event = head.began.is_some() || head.entered.is_some();
             if line.ends_with('\n') && (head.step < from || head.step == from && (is_begun || is_event)) {
@@ -98,8 +97,10 @@ mod tests {
         let mut file = AnswersFile::open(&path, 5, false).unwrap();
         file.add("{\"step\":5}\n").unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), [said.concat(), "{\"step\":5}\n".to_owned()].concat());
-        std::fs::write(&path, "What to buy\n- bread").unwrap();
-        assert_eq!(AnswersFile::open(&path, 5, false).err().unwrap().to_string(), "line 1 is no answer");
+        for foreign in ["What to buy\n- bread", "What to buy"] {
+            std::fs::write(&path, foreign).unwrap();
+            assert_eq!(AnswersFile::open(&path, 5, false).err().unwrap().to_string(), "line 1 is no answer");
+        }
         drop(AnswersFile::open(&path, 0, false).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
     }

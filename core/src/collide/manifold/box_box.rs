@@ -8,7 +8,7 @@ use super::{Manifold, ManifoldPoint};
 use crate::model::math::{Rot, clamp, dot, min};
 use glam::Vec2;
 
-/// A face of B becomes the reference only if it separates by so much more than one of A, in meters (a quarter of the length below which two
+/// A face of B becomes the reference only if it separates by so much more than an [equal](EQUAL) one of A, in meters (a quarter of the length below which two
 /// surfaces touch; of small bodies a part, see [`scale_of`](super::scale_of)): keeps the choice from flickering between two equal faces.
 pub(in crate::collide) const PREFERENCE: f32 = 0.0005;
 

@@ -21,7 +21,7 @@ pub(in crate::collide) const FAR: f32 = 0.05;
 /// A segment reaches so much further than it is long, as part of its length: rounding leaves no gap at a joint.
 pub(in crate::collide) const BEYOND: f32 = 1e-5;
 
-/// What comes out at a joint along a normal that is turned by more than this from that of a segment does not touch it there, in rad.
+/// What comes out at a joint along a normal that is turned by more than this from that of a segment does not touch it there: the sine.
 pub(in crate::collide) const ASLANT: f32 = 0.01;
 
 /// How far the whole of a piece may be behind a segment that it lies on, in m; none for one that does not.
@@ -56,7 +56,8 @@ pub(super) fn collide(
     let is_over = (0.0..=length).contains(&dot(corner - from, along));
     let is_center_over = (0.0..=length).contains(&dot(center - from, along));
     let is_pressed = is_center_over && lies.is_some_and(|most| highest + radius >= -most);
-    let is_before = is_pressed || dot(center - from, n) >= 0.0;
+    let is_in_front = dot(center - from, n) >= 0.0;
+    let is_before = is_pressed || is_in_front;
     // A round one with an edge that leans out beyond the end comes down with the edge's other corner.
     let of_lowest = || is_over.then(|| of_corner(corner, lowest, n, radius, 1 << 9 | number));
     let over = is_before.then(|| against_face(own, n, other, radius).or_else(of_lowest)).flatten();
@@ -99,7 +100,7 @@ pub(super) fn collide(
                 if turn >= far && dot(normal, limit) >= dot(normal, n) {
                     beyond = max(beyond, distance);
                 } else {
-                    leaves[number as usize] = turn >= ASLANT && lowest <= radius && distance > lowest;
+                    leaves[number as usize] = is_in_front && turn >= ASLANT && lowest <= radius && distance > lowest;
                 }
                 is_end && is_out(limit) && is_between(normal, [n, limit], [far, far])
             }
@@ -120,7 +121,7 @@ pub(super) fn collide(
     // There the next segment has it, or this one from the joint.
     let over = over.and_then(|over| over.without(|anchor| is_at_left_end(dot(anchor - from, along), length, leaves)));
     match (over, touched.filter(|(_, at_end)| !is_far(at_end)), nearest) {
-        // What lies over an edge is deep in the wall below it, and touches what is before the edge.
+        // What lies over an edge is deep in the wall below it, or within its rounding, and touches what is before the edge.
         (Some(_), None, Some((_, nearest))) if lowest <= radius && beyond > lowest => nearest,
         // Both are ways out.
         (Some(over), Some((distance, at_end)), _) => {

@@ -77,7 +77,7 @@ impl Manifold {
     }
 
     /// The same without the points with some anchors, if any is left.
-    fn without(self, is_gone: impl Fn(Vec2) -> bool) -> Option<Self> {
+    pub(super) fn without(self, is_gone: impl Fn(Vec2) -> bool) -> Option<Self> {
         let mut left = Self { count: 0, ..self };
         self.points().iter().filter(|point| !is_gone(point.anchor)).for_each(|&point| left.push(point));
         (left.count > 0).then_some(left)

@@ -13,7 +13,7 @@ use std::cmp::Ordering;
 /// A search for a touch is begun so often, at most.
 const SEARCHES: usize = 8;
 
-/// A bow leads no further off a straight way than this, in m.
+/// A bow leads no further off a straight way than this, in m; of small bodies less, see [`scale_of`](crate::collide::manifold::scale_of).
 const MOST_BOW: f32 = 0.008;
 
 /// How two bodies go on from the moment in which they touch: along each other, as if both were smooth and nothing bounced.
@@ -100,7 +100,7 @@ impl Stopped {
     }
 
     /// Whether a corner passes over another, as if there were nothing beside it.
-    pub(in crate::collide) fn passes(&self) -> bool {
+    pub(in crate::collide) fn passes_over_corner(&self) -> bool {
         self.passes
     }
 

@@ -49,10 +49,11 @@ impl<V: Wide> Manifolds<V> {
     /// The same without the points that are gone, where these are positive.
     #[inline(always)]
     pub(super) fn without(&self, gone: [V; 2]) -> Self {
-        let zero = V::splat(0.0);
+        // Of what is not there at all there is no second one either.
+        let (zero, two) = (V::splat(0.0), self.two.mul(self.some));
         let left = Self {
-            two: gone[0].max(gone[1]).if_positive(zero, self.two),
-            some: gone[0].if_positive(gone[1].if_positive(zero, self.two), self.some),
+            two: gone[0].max(gone[1]).if_positive(zero, two),
+            some: gone[0].if_positive(gone[1].if_positive(zero, two), self.some),
             ..*self
         };
         let second = Self::single(left.some, self.normal, self.anchor[1], self.separation[1], self.feature[1]);
@@ -71,5 +72,56 @@ impl<V: Wide> Manifolds<V> {
     pub(super) fn least(&self) -> (V, V) {
         let second = self.two.mul(less(self.separation[1], self.separation[0]));
         (second, second.if_positive(self.separation[1], self.separation[0]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::manifold::{Manifold, ManifoldPoint};
+    use crate::model::params::Instructions;
+    use crate::parallel::lanes::{Kernel, LaneSet, Lanes, WIDE, WideRow};
+    use glam::Vec2;
+
+    /// All manifolds of up to two points without all of these.
+    struct WithoutSome;
+
+    impl Kernel for WithoutSome {
+        type Output = [WideRow; 3];
+
+        #[inline(always)]
+        fn run<V: Lanes>(self) -> [WideRow; 3] {
+            without_some::<V::Wide>()
+        }
+    }
+
+    #[inline(always)]
+    fn without_some<V: Wide>() -> [WideRow; 3] {
+        let bit = |bit: usize| -> WideRow { std::array::from_fn(|lane| (lane >> bit & 1) as f32) };
+        let [some, two, first, second] = [0, 1, 2, 3].map(|number| V::load(&bit(number)));
+        let (none, points) = (V::splat(0.0), [V::splat(1.0), V::splat(2.0)]);
+        let single = Manifolds::single(some, Vectors::new(none, none), Vectors::new(none, none), none, none);
+        let left = Manifolds { two, separation: points, ..single }.without([first, second]);
+        let mut rows = [[0.0; WIDE]; 3];
+        [left.some, left.two, left.separation[0]].into_iter().zip(&mut rows).for_each(|(row, to)| row.store(to));
+        rows
+    }
+
+    #[test]
+    fn what_is_left_of_two_points_is_that_of_one_pair() {
+        for instructions in [Instructions::Auto, Instructions::Portable] {
+            let [some, two, first] = LaneSet::of(instructions).unwrap().run(WithoutSome);
+            for lane in 0..WIDE {
+                let [is_some, is_two, first_goes, second_goes] = [0, 1, 2, 3].map(|bit| lane >> bit & 1 == 1);
+                let point = |number: f32| ManifoldPoint { anchor: Vec2::splat(number), separation: number, feature: 0 };
+                let mut one = Manifold::EMPTY;
+                (0..usize::from(is_some) + usize::from(is_some && is_two))
+                    .for_each(|i| one.push(point(i as f32 + 1.0)));
+                let is_gone = |anchor: Vec2| if anchor.x == 1.0 { first_goes } else { second_goes };
+                let left = one.without(is_gone).unwrap_or(Manifold::EMPTY);
+                assert_eq!([some[lane], two[lane]].map(|is| is > 0.0), [left.count > 0, left.count > 1], "{lane}");
+                assert!(left.count == 0 || left.points[0].separation == first[lane], "{lane}");
+            }
+        }
     }
 }

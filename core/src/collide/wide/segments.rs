@@ -324,6 +324,7 @@ impl<V: Wide> Segments<V> {
         let (zero, half) = (V::splat(0.0), V::splat(0.5));
         let (mut touched, mut nearest) = (AtEnd::none(), AtEnd::none());
         let is_near = at_least(self.radius, lowest);
+        let is_in_front = at_least(center.minus(self.ends[0]).dot(n), zero);
         // How far from a joint what comes out there rather along the normal of the next segment; and where it does along its own.
         let (mut beyond, mut leaves) = (V::splat(f32::NEG_INFINITY), [zero; 2]);
         let far = single.if_positive(zero, V::splat(SAME));
@@ -334,7 +335,8 @@ impl<V: Wide> Segments<V> {
             let from_n = turned(n, normal, limit);
             let goes_on = at_least(from_n, far).mul(at_least(normal.dot(limit), normal.dot(n)));
             beyond = goes_on.mul(joint.juts_out).if_positive(beyond.max(distance), beyond);
-            let is_aslant = at_least(from_n, V::splat(ASLANT)).mul(is_near).mul(less(lowest, distance));
+            let is_aslant =
+                at_least(from_n, V::splat(ASLANT)).mul(is_near).mul(is_in_front).mul(less(lowest, distance));
             leaves[number] = goes_on.if_positive(zero, is_aslant.mul(joint.juts_out));
             let is_out = is_before.max(at_least(center.minus(end).dot(limit), zero));
             let from_limit = joint.juts_out.if_positive(far, zero.sub(far));
@@ -353,7 +355,7 @@ impl<V: Wide> Segments<V> {
             &over.without([self.is_at_left_end(over.anchor[0], leaves), self.is_at_left_end(over.anchor[1], leaves)]);
         let (has_over, has_nearest) = (over.some, nearest.found.some);
         let is_touched = touched.found.some.mul(not(is_far(&touched.found)));
-        // What lies over an edge is deep in the wall below it, and touches what is before the edge; and along the segment's normal what
+        // What lies over an edge is deep in the wall below it, or within its rounding, and touches what is before the edge; and along the segment's normal what
         // reaches beyond it may be nearer than what is over it.
         let is_below = is_near.mul(less(lowest, beyond));
         let is_nearer = is_far(over).mul(is_far(&nearest.found));

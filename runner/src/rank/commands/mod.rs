@@ -199,7 +199,7 @@ impl Commander {
     fn open_files(&mut self, plan: &Plan, from: u64) -> Result<(), RunError> {
         if let Some(path) = &plan.commands.answers {
             let opened = AnswersFile::open(path, from, self.done_before > 0);
-            self.answers = Some(opened.map_err(|error| not_continued(path, &error))?);
+            self.answers = Some(opened.map_err(|error| not_opened(path, &error))?);
         }
         let Some(output) = &plan.output else { return Ok(()) };
         let written = output.folder.write_commands(&plan.commands.record(from, self.done_before));
@@ -523,7 +523,7 @@ fn not_written(path: &std::path::Path, error: &io::Error) -> RunError {
     RunError::Output { path: path.to_owned(), reason: error.to_string() }
 }
 
-fn not_continued(path: &std::path::Path, error: &io::Error) -> RunError {
+fn not_opened(path: &std::path::Path, error: &io::Error) -> RunError {
     if error.kind() != io::ErrorKind::InvalidData {
         return not_written(path, error);
     }
