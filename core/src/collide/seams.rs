@@ -201,7 +201,9 @@ struct Direction {
 }
 
 impl<'a> Touched<'a> {
-    fn new(mut faces: Vec<Face<'a>>) -> Self {
+    /// By the contacts of a run.
+    fn by(tile: &Tile, contacts: &Contacts, run: Range<usize>, surface: Surface, setup: &'a Setup) -> Self {
+        let mut faces: Vec<_> = run.map(|number| Face::new(tile, contacts, number, surface, setup)).collect();
         let name = |face: &Face<'_>| face.normal.to_array().map(f32::to_bits);
         faces.sort_by_key(name);
         let mut first = 0;
@@ -242,10 +244,7 @@ fn mend_run(
     setup: &Setup,
     gone: &mut Vec<usize>,
 ) {
-    let touched = |&surface| {
-        let faces = run.clone().map(|number| Face::new(tile, contacts, number, surface, setup));
-        Touched::new(faces.collect())
-    };
+    let touched = |&surface| Touched::by(tile, contacts, run.clone(), surface, setup);
     let mut surfaces: Vec<Touched<'_>> = surfaces.iter().map(touched).collect();
     let mut all = surfaces.iter().flat_map(|surface| surface.faces.iter().map(move |face| (surface, face)));
     if !all.any(|(surface, face)| surface.firsts(face).next().is_some()) {
@@ -255,8 +254,7 @@ fn mend_run(
     let mut all: Vec<Option<Stopped>> = run.clone().map(stop).collect();
     let of_statics = tile.contacts.keys[run.start].is_with_static();
     if of_statics && hold_at_corners(tile, contacts, run.clone(), &mut all, setup) {
-        let faces = run.clone().map(|number| Face::new(tile, contacts, number, Surface::Static, setup));
-        surfaces = vec![Touched::new(faces.collect())];
+        surfaces = vec![Touched::by(tile, contacts, run.clone(), Surface::Static, setup)];
     }
     let contact = |number: usize| (contacts.bodies[number], &tile.contacts.contacts[number]);
     let stopped = |number: usize| all[number - run.start].as_ref();
