@@ -31,12 +31,12 @@ pub(crate) fn follow(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     if !any_may_pass(tile, setup) {
         return;
     }
-    let (mut found, mut orders, mut first) = (Vec::new(), Vec::new(), 0);
+    let (mut found, mut orders, mut first) = (Vec::new(), Vec::<Vec<PairKey>>::new(), 0);
     while first < tile.contacts.len() {
         let key = tile.contacts.keys[first];
         let is_of_one = |other: &PairKey| other.low() == key.low() && other.is_with_static();
         let count = tile.contacts.keys[first..].iter().take_while(|&other| is_of_one(other)).count();
-        follow_run(tile, contacts, first..first + count, setup, &mut found, &mut orders);
+        orders.extend(follow_run(tile, contacts, first..first + count, setup, &mut found));
         first += count.max(1);
     }
     contacts.insert(found, &mut tile.contacts);
@@ -44,7 +44,7 @@ pub(crate) fn follow(tile: &mut Tile, contacts: &mut Contacts, setup: &Setup) {
     let places = |key: &PairKey| {
         keys.partition_point(|other| other < key) as u32..keys.partition_point(|other| other <= key) as u32
     };
-    contacts.turns.extend(orders.iter().map(|order: &Vec<PairKey>| order.iter().flat_map(places).collect()));
+    contacts.turns.extend(orders.iter().map(|order| order.iter().flat_map(places).collect()));
 }
 
 /// Whether a body may go further than a segment of a hollow is long: looser than what is asked of each.
@@ -54,7 +54,7 @@ fn any_may_pass(tile: &Tile, setup: &Setup) -> bool {
     shortest.is_finite() && (setup.any_drives() || far > shortest)
 }
 
-/// Looks for those of one body, whose contacts with statics these are; and the order in which it comes to them, if it is not that of their
+/// Looks for those of one body, whose contacts with statics these are. Returns the order in which it comes to them, if it is not that of their
 /// names: whoever is turned by the last one first loses more.
 fn follow_run(
     tile: &Tile,
@@ -62,8 +62,7 @@ fn follow_run(
     run: Range<usize>,
     setup: &Setup,
     found: &mut Vec<New>,
-    orders: &mut Vec<Vec<PairKey>>,
-) {
+) -> Option<Vec<PairKey>> {
     let met = run.clone().filter_map(|number| {
         let (key, pair) = (tile.contacts.keys[number], contacts.bodies[number]);
         let row = key.high().index(tile.owned, tile.ghosts());
@@ -75,12 +74,10 @@ fn follow_run(
         let stopped = Stopped::new(tile, (pair, &tile.contacts.contacts[number]), setup)?;
         stopped.by().is_some().then_some((number, ground, stopped))
     });
-    let Some((number, first, stopped)) = met.min_by(|(.., one), (.., two)| sooner(one.order(), two.order())) else {
-        return;
-    };
+    let (number, first, stopped) = met.min_by(|(.., one), (.., two)| sooner(one.order(), two.order()))?;
     let (pair, numbers) = (contacts.bodies[number], tile.contacts.contacts[number].piece_numbers());
     if bounces(tile, pair, &stopped, setup) {
-        return;
+        return None;
     }
     let side = usize::from(pair[0] as usize == first.row);
     let (body, piece) = (pair[side], numbers[side]);
@@ -112,7 +109,8 @@ fn follow_run(
         if length - first.link.length > far || turns_by(&next) < LEAST_COSINE || lean < -SLOPE {
             break;
         }
-        let (key, is_known) = (key_of(&next), is_known(&key_of(&next)));
+        let key = key_of(&next);
+        let is_known = is_known(&key);
         let touches = || setup.kind(tile.bodies.kind[next.row]).touches(setup.kind(tile.bodies.kind[body as usize]));
         // What is level it touches on its free way, or not at all.
         if lean > SLOPE && !is_known && touches() {
@@ -127,9 +125,7 @@ fn follow_run(
         here = next;
     }
     found[begin..].sort_by_key(|new| new.key);
-    if !order.is_sorted() {
-        orders.push(order);
-    }
+    (!order.is_sorted()).then_some(order)
 }
 
 /// Whether two bodies bounce off each other rather than that one glides on.
