@@ -1,13 +1,15 @@
-//! Upright rectangles around the convex pieces of bodies, by which most pairs of pieces are seen to be apart.
+//! Two rectangles around each convex piece of bodies, one upright and one along the diagonals, by which most pairs of pieces are seen to
+//! be apart: discrete oriented polytopes of eight faces (J. T. Klosowski et al., "Efficient collision detection using bounding volume
+//! hierarchies of k-DOPs", 1998).
 
 use crate::collide::broad_phase::Pair;
 use crate::model::id::KindId;
-use crate::model::math::{Rot, max};
+use crate::model::math::Rot;
 use crate::model::piece::Piece;
 use crate::parallel::team::Team;
 use crate::tiling::blueprint::Setup;
 use crate::tiling::tile::Tile;
-use glam::Vec2;
+use glam::{Vec2, Vec4};
 
 /// Bodies in a piece of work, at least.
 const GRAIN: usize = 512;
@@ -15,32 +17,43 @@ const GRAIN: usize = 512;
 /// Of more pieces some have a rectangle around all of them, too.
 const FEW: usize = 8;
 
-/// Low and high corner of a rectangle, from the center of the body, in meters.
+/// An eighth of a turn.
+const EIGHTH: Rot = Rot { c: std::f32::consts::FRAC_1_SQRT_2, s: std::f32::consts::FRAC_1_SQRT_2 };
+
+/// Of how far something goes to the right and up, how far that is along those and along both diagonals.
+#[inline(always)]
+fn along_all(upright: Vec2, slanted: Vec2) -> Vec4 {
+    Vec4::new(upright.x, upright.y, slanted.x, slanted.y)
+}
+
+/// Where a piece begins and ends along four directions, from the center of the body, in meters: to the right, up, and these turned by an
+/// eighth of a turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PieceBox {
-    low: Vec2,
-    high: Vec2,
+    low: Vec4,
+    high: Vec4,
 }
 
 impl PieceBox {
     #[inline(always)]
     fn new(piece: &Piece, rotation: Rot) -> Self {
-        let [low, high] = piece.outline.bounds(rotation);
+        let (upright, slanted) = (piece.outline.bounds(rotation), piece.outline.bounds(EIGHTH.after(rotation)));
+        let [low, high] = [0, 1].map(|end| along_all(upright[end], slanted[end]));
         Self { low: low - piece.radius, high: high + piece.radius }
     }
 
     /// Around all of some.
     fn around(all: &[Self]) -> Self {
-        let nothing = Self { low: Vec2::INFINITY, high: Vec2::NEG_INFINITY };
+        let nothing = Self { low: Vec4::INFINITY, high: Vec4::NEG_INFINITY };
         all.iter().fold(nothing, |one, two| Self { low: one.low.min(two.low), high: one.high.max(two.high) })
     }
 
-    /// Whether another, of a body at `offset` from this one's, is further than so far along an axis. Who is apart from one that holds
+    /// Whether another, of a body at `offset` from this one's, is further than so far along a direction. Who is apart from one that holds
     /// others is apart from these, rounded as all is.
     #[inline(always)]
-    fn is_apart(&self, other: &Self, offset: Vec2, far: f32) -> bool {
+    fn is_apart(&self, other: &Self, offset: Vec4, far: f32) -> bool {
         let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
-        max(gap.x, gap.y) > far
+        gap.cmpgt(Vec4::splat(far)).any()
     }
 }
 
@@ -139,6 +152,7 @@ impl PieceBoxes {
         let mut only = [None; 2];
         let [only_a, only_b] = &mut only;
         let (a, b) = (self.of(bodies[0], tile, setup, only_a), self.of(bodies[1], tile, setup, only_b));
+        let offset = along_all(offset, EIGHTH.rotate(offset));
         let whole = if a.groups.is_empty() { None } else { Some(b.around()) };
         let beyond = |box_a: &PieceBox| whole.is_some_and(|whole| box_a.is_apart(&whole, offset, far));
         a.each_near(beyond, |number_a| {
