@@ -107,8 +107,6 @@ impl<V: Wide> Normals<V> {
     /// Sets the relative velocities right: along the normals, and then along the tangents, within the cones that the normal
     /// impulses of this moment allow. `press` tells what the normal impulse at a point is to be.
     ///
-    /// In solve and in relax: with friction in relax alone, piles over a tile border jitter a hundred times more.
-    ///
     /// Returns how fast, in m/s, friction at two points then has them part or meet, which the normals had stopped.
     #[inline(always)]
     pub(crate) fn push<const N: usize>(
@@ -119,18 +117,61 @@ impl<V: Wide> Normals<V> {
         b: &mut [V; 4],
         press: impl Fn(&PointRows) -> Press<V>,
     ) -> V {
-        let zero = V::splat(0.0);
         if let [rows] = &mut points[..] {
             let press = press(rows);
             self.push_at_once(rows, friction, a, b, press);
-            return zero;
+            return V::splat(0.0);
         }
-        if let [one, two] = &mut points[..] {
+        self.press(points, a, b, press);
+        let [turning_a, turning_b] = self.rub(points, friction, a, b);
+        let zero = V::splat(0.0);
+        let mut turned = zero;
+        for rows in points {
+            let speed = V::load(&rows.normal_a).mul(turning_a).add(V::load(&rows.normal_b).mul(turning_b));
+            turned = turned.max(speed).max(zero.sub(speed));
+        }
+        turned
+    }
+
+    /// The other way around: along the tangents first, within the cones of the normal impulses so far.
+    ///
+    /// Solve goes this way and relax the other, so that friction and normals see each other's latest as often, as in a symmetric
+    /// Gauss-Seidel sweep. With friction last in both, pyramids of boxes sway for ever where contacts are as stiff as substeps allow: 1,275
+    /// boxes at 30 Hz. With friction in relax alone, piles over a tile border jitter a hundred times more.
+    #[inline(always)]
+    pub(crate) fn rub_and_push<const N: usize>(
+        &self,
+        points: &mut [PointRows; N],
+        friction: V,
+        a: &mut [V; 4],
+        b: &mut [V; 4],
+        press: impl Fn(&PointRows) -> Press<V>,
+    ) {
+        if let [rows] = &mut points[..] {
+            let press = press(rows);
+            self.push_at_once(rows, friction, a, b, press);
+            return;
+        }
+        self.rub(points, friction, a, b);
+        self.press(points, a, b, press);
+    }
+
+    /// Sets the relative velocities at two points right along the normals.
+    #[inline(always)]
+    fn press(&self, points: &mut [PointRows], a: &mut [V; 4], b: &mut [V; 4], press: impl Fn(&PointRows) -> Press<V>) {
+        if let [one, two] = points {
             let presses = [press(one), press(two)];
             self.press_together([one, two], presses, a, b);
         }
+    }
+
+    /// Sets the relative velocities at some points right along the tangents, within the cones that the normal impulses of this moment
+    /// allow, and returns how that turned both bodies.
+    #[inline(always)]
+    fn rub(&self, points: &mut [PointRows], friction: V, a: &mut [V; 4], b: &mut [V; 4]) -> [V; 2] {
+        let zero = V::splat(0.0);
         let (mut turning_a, mut turning_b) = (zero, zero);
-        for rows in &mut *points {
+        for rows in points {
             let axis = self.tangent(rows);
             let old = V::load(&rows.tangent_impulse);
             let wanted = V::load(&rows.tangent_mass).mul(axis.speed(a, b));
@@ -139,12 +180,7 @@ impl<V: Wide> Normals<V> {
             axis.apply_impulse(more, a, b);
             (turning_a, turning_b) = (turning_a.add(axis.aw.mul(more)), turning_b.add(axis.bw.mul(more)));
         }
-        let mut turned = zero;
-        for rows in points {
-            let speed = V::load(&rows.normal_a).mul(turning_a).add(V::load(&rows.normal_b).mul(turning_b));
-            turned = turned.max(speed).max(zero.sub(speed));
-        }
-        turned
+        [turning_a, turning_b]
     }
 
     /// As [`push`](Self::push), and where friction turns what the normals have stopped, again, until it hardly does: who lands flat and
