@@ -73,6 +73,73 @@
 //! | `iceoryx2`, with the cargo feature `iceoryx2` | processes of one machine, which share memory | one machine |
 //! | `mpi`, with the cargo feature `mpi` | processes of an MPI job | clusters, and one machine |
 //!
+//! # A backend of your own
+//!
+//! It keeps an [`Outgoing::owned`], and in an exchange moves its buffers to where they go, however that is done: here two threads by a
+//! pipe each way. [`conformance`] tells whether it keeps the contract, of which this one leaves the timeout to you.
+//!
+//! ```
+//! use atoll_transport::{Aborted, Incoming, Outgoing, Rank, Transport, TransportError};
+//! use std::sync::mpsc::{Receiver, Sender, channel};
+//! use std::time::Duration;
+//!
+//! struct Pipe {
+//!     rank: Rank,
+//!     outgoing: Outgoing,
+//!     to: Sender<(u128, Vec<u8>)>,
+//!     from: Receiver<(u128, Vec<u8>)>,
+//! }
+//!
+//! impl Transport for Pipe {
+//!     fn rank(&self) -> Rank {
+//!         self.rank
+//!     }
+//!
+//!     fn size(&self) -> usize {
+//!         2
+//!     }
+//!
+//!     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
+//!         self.outgoing.lay_out(self.rank, lengths)
+//!     }
+//!
+//!     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
+//!         self.outgoing.begin_exchange(self.rank)?;
+//!         incoming.begin(2);
+//!         let peer = Rank(1 - self.rank.0);
+//!         let lost = || TransportError::PeerLost { rank: peer, reason: "it left".to_owned() };
+//!         let word = self.outgoing.flag_word();
+//!         self.to.send((word, self.outgoing.replace(peer, Vec::new()))).map_err(|_| lost())?;
+//!         let own = (word, self.outgoing.replace(self.rank, Vec::new()));
+//!         for (from, (word, message)) in [(self.rank, own), (peer, self.from.recv().map_err(|_| lost())?)] {
+//!             incoming.hear(word);
+//!             let old = incoming.replace(from, message);
+//!             self.outgoing.replace(from, old);
+//!         }
+//!         incoming.end(Duration::ZERO);
+//!         Ok(())
+//!     }
+//!
+//!     fn abort(&mut self, reason: &str) -> ! {
+//!         Aborted::unwind(self.rank, reason)
+//!     }
+//! }
+//!
+//! let ((to_one, from_zero), (to_zero, from_one)) = (channel(), channel());
+//! let pipe = |rank, to, from| Pipe { rank, outgoing: Outgoing::owned(2), to, from };
+//! let (mut zero, mut one) = (pipe(Rank(0), to_one, from_one), pipe(Rank(1), to_zero, from_zero));
+//! let other = std::thread::spawn(move || {
+//!     one.prepare(&[3, 0])?.to(Rank(0)).copy_from_slice(b"one");
+//!     one.exchange(&mut Incoming::default())
+//! });
+//! let mut incoming = Incoming::default();
+//! zero.prepare(&[0, 0])?.set_flag_word(7);
+//! zero.exchange(&mut incoming)?;
+//! assert_eq!((incoming.from(Rank(1)), incoming.flag_word()), (&b"one"[..], 7));
+//! other.join().expect("it ends")?;
+//! # Ok::<(), TransportError>(())
+//! ```
+//!
 //! [`Counting`] wraps any of them and counts traffic; [`Collective`] adds barrier, gather and ordered reductions.
 
 // Allowed in the few files that meet memory shared with other processes.

@@ -44,20 +44,16 @@ impl Transport for Local {
     }
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
-        self.outgoing.begin_prepare(Rank(0), lengths)?;
-        self.outgoing.as_owned().resize(lengths);
-        self.outgoing.end_prepare();
-        Ok(&mut self.outgoing)
+        self.outgoing.lay_out(Rank(0), lengths)
     }
 
     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
         self.outgoing.begin_exchange(self.rank())?;
         incoming.begin(1);
         incoming.hear(self.outgoing.flag_word());
-        let received = incoming.as_owned();
-        received.resize(1);
-        let old = received.take(Rank(0));
-        received.put(Rank(0), self.outgoing.as_owned().replace(Rank(0), old));
+        let message = self.outgoing.replace(Rank(0), Vec::new());
+        let old = incoming.replace(Rank(0), message);
+        self.outgoing.replace(Rank(0), old);
         incoming.end(Duration::ZERO);
         Ok(())
     }

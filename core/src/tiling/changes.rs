@@ -166,7 +166,7 @@ impl Tile {
         }
         let mut owned = self.owned;
         if !changes.gone.is_empty() {
-            owned = 0;
+            (owned, self.is_rearranged) = (0, true);
             // For each its new place.
             let mut places = Vec::with_capacity(self.owned);
             let is_gone = changes.is_gone();

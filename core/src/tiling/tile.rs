@@ -36,6 +36,8 @@ pub(crate) struct Tile {
     pub(crate) changes: Option<Box<Changes>>,
     /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays.
     pub(crate) newcomers: Vec<u32>,
+    /// Whether owned bodies that neither came nor left are in other places than before. Who remembers their places takes it back.
+    pub(crate) is_rearranged: bool,
     /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
     pub(crate) gaps: Vec<u32>,
     /// Who is pushed by forces in the step under way, by body; before its first sync point owned ones alone.
@@ -134,6 +136,7 @@ impl Tile {
             owned: 0,
             changes: None,
             newcomers: Vec::new(),
+            is_rearranged: false,
             pushes: Vec::new(),
             gaps: Vec::new(),
             rim: Rim::default(),

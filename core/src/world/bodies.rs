@@ -221,8 +221,7 @@ impl World {
             return;
         }
         for &number in &self.busy {
-            let tile = &self.tiles[number as usize];
-            locator.follow(number, tile, tile.newcomers.iter().copied());
+            locator.follow(number, &mut self.tiles[number as usize]);
         }
     }
 

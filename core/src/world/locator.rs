@@ -17,24 +17,13 @@ pub(super) struct Place {
 #[derive(Debug)]
 pub(super) struct Locator {
     places: FxHashMap<GlobalId, Place>,
-    /// Per tile, how many bodies were not where they had been last seen, since all of its were written down.
-    missed: Vec<u32>,
 }
-
-/// Whoever is so few places nearer to the first is found as fast again.
-const NEAR: u32 = 256;
-
-/// After so many the whole tile is written down anew: that takes as long as searching through it so often.
-const MISSES: u32 = 400;
 
 impl Locator {
     /// Of all bodies of some tiles. Takes time for each.
     pub(super) fn new(tiles: &[Tile]) -> Self {
         let count = tiles.iter().map(Tile::count).sum();
-        let mut locator = Self {
-            places: FxHashMap::with_capacity_and_hasher(count, rustc_hash::FxBuildHasher),
-            missed: vec![0; tiles.len()],
-        };
+        let mut locator = Self { places: FxHashMap::with_capacity_and_hasher(count, rustc_hash::FxBuildHasher) };
         for (number, tile) in (0..).zip(tiles) {
             locator.write_down(number, tile);
         }
@@ -63,18 +52,7 @@ impl Locator {
         let found = Self::confirm(id, known, tiles);
         match found {
             Some(place) if place == known => {}
-            Some(place) => {
-                self.places.insert(id, place);
-                if known.at.wrapping_sub(place.at) < NEAR {
-                    return found;
-                }
-                let missed = &mut self.missed[place.tile as usize];
-                *missed += 1;
-                if *missed > MISSES {
-                    *missed = 0;
-                    self.write_down(place.tile, &tiles[place.tile as usize]);
-                }
-            }
+            Some(place) => drop(self.places.insert(id, place)),
             None => drop(self.places.remove(&id)),
         }
         found
@@ -91,8 +69,11 @@ impl Locator {
     }
 
     /// After a step: the bodies of a tile that are new there, or in another place.
-    pub(super) fn follow(&mut self, number: u32, tile: &Tile, newcomers: impl Iterator<Item = u32>) {
-        for index in newcomers {
+    pub(super) fn follow(&mut self, number: u32, tile: &mut Tile) {
+        if std::mem::take(&mut tile.is_rearranged) {
+            return self.write_down(number, tile);
+        }
+        for &index in &tile.newcomers {
             let id = tile.bodies.id[index as usize];
             self.places.insert(id, Place { tile: number, at: index });
         }

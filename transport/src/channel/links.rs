@@ -97,7 +97,6 @@ impl Links {
     pub(super) fn exchange(&mut self, outgoing: &mut Outgoing, incoming: &mut Incoming) -> Result<(), TransportError> {
         let started = Instant::now();
         incoming.begin(self.size());
-        incoming.as_owned().resize(self.size());
         self.send(outgoing, incoming, started)
             .and_then(|()| {
                 let sent = Instant::now();
@@ -122,10 +121,10 @@ impl Links {
     ) -> Result<(), TransportError> {
         let word = outgoing.flag_word();
         for (to, sender) in Rank::all(self.size()).zip(&self.senders) {
-            let old = incoming.as_owned().take(to);
-            let message = outgoing.as_owned().replace(to, old);
+            let old = incoming.replace(to, Vec::new());
+            let message = outgoing.replace(to, old);
             let Some(sender) = sender else {
-                incoming.as_owned().put(to, message);
+                incoming.replace(to, message);
                 incoming.hear(word);
                 continue;
             };
@@ -183,7 +182,7 @@ impl Links {
     }
 
     fn accept(&mut self, from: Rank, (message, word): Frame, incoming: &mut Incoming) {
-        incoming.as_owned().put(from, message);
+        incoming.replace(from, message);
         incoming.hear(word);
         self.awaited[from.index()] = false;
     }

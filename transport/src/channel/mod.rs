@@ -105,10 +105,7 @@ impl Transport for Channel {
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
         self.links.check()?;
-        self.outgoing.begin_prepare(self.links.rank(), lengths)?;
-        self.outgoing.as_owned().resize(lengths);
-        self.outgoing.end_prepare();
-        Ok(&mut self.outgoing)
+        self.outgoing.lay_out(self.links.rank(), lengths)
     }
 
     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {

@@ -87,7 +87,6 @@ fn what_was_sent_before_leaving_arrives() {
     a.outgoing.begin_exchange(Rank(0)).unwrap();
     let mut incoming = Incoming::default();
     incoming.begin(2);
-    incoming.as_owned().resize(2);
     a.links.send(&mut a.outgoing, &mut incoming, Instant::now()).unwrap();
     has_left.recv().unwrap();
     a.links.receive(&mut incoming, Instant::now()).unwrap();

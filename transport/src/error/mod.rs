@@ -70,7 +70,7 @@ pub struct Aborted {
 
 impl Aborted {
     /// Unwinds the current thread with this payload. The panic hook is not run: an abort is no bug.
-    pub(crate) fn unwind(rank: Rank, reason: &str) -> ! {
+    pub fn unwind(rank: Rank, reason: &str) -> ! {
         std::panic::resume_unwind(Box::new(Aborted { rank, reason: reason.to_owned() }))
     }
 }

@@ -33,7 +33,7 @@ impl OwnedOutgoing {
     }
 
     /// Sizes the buffers for a new round.
-    pub(crate) fn resize(&mut self, lengths: &[usize]) {
+    pub(super) fn resize(&mut self, lengths: &[usize]) {
         for ((frame, need), &length) in self.frames.iter_mut().zip(&mut self.needs).zip(lengths) {
             *need = length.max(*need - need.div_ceil(FADE));
             // Old bytes stay: only growth is filled, so that a warm round writes nothing twice.
@@ -45,7 +45,7 @@ impl OwnedOutgoing {
     }
 
     /// Takes the frame for `rank` out and leaves `old`, a frame no longer needed, as the memory of the next one.
-    pub(crate) fn replace(&mut self, rank: Rank, old: Vec<u8>) -> Vec<u8> {
+    pub(super) fn replace(&mut self, rank: Rank, old: Vec<u8>) -> Vec<u8> {
         let need = &mut self.needs[rank.index()];
         *need = old.len().max(*need);
         std::mem::replace(&mut self.frames[rank.index()], old)
@@ -63,19 +63,10 @@ impl OwnedIncoming {
         &self.frames[rank.index()]
     }
 
-    /// Makes room for one frame per rank.
-    pub(crate) fn resize(&mut self, size: usize) {
+    /// Puts a frame of `rank`, one of so many, in its place, and takes out the one that was there.
+    pub(super) fn replace(&mut self, rank: Rank, size: usize, frame: Vec<u8>) -> Vec<u8> {
         self.frames.resize_with(size, Vec::new);
-    }
-
-    /// Takes the frame of `rank` out, to be given back to the backend.
-    pub(crate) fn take(&mut self, rank: Rank) -> Vec<u8> {
-        std::mem::take(&mut self.frames[rank.index()])
-    }
-
-    /// Puts a received frame in its place.
-    pub(crate) fn put(&mut self, rank: Rank, frame: Vec<u8>) {
-        self.frames[rank.index()] = frame;
+        std::mem::replace(&mut self.frames[rank.index()], frame)
     }
 }
 

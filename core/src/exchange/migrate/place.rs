@@ -23,7 +23,7 @@ pub(super) fn sort(tile: &mut Tile, setup: &Setup) {
     let order: Vec<u32> = order.into_iter().map(|number| number as u32).collect();
     tile.bodies.permute(&order);
     tile.sleep.permute(&order);
-    tile.standstill = None;
+    (tile.standstill, tile.is_rearranged) = (None, true);
     let mut new_place = vec![0; order.len()];
     for (to, &from) in (0..).zip(&order) {
         new_place[from as usize] = to;
