@@ -52,6 +52,22 @@
 //! `examples/two_tiles.rs` has a halo of its own, if for one rank. At the end of a run [`finish`] makes the closing
 //! exchange.
 //!
+//! # Debug builds of your own
+//!
+//! What is compiled without any optimization needs megabytes of stack for a step, more than a thread has if nobody asks for more, and is many
+//! times as slow. Your program may be debugged all the same with this in the `Cargo.toml` of its workspace:
+//!
+//! ```toml
+//! [profile.dev.package.atoll-core]
+//! opt-level = 1
+//! ```
+//!
+//! # What there is not
+//!
+//! Joints; statics that come, go or are moved by hand (what moves them is a [`Path`], known from the beginning); a body put elsewhere but by
+//! [`World::remove`] and [`World::add`]; shapes cast along a way, and rays that go on behind what they hit first; other steps than those of
+//! [`Params::dt`] while a world lasts.
+//!
 //! # Saving
 //!
 //! [`World::save`] turns each tile into a block of bytes; [`World::restore`] turns it back, in any world that holds the

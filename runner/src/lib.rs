@@ -15,6 +15,7 @@
 //! What there is to use:
 //!
 //! - [`Config`] says what to run, by the [keys](config) of a file; [`scene`] which bodies there are at the start.
+//! - [`world`] makes the world of it, for a program that steps it itself.
 //! - [`run`], and [`run_with`] an [`Observer`]: a [`Listener`] hears how it goes, a [`StopFlag`] ends it early. What comes of it
 //!   is a [`Summary`] or a [`RunError`].
 //! - [`recording`] reads what `atoll run --out` has recorded, [`compare`] says whether two recordings hold the same.
@@ -44,7 +45,33 @@ pub use look::compare;
 pub use rank::{Listener, Observer, StopFlag};
 pub use summary::{PhaseTime, RankTimings, Summary};
 
+use atoll_core::World;
+use atoll_transport::Rank;
 use plan::Plan;
+
+/// The world of a configuration as its run begins with it, whole, for a program that [steps](atoll_core::step) it itself. Commands,
+/// output, and tilings that follow the bodies, are a matter of runs.
+///
+/// ```
+/// use atoll_core::{Loopback, step};
+///
+/// let text = "[scene]\nkind = \"rooms\"\nbodies = 500\n[run]\nsteps = 3\ntiles = [2, 2]\n";
+/// let config = atoll::Config::from_toml_str("example", text, &[])?;
+/// let mut world = atoll::world(&config)?;
+/// for _ in 0..3 {
+///     step(&mut world, &mut Loopback)?;
+/// }
+/// assert_eq!(format!("{:032x}", world.hashes().state), atoll::run(&config)?.state_hash);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If the configuration makes no world, or its files cannot be read.
+pub fn world(config: &Config) -> Result<World, RunError> {
+    let mut config = config.clone();
+    config.run.ranks = 1;
+    rank::part_of_scene(&Plan::new(&config)?, Rank(0))
+}
 
 /// Runs a configuration from start to end in this process and returns its summary. Prints nothing.
 ///
