@@ -315,7 +315,30 @@ fn two_recordings_are_side_by_side_and_where_they_part_is_marked() {
     browser.click([x + quarter, y]);
     browser.wait_for("atoll.state.body !== null && atoll.state.body.source === 1");
     assert_eq!(browser.evaluate("atoll.state.body.id"), json!(row.id.to_string()));
+    // One list of colors is of both, and so are all records.
+    let heads = "[...document.querySelectorAll('#legend strong, #legend em')].map((head) => head.textContent)";
+    assert_eq!(browser.evaluate(heads), json!(["kind"]));
+    assert_eq!(browser.evaluate("document.getElementById('beyond').hidden"), json!(true));
     assert_well(&browser, &served);
+    // Of other kinds, and for a shorter time.
+    let kinds = "[[kinds]]\nname = \"pebble\"\ncircle = 0.3\n";
+    let world = format!("format = \"atoll-scene/1\"\ndomain = [[0, 0], [9, 9]]\n{kinds}[[body]]\nx = 4\ny = 5\n");
+    std::fs::write(folder("pebble.toml"), world).unwrap();
+    let line = "run pebble.toml --steps 5 --out pebble --record-every 1 --quiet";
+    let ended = program::run(program::command().current_dir(DESK.path()).args(line.split(' ')));
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let served = serve("a pebble");
+    browser.open(&served.url);
+    browser.wait_for("window.atoll !== undefined && atoll.state.frames > 0");
+    assert_eq!(browser.evaluate(heads), json!(["kind", "a", "pebble"]));
+    let listed = "[...document.querySelectorAll('#legend em:last-of-type ~ span')].map((row) => row.textContent)";
+    assert_eq!(browser.evaluate(listed), json!(["pebble"]));
+    assert_eq!(
+        browser.evaluate("document.getElementById('beyond').textContent"),
+        json!("in the 3 records of both; only a has 28 more, only pebble has 3 more")
+    );
+    browser.screenshot("two_unlike");
+    assert!(browser.errors.is_empty(), "{:?}", browser.errors);
 }
 
 #[test]

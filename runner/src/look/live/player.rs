@@ -1,7 +1,7 @@
 //! Plays what runs have recorded, one or two of them on one clock.
 
 use super::desk::{Desk, Due, Pace, Pick};
-use super::protocol::{Gaze, Picture, Say, Tiles};
+use super::protocol::{Gaze, Picture, Say, Source, Tiles};
 use super::question::{Found, distance};
 use super::sketch::{Paper, Portion, Sketch, rectangle, turn_of_angle};
 use super::{figures, scenery};
@@ -59,7 +59,8 @@ impl Player {
         let mut tracks = Vec::new();
         let mut sources = Vec::new();
         for (name, recorded) in recorded {
-            sources.push(scenery::source(name, recorded.setting(), Vec::new()));
+            let records = recorded.recording().steps().len();
+            sources.push(Source { records, ..scenery::source(name, recorded.setting(), Vec::new()) });
             tracks.push(Track { recorded, frame: Frame::default(), ranges: [Range::default(); 2] });
         }
         desk.greet(Say::Hello(scenery::hello(sources, true, common.clone(), last)));

@@ -178,7 +178,7 @@ pub(crate) struct Hello {
     pub sources: Vec<Source>,
     /// Whether they are recorded, and not run just now.
     pub recorded: bool,
-    /// The steps of the records.
+    /// The steps of the records, those that all worlds have.
     pub steps: Vec<u64>,
     /// The last step of the run.
     pub last_step: u64,
@@ -195,6 +195,8 @@ pub(crate) struct Hello {
 pub(crate) struct Source {
     /// What it is called.
     pub name: String,
+    /// How many records there are of it, also those of steps that the other world has none of.
+    pub records: usize,
     /// Low x, low y, high x, high y, in m.
     pub domain: [f64; 4],
     /// Columns and rows of tiles, or of the squares that they are cut from.

@@ -4,7 +4,7 @@ import { COLORS } from "./controls.js";
 import { decode } from "./frame.js";
 import { find } from "./hand.js";
 import { listen, say, tell } from "./link.js";
-import { clock, difference, figures, legend, name_shapes, note, pace, speed } from "./panel.js";
+import { beyond, clock, difference, figures, legend, name_shapes, note, pace, speed } from "./panel.js";
 import { at, state } from "./state.js";
 import { boxes, draw, fit, paper, redraw, start_drawing } from "./view.js";
 import { list, options } from "./words.js";
@@ -33,10 +33,11 @@ function hello(message) {
     Object.assign(at("scrub"), { min: 0, max: message.steps.length - 1, value: 0 });
   }
   state.difference = null;
-  at("difference").hidden = message.sources.length < 2;
+  at("compared").hidden = message.sources.length < 2;
   at("difference").disabled = true;
   at("difference").textContent = "Comparing…";
   at("apart").hidden = true;
+  beyond();
   state.asked = "";
   fit();
 }
@@ -67,7 +68,7 @@ function show(frame) {
     [state.camera.x, state.camera.y] = frame.followed;
   }
   if (frame.followed) state.marked = frame.followed;
-  legend(frame.legend);
+  legend(frame.source, frame.legend);
   say("");
   clock();
   redraw();

@@ -23,11 +23,21 @@ function mark_difference() {
 /// Two worlds differ from a record on, or nowhere.
 export function difference({ step }) {
   state.difference = step;
-  at("difference").hidden = false;
+  at("compared").hidden = false;
   at("difference").disabled = step === null;
   at("difference").textContent = step === null ? "No difference" : "First difference";
   mark_difference();
   if (state.time !== undefined) clock();
+}
+
+/// Which records of two worlds are compared and shown, if one of them has more than the other.
+export function beyond() {
+  const { steps, sources } = state.hello;
+  const more = sources.filter(({ records }) => records > steps.length)
+    .map(({ name, records }) => `only ${name} has ${count(records - steps.length)} more`);
+  const compared = steps.length === 1 ? "record" : `${count(steps.length)} records`;
+  at("beyond").hidden = !more.length;
+  at("beyond").textContent = `in the ${compared} of both; ${more.join(", ")}`;
 }
 
 export function clock() {
@@ -74,7 +84,14 @@ export function figures({ figures, phases, busy }) {
   });
 }
 
-export function legend({ title, scale, rows }) {
+/// What colors mean: told once if that is the same in all worlds, or else under the name of each.
+export function legend(source, meaning) {
+  state.legends[source] = meaning;
+  // Those of the others come with it.
+  if (source < state.sources.length - 1) return;
+  const texts = state.legends.map((meaning) => JSON.stringify(meaning)), text = texts.join();
+  if (text === state.legend) return;
+  state.legend = text;
   const parts = [];
   const add = (name, text) => {
     const made = document.createElement(name);
@@ -82,24 +99,26 @@ export function legend({ title, scale, rows }) {
     parts.push(made);
     return made;
   };
-  add("strong", title);
-  if (scale) {
-    const [low, , high] = scale.marks;
-    const bar = add("span");
-    const colors = document.createElement("b");
-    colors.style.background = `linear-gradient(to right, ${scale.colors.map(css).join(", ")})`;
-    bar.append(low, colors, high);
-  }
-  for (const [name, color, is_round] of rows) {
-    const entry = add("span");
-    const swatch = document.createElement("i");
-    swatch.style.background = css(color);
-    if (is_round) swatch.style.borderRadius = "50%";
-    entry.append(swatch, name);
-  }
-  const text = JSON.stringify([title, scale, rows]);
-  if (text !== state.legend) at("legend").replaceChildren(...parts);
-  state.legend = text;
+  add("strong", meaning.title);
+  const differ = texts.some((text) => text !== texts[0]);
+  (differ ? state.legends : [meaning]).forEach(({ scale, rows }, i) => {
+    if (differ) add("em", state.hello.sources[i].name);
+    if (scale) {
+      const [low, , high] = scale.marks;
+      const bar = add("span");
+      const colors = document.createElement("b");
+      colors.style.background = `linear-gradient(to right, ${scale.colors.map(css).join(", ")})`;
+      bar.append(low, colors, high);
+    }
+    for (const [name, color, is_round] of rows) {
+      const entry = add("span");
+      const swatch = document.createElement("i");
+      swatch.style.background = css(color);
+      if (is_round) swatch.style.borderRadius = "50%";
+      entry.append(swatch, name);
+    }
+  });
+  at("legend").replaceChildren(...parts);
 }
 
 /// Something was refused, which is to be read before it goes.

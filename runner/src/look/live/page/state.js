@@ -17,6 +17,7 @@ export const state = {
   step: 0,
   frames: 0,
   legend: "",
+  legends: [],
   due: false,
   asked: "",
   failure: null,
