@@ -226,6 +226,24 @@ fn pyramid(shape: Shape) {
     }
 }
 
+/// At a quarter of the rate of substeps, where it would sway for ever if solve had friction last, as relax has.
+#[test]
+fn a_pyramid_rests_where_contacts_are_as_stiff_as_they_may_be() {
+    let mut scene = Scene::new(DVec2::new(0.0, 3.0), -10.0);
+    scene.params.substeps = 2;
+    scene.wall(DVec2::new(0.0, -0.5), (40.0, 1.0), 0.0, Material::default());
+    let kind = scene.kind(Shape::rectangle(0.5, 0.5), Material::default());
+    for row in 0..16 {
+        for i in 0..16 - row {
+            let x = f64::from(i) - 0.5 * f64::from(15 - row);
+            scene.body(kind, DVec2::new(0.5 * x, 0.25 + 0.5 * f64::from(row)), Vec2::ZERO);
+        }
+    }
+    let mut sim = scene.start(EXACT_WAYS[0]);
+    sim.run(600);
+    assert!(sim.greatest_speed() < 0.001, "a box moves at {} m/s", sim.greatest_speed());
+}
+
 /// Both points of its contact are stopped at once, whenever in the step it lands.
 #[test]
 fn who_lands_flat_does_not_turn() {
