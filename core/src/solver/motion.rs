@@ -140,9 +140,11 @@ impl Motion {
         Vectors::new(vx, vy)
     }
 
-    /// A rotation turned on for a substep, at length one again.
+    /// A rotation turned on for a substep, at length one again: by no more than the limit of speed lets it, whatever a blow in between gave.
     #[inline(always)]
     pub(crate) fn turn<V: Lanes>(&self, mut rotation: Vectors<V>, speed: V) -> Vectors<V> {
+        let limit = V::splat(self.max_angular_speed);
+        let speed = speed.min(limit).max(V::splat(0.0).sub(limit));
         for _ in 0..self.parts {
             rotation = at_length_one(self.turn_part(rotation, speed));
         }

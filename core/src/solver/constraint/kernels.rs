@@ -136,8 +136,8 @@ impl<V: Wide> Normals<V> {
     /// The other way around: along the tangents first, within the cones of the normal impulses so far.
     ///
     /// Solve goes this way and relax the other. With friction last in both, pyramids of boxes sway for ever where contacts are as stiff as
-    /// substeps allow (1,275 boxes at 30 Hz); with friction first in both, who lands flat and slides is slowed by too little. With friction
-    /// in relax alone, piles over a tile border jitter a hundred times more.
+    /// substeps allow (1,275 boxes at 30 Hz); with friction first in both, who lands flat and slides comes off the ground. With friction in
+    /// relax alone, piles over a tile border jitter a hundred times more.
     #[inline(always)]
     pub(crate) fn rub_and_push<const N: usize>(
         &self,
