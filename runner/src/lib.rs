@@ -49,8 +49,8 @@ use atoll_core::World;
 use atoll_transport::Rank;
 use plan::Plan;
 
-/// The world of a configuration as its run begins with it, whole, for a program that [steps](atoll_core::step) it itself. Commands,
-/// output, and tilings that follow the bodies, are a matter of runs.
+/// The world of a configuration as its run begins with it, whole, for a program that [steps](atoll_core::step) it itself, on threads of its
+/// own. Commands, output, and tilings that follow the bodies, are a matter of runs.
 ///
 /// ```
 /// use atoll_core::{Loopback, step};
@@ -66,11 +66,15 @@ use plan::Plan;
 /// ```
 ///
 /// # Errors
-/// If the configuration makes no world, or its files cannot be read.
+/// If the configuration makes no world, one that is too crowded for a step, or its files cannot be read.
 pub fn world(config: &Config) -> Result<World, RunError> {
     let mut config = config.clone();
     config.run.ranks = 1;
-    rank::part_of_scene(&Plan::new(&config)?, Rank(0))
+    let plan = Plan::new(&config)?;
+    let world = rank::part_of_scene(&plan, Rank(0))?;
+    let bodies = world.body_count() as u64;
+    rank::not_crowded(world.crowding(), bodies)?;
+    plan.scene.lost(bodies).map_or(Ok(world), |error| Err(error.into()))
 }
 
 /// Runs a configuration from start to end in this process and returns its summary. Prints nothing.

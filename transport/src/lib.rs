@@ -75,19 +75,19 @@
 //!
 //! # A backend of your own
 //!
-//! It keeps an [`Outgoing::owned`], and in an exchange moves its buffers to where they go, however that is done: here two threads by a
-//! pipe each way. [`conformance`] tells whether it keeps the contract, of which this one leaves the timeout to you.
+//! It keeps [`Buffers`], and in an exchange moves them to where they go, however that is done: here two threads by a pipe each way. What of
+//! the contract is about ranks that are lost is left to you; [`conformance`] tells whether you keep it.
 //!
 //! ```
-//! use atoll_transport::{Aborted, Incoming, Outgoing, Rank, Transport, TransportError};
+//! use atoll_transport::{Aborted, Buffers, Incoming, Outgoing, Rank, Transport, TransportError};
 //! use std::sync::mpsc::{Receiver, Sender, channel};
 //! use std::time::Duration;
 //!
 //! struct Pipe {
 //!     rank: Rank,
-//!     outgoing: Outgoing,
-//!     to: Sender<(u128, Vec<u8>)>,
-//!     from: Receiver<(u128, Vec<u8>)>,
+//!     buffers: Buffers,
+//!     to: Sender<(Vec<u8>, u128)>,
+//!     from: Receiver<(Vec<u8>, u128)>,
 //! }
 //!
 //! impl Transport for Pipe {
@@ -100,22 +100,18 @@
 //!     }
 //!
 //!     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
-//!         self.outgoing.lay_out(self.rank, lengths)
+//!         self.buffers.prepare(lengths)
 //!     }
 //!
 //!     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
-//!         self.outgoing.begin_exchange(self.rank)?;
-//!         incoming.begin(2);
 //!         let peer = Rank(1 - self.rank.0);
-//!         let lost = || TransportError::PeerLost { rank: peer, reason: "it left".to_owned() };
-//!         let word = self.outgoing.flag_word();
-//!         self.to.send((word, self.outgoing.replace(peer, Vec::new()))).map_err(|_| lost())?;
-//!         let own = (word, self.outgoing.replace(self.rank, Vec::new()));
-//!         for (from, (word, message)) in [(self.rank, own), (peer, self.from.recv().map_err(|_| lost())?)] {
-//!             incoming.hear(word);
-//!             let old = incoming.replace(from, message);
-//!             self.outgoing.replace(from, old);
-//!         }
+//!         let word = self.buffers.begin_exchange(incoming)?;
+//!         let own = self.buffers.take(self.rank, incoming);
+//!         incoming.accept(self.rank, own, word);
+//!         let lost = || TransportError::PeerLost { rank: peer, reason: "its pipe is closed".to_owned() };
+//!         self.to.send((self.buffers.take(peer, incoming), word)).map_err(|_| lost())?;
+//!         let (message, word) = self.from.recv().map_err(|_| lost())?;
+//!         incoming.accept(peer, message, word);
 //!         incoming.end(Duration::ZERO);
 //!         Ok(())
 //!     }
@@ -126,7 +122,7 @@
 //! }
 //!
 //! let ((to_one, from_zero), (to_zero, from_one)) = (channel(), channel());
-//! let pipe = |rank, to, from| Pipe { rank, outgoing: Outgoing::owned(2), to, from };
+//! let pipe = |rank, to, from| Pipe { rank, buffers: Buffers::new(rank, 2), to, from };
 //! let (mut zero, mut one) = (pipe(Rank(0), to_one, from_one), pipe(Rank(1), to_zero, from_zero));
 //! let other = std::thread::spawn(move || {
 //!     one.prepare(&[3, 0])?.to(Rank(0)).copy_from_slice(b"one");
@@ -165,7 +161,7 @@ mod stats;
 
 pub use collective::Collective;
 pub use error::{Aborted, RankFailure, TransportError};
-pub use frame::{Incoming, Outgoing};
+pub use frame::{Buffers, Incoming, Outgoing};
 pub use launched::{Launched, launched, ranks_here};
 pub use rank::Rank;
 pub use stats::{Counting, Stats};

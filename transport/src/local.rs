@@ -1,7 +1,7 @@
 //! One rank alone: messages to oneself, in memory.
 
 use crate::error::Aborted;
-use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
+use crate::{Buffers, Incoming, Outgoing, Rank, Transport, TransportError};
 use std::time::Duration;
 
 /// The only rank of a run of size 1.
@@ -18,13 +18,13 @@ use std::time::Duration;
 /// ```
 #[derive(Debug)]
 pub struct Local {
-    outgoing: Outgoing,
+    buffers: Buffers,
 }
 
 impl Local {
     /// The endpoint of a run of one rank.
     pub fn new() -> Local {
-        Local { outgoing: Outgoing::owned(1) }
+        Local { buffers: Buffers::new(Rank(0), 1) }
     }
 }
 
@@ -44,16 +44,13 @@ impl Transport for Local {
     }
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
-        self.outgoing.lay_out(Rank(0), lengths)
+        self.buffers.prepare(lengths)
     }
 
     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
-        self.outgoing.begin_exchange(self.rank())?;
-        incoming.begin(1);
-        incoming.hear(self.outgoing.flag_word());
-        let message = self.outgoing.replace(Rank(0), Vec::new());
-        let old = incoming.replace(Rank(0), message);
-        self.outgoing.replace(Rank(0), old);
+        let word = self.buffers.begin_exchange(incoming)?;
+        let message = self.buffers.take(Rank(0), incoming);
+        incoming.accept(Rank(0), message, word);
         incoming.end(Duration::ZERO);
         Ok(())
     }

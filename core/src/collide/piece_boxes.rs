@@ -17,6 +17,9 @@ const GRAIN: usize = 512;
 /// Of more pieces some have a rectangle around all of them, too.
 const FEW: usize = 8;
 
+/// What figures along the diagonals may be wrong by as they are rounded, as part of the greatest that goes into them.
+const ROUNDING: f32 = 1e-6;
+
 /// An eighth of a turn.
 const EIGHTH: Rot = Rot { c: std::f32::consts::FRAC_1_SQRT_2, s: std::f32::consts::FRAC_1_SQRT_2 };
 
@@ -39,7 +42,9 @@ impl PieceBox {
     fn new(piece: &Piece, rotation: Rot) -> Self {
         let (upright, slanted) = (piece.outline.bounds(rotation), piece.outline.bounds(EIGHTH.after(rotation)));
         let [low, high] = [0, 1].map(|end| along_all(upright[end], slanted[end]));
-        Self { low: low - piece.radius, high: high + piece.radius }
+        let wider = ROUNDING * high.max(-low).max_element();
+        let margin = piece.radius + Vec4::new(0.0, 0.0, wider, wider);
+        Self { low: low - margin, high: high + margin }
     }
 
     /// Around all of some.
@@ -48,12 +53,12 @@ impl PieceBox {
         all.iter().fold(nothing, |one, two| Self { low: one.low.min(two.low), high: one.high.max(two.high) })
     }
 
-    /// Whether another, of a body at `offset` from this one's, is further than so far along a direction. Who is apart from one that holds
+    /// Whether another, of a body at `offset` from this one's, is further than so far along one of the four directions. Who is apart from one that holds
     /// others is apart from these, rounded as all is.
     #[inline(always)]
-    fn is_apart(&self, other: &Self, offset: Vec4, far: f32) -> bool {
+    fn is_apart(&self, other: &Self, offset: Vec4, far: Vec4) -> bool {
         let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
-        gap.cmpgt(Vec4::splat(far)).any()
+        gap.cmpgt(far).any()
     }
 }
 
@@ -152,7 +157,8 @@ impl PieceBoxes {
         let mut only = [None; 2];
         let [only_a, only_b] = &mut only;
         let (a, b) = (self.of(bodies[0], tile, setup, only_a), self.of(bodies[1], tile, setup, only_b));
-        let offset = along_all(offset, EIGHTH.rotate(offset));
+        let wider = far + ROUNDING * offset.abs().max_element();
+        let (offset, far) = (along_all(offset, EIGHTH.rotate(offset)), Vec4::new(far, far, wider, wider));
         let whole = if a.groups.is_empty() { None } else { Some(b.around()) };
         let beyond = |box_a: &PieceBox| whole.is_some_and(|whole| box_a.is_apart(&whole, offset, far));
         a.each_near(beyond, |number_a| {

@@ -36,6 +36,9 @@ impl Changes {
 /// The new place of who is gone.
 const GONE: u32 = u32::MAX;
 
+/// Who is so few places nearer to the first than he was is found as fast.
+const NEAR: usize = 64;
+
 /// The kind of those that came and left again: so that others keep their places.
 const LEFT: KindId = KindId(u32::MAX);
 
@@ -160,13 +163,14 @@ impl Tile {
     /// their order, so that it makes no difference how often this is done. Takes time for the tile.
     pub(crate) fn settle(&mut self) {
         let Some(changes) = self.changes.take() else { return };
+        self.is_rearranged |= changes.gone.len() + changes.left > NEAR;
         let rests = !self.sleep.still().is_empty();
         if rests {
             self.sleep.resize(self.owned);
         }
         let mut owned = self.owned;
         if !changes.gone.is_empty() {
-            (owned, self.is_rearranged) = (0, true);
+            owned = 0;
             // For each its new place.
             let mut places = Vec::with_capacity(self.owned);
             let is_gone = changes.is_gone();

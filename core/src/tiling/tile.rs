@@ -36,7 +36,7 @@ pub(crate) struct Tile {
     pub(crate) changes: Option<Box<Changes>>,
     /// Owned bodies that came in this step, or changed places as others left: their contacts of before are among the strays.
     pub(crate) newcomers: Vec<u32>,
-    /// Whether owned bodies that neither came nor left are in other places than before. Who remembers their places takes it back.
+    /// Whether owned bodies beside the newcomers are far from the places where they were. Who remembers these takes note, and takes it back.
     pub(crate) is_rearranged: bool,
     /// Places of owned bodies that left, ascending. Empty but between the two halves of the first sync point.
     pub(crate) gaps: Vec<u32>,

@@ -70,12 +70,12 @@ impl Locator {
 
     /// After a step: the bodies of a tile that are new there, or in another place.
     pub(super) fn follow(&mut self, number: u32, tile: &mut Tile) {
+        let ids = &tile.bodies.id[..tile.owned];
         if std::mem::take(&mut tile.is_rearranged) {
-            return self.write_down(number, tile);
+            return self.places.extend(ids.iter().zip(0..).map(|(&id, at)| (id, Place { tile: number, at })));
         }
-        for &index in &tile.newcomers {
-            let id = tile.bodies.id[index as usize];
-            self.places.insert(id, Place { tile: number, at: index });
+        for &at in &tile.newcomers {
+            self.places.insert(ids[at as usize], Place { tile: number, at });
         }
     }
 

@@ -7,7 +7,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, Tr
 
 use crate::origin::{Origin, left_early};
 use crate::patience::Patience;
-use crate::{Incoming, Outgoing, Rank, TransportError};
+use crate::{Buffers, Incoming, Rank, TransportError};
 
 /// Messages that a channel holds. Lockstep leaves at most two unread, so a send never waits. (With none, a
 /// rank would wait in its first send for a peer that waits in its own.)
@@ -94,9 +94,12 @@ impl Links {
     }
 
     /// Sends a frame to every rank and receives one from each. An error ends the run for this rank.
-    pub(super) fn exchange(&mut self, outgoing: &mut Outgoing, incoming: &mut Incoming) -> Result<(), TransportError> {
+    pub(super) fn exchange(
+        &mut self,
+        outgoing: (&mut Buffers, u128),
+        incoming: &mut Incoming,
+    ) -> Result<(), TransportError> {
         let started = Instant::now();
-        incoming.begin(self.size());
         self.send(outgoing, incoming, started)
             .and_then(|()| {
                 let sent = Instant::now();
@@ -115,17 +118,14 @@ impl Links {
     /// Sends every frame; the frames of the round before, given back by `incoming`, become the memory of the next.
     pub(super) fn send(
         &mut self,
-        outgoing: &mut Outgoing,
+        (outgoing, word): (&mut Buffers, u128),
         incoming: &mut Incoming,
         started: Instant,
     ) -> Result<(), TransportError> {
-        let word = outgoing.flag_word();
         for (to, sender) in Rank::all(self.size()).zip(&self.senders) {
-            let old = incoming.replace(to, Vec::new());
-            let message = outgoing.replace(to, old);
+            let message = outgoing.take(to, incoming);
             let Some(sender) = sender else {
-                incoming.replace(to, message);
-                incoming.hear(word);
+                incoming.accept(to, message, word);
                 continue;
             };
             let left = self.peer_timeout.saturating_sub(started.elapsed());
@@ -182,8 +182,7 @@ impl Links {
     }
 
     fn accept(&mut self, from: Rank, (message, word): Frame, incoming: &mut Incoming) {
-        incoming.replace(from, message);
-        incoming.hear(word);
+        incoming.accept(from, message, word);
         self.awaited[from.index()] = false;
     }
 

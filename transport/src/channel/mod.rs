@@ -27,7 +27,7 @@ pub use self::run::run;
 
 use self::links::Links;
 use crate::error::Aborted;
-use crate::{Incoming, Outgoing, Rank, Transport, TransportError};
+use crate::{Buffers, Incoming, Outgoing, Rank, Transport, TransportError};
 
 /// How the ranks of a run are joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,8 +82,8 @@ impl Builder {
     /// Makes the endpoint. Call this on the rank's own thread.
     pub fn build(mut self) -> Channel {
         self.links.join_run();
-        let outgoing = Outgoing::owned(self.links.size());
-        Channel { links: self.links, outgoing }
+        let buffers = Buffers::new(self.links.rank(), self.links.size());
+        Channel { links: self.links, buffers }
     }
 }
 
@@ -91,7 +91,7 @@ impl Builder {
 #[derive(Debug)]
 pub struct Channel {
     links: Links,
-    outgoing: Outgoing,
+    buffers: Buffers,
 }
 
 impl Transport for Channel {
@@ -105,13 +105,13 @@ impl Transport for Channel {
 
     fn prepare(&mut self, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
         self.links.check()?;
-        self.outgoing.lay_out(self.links.rank(), lengths)
+        self.buffers.prepare(lengths)
     }
 
     fn exchange(&mut self, incoming: &mut Incoming) -> Result<(), TransportError> {
         self.links.check()?;
-        self.outgoing.begin_exchange(self.links.rank())?;
-        let result = self.links.exchange(&mut self.outgoing, incoming);
+        let word = self.buffers.begin_exchange(incoming)?;
+        let result = self.links.exchange((&mut self.buffers, word), incoming);
         if result.is_err() {
             incoming.clear();
         }

@@ -84,10 +84,9 @@ fn what_was_sent_before_leaving_arrives() {
     });
     // The two halves of an exchange, so that the answer is taken only when the other rank has left.
     a.prepare(&[1, 1]).unwrap().iter_mut().for_each(|(_, frame)| frame.copy_from_slice(b"a"));
-    a.outgoing.begin_exchange(Rank(0)).unwrap();
     let mut incoming = Incoming::default();
-    incoming.begin(2);
-    a.links.send(&mut a.outgoing, &mut incoming, Instant::now()).unwrap();
+    let word = a.buffers.begin_exchange(&mut incoming).unwrap();
+    a.links.send((&mut a.buffers, word), &mut incoming, Instant::now()).unwrap();
     has_left.recv().unwrap();
     a.links.receive(&mut incoming, Instant::now()).unwrap();
     assert_eq!(incoming.from(Rank(1)), b"b");

@@ -6,6 +6,7 @@
 //! of one machine it is a slice of shared memory per rank (`loaned`): written once, read in place. A message-passing library
 //! gets one buffer with a part for each rank (`flat`).
 
+mod buffers;
 #[cfg(feature = "mpi")]
 mod flat;
 #[cfg(feature = "iceoryx2")]
@@ -13,6 +14,7 @@ mod loaned;
 mod owned;
 
 use crate::{Rank, TransportError};
+pub use buffers::Buffers;
 #[cfg(feature = "mpi")]
 pub(crate) use flat::Flat;
 #[cfg(feature = "iceoryx2")]
@@ -52,8 +54,8 @@ impl Outgoing {
         Outgoing { memory, size, flag_word: NO_WORD, ready: false }
     }
 
-    /// For backends that move a buffer to each of so many ranks, as [one of your own](crate#a-backend-of-your-own) may.
-    pub fn owned(size: usize) -> Outgoing {
+    /// For backends that move a buffer per rank.
+    pub(crate) fn owned(size: usize) -> Outgoing {
         Outgoing::new(size, OutgoingMemory::Owned(OwnedOutgoing::new(size)))
     }
 
@@ -106,32 +108,9 @@ impl Outgoing {
         self.flag_word = word;
     }
 
-    /// The word of this rank, for a backend to send.
-    pub fn flag_word(&self) -> u128 {
+    /// The word of this rank.
+    pub(crate) fn flag_word(&self) -> u128 {
         self.flag_word
-    }
-
-    /// All of a [prepare](crate::Transport::prepare) of an endpoint of that rank, for a backend that moves a buffer to each.
-    ///
-    /// # Errors
-    /// [`Usage`](TransportError::Usage) if there is not one length per rank.
-    ///
-    /// # Panics
-    /// If it is not [owned](Outgoing::owned).
-    pub fn lay_out(&mut self, rank: Rank, lengths: &[usize]) -> Result<&mut Outgoing, TransportError> {
-        self.begin_prepare(rank, lengths)?;
-        self.as_owned().resize(lengths);
-        self.end_prepare();
-        Ok(self)
-    }
-
-    /// Takes out what goes to a rank and leaves another buffer, of any length, as the memory of a later round: best the one that came
-    /// from there in the round before.
-    ///
-    /// # Panics
-    /// If there is no such rank, or if it is not [owned](Outgoing::owned).
-    pub fn replace(&mut self, to: Rank, old: Vec<u8>) -> Vec<u8> {
-        self.as_owned().replace(to, old)
     }
 
     /// The buffers of a backend that moves one per rank.
@@ -179,11 +158,8 @@ impl Outgoing {
         self.ready = true;
     }
 
-    /// Begins the sending by an endpoint of that rank: the round is spent from here on.
-    ///
-    /// # Errors
-    /// [`Usage`](TransportError::Usage) if nothing was prepared.
-    pub fn begin_exchange(&mut self, rank: Rank) -> Result<(), TransportError> {
+    /// Begins the sending: the round is spent from here on.
+    pub(crate) fn begin_exchange(&mut self, rank: Rank) -> Result<(), TransportError> {
         if std::mem::take(&mut self.ready) {
             Ok(())
         } else {
@@ -281,24 +257,23 @@ impl Incoming {
         self.waited
     }
 
-    /// Begins a round among so many ranks, whose flag words are all to be [heard](Incoming::hear), and whose messages are to be
-    /// [taken in](Incoming::replace).
-    pub fn begin(&mut self, size: usize) {
+    /// Begins a round among so many ranks, whose flag words are all to be [`hear`](Incoming::hear)d.
+    pub(crate) fn begin(&mut self, size: usize) {
         (self.size, self.flag_word) = (size, NO_WORD);
     }
 
     /// Takes the flag word of one rank into account.
-    pub fn hear(&mut self, word: u128) {
+    pub(crate) fn hear(&mut self, word: u128) {
         self.flag_word = self.flag_word.min(word);
     }
 
-    /// Takes in the message of a rank, for a backend that moves a buffer from each, and returns the buffer that was there.
+    /// Takes in the message of a rank, of a backend that moves [`Buffers`], and its flag word.
     ///
     /// # Panics
-    /// If the round has no such rank.
-    pub fn replace(&mut self, from: Rank, message: Vec<u8>) -> Vec<u8> {
-        let size = self.size;
-        self.as_owned().replace(from, size, message)
+    /// If there is no such rank, or the exchange was not [begun](Buffers::begin_exchange).
+    pub fn accept(&mut self, from: Rank, message: Vec<u8>, word: u128) {
+        self.as_owned().replace(from, message);
+        self.hear(word);
     }
 
     /// Ends a round in which the rank [waited](Incoming::waited) so long.
@@ -346,41 +321,5 @@ impl Incoming {
     /// Forgets every message, so that a failed round cannot be mistaken for a received one.
     pub fn clear(&mut self) {
         *self = Incoming::default();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn buffers_have_the_prepared_lengths() {
-        let mut outgoing = Outgoing::owned(3);
-        for lengths in [[4, 0, 9], [1, 7, 0]] {
-            outgoing.lay_out(Rank(0), &lengths).unwrap();
-            let seen: Vec<_> = outgoing.iter_mut().map(|(rank, frame)| (rank, frame.len())).collect();
-            assert_eq!(seen, [(Rank(0), lengths[0]), (Rank(1), lengths[1]), (Rank(2), lengths[2])]);
-            assert_eq!(outgoing.to(Rank(1)).len(), lengths[1]);
-        }
-    }
-
-    #[test]
-    fn a_failed_prepare_leaves_nothing_prepared() {
-        let mut outgoing = Outgoing::owned(2);
-        outgoing.lay_out(Rank(1), &[1, 1]).unwrap();
-        let error = outgoing.lay_out(Rank(1), &[1]).unwrap_err();
-        assert!(error.to_string().starts_with("rank 1: prepare was given 1 lengths for 2 ranks"), "{error}");
-        let error = outgoing.begin_exchange(Rank(1)).unwrap_err();
-        assert!(error.to_string().starts_with("rank 1: exchange without prepare"), "{error}");
-    }
-
-    #[test]
-    fn a_flag_word_is_for_one_round() {
-        let mut outgoing = Outgoing::owned(1);
-        outgoing.lay_out(Rank(0), &[0]).unwrap();
-        outgoing.set_flag_word(7);
-        assert_eq!(outgoing.flag_word(), 7);
-        outgoing.lay_out(Rank(0), &[0]).unwrap();
-        assert_eq!(outgoing.flag_word(), NO_WORD);
     }
 }

@@ -63,9 +63,13 @@ impl OwnedIncoming {
         &self.frames[rank.index()]
     }
 
-    /// Puts a frame of `rank`, one of so many, in its place, and takes out the one that was there.
-    pub(super) fn replace(&mut self, rank: Rank, size: usize, frame: Vec<u8>) -> Vec<u8> {
+    /// Makes room for one frame per rank.
+    pub(super) fn resize(&mut self, size: usize) {
         self.frames.resize_with(size, Vec::new);
+    }
+
+    /// Puts a frame of `rank` in its place, and takes out the one that was there.
+    pub(super) fn replace(&mut self, rank: Rank, frame: Vec<u8>) -> Vec<u8> {
         std::mem::replace(&mut self.frames[rank.index()], frame)
     }
 }

@@ -104,8 +104,8 @@ impl<V: Wide> Normals<V> {
         }
     }
 
-    /// Sets the relative velocities right: along the normals, and then along the tangents, within the cones that the normal
-    /// impulses of this moment allow. `press` tells what the normal impulse at a point is to be.
+    /// Sets the relative velocities right, in relax and in all passes of `pgs`: along the normals, and then along the tangents, within the
+    /// cones that the normal impulses of this moment allow. `press` tells what the normal impulse at a point is to be.
     ///
     /// Returns how fast, in m/s, friction at two points then has them part or meet, which the normals had stopped.
     #[inline(always)]
@@ -122,7 +122,7 @@ impl<V: Wide> Normals<V> {
             self.push_at_once(rows, friction, a, b, press);
             return V::splat(0.0);
         }
-        self.press(points, a, b, press);
+        self.press_points(points, a, b, press);
         let [turning_a, turning_b] = self.rub(points, friction, a, b);
         let zero = V::splat(0.0);
         let mut turned = zero;
@@ -149,16 +149,21 @@ impl<V: Wide> Normals<V> {
     ) {
         if let [rows] = &mut points[..] {
             let press = press(rows);
-            self.push_at_once(rows, friction, a, b, press);
-            return;
+            return self.push_at_once(rows, friction, a, b, press);
         }
         self.rub(points, friction, a, b);
-        self.press(points, a, b, press);
+        self.press_points(points, a, b, press);
     }
 
     /// Sets the relative velocities at two points right along the normals.
     #[inline(always)]
-    fn press(&self, points: &mut [PointRows], a: &mut [V; 4], b: &mut [V; 4], press: impl Fn(&PointRows) -> Press<V>) {
+    fn press_points(
+        &self,
+        points: &mut [PointRows],
+        a: &mut [V; 4],
+        b: &mut [V; 4],
+        press: impl Fn(&PointRows) -> Press<V>,
+    ) {
         if let [one, two] = points {
             let presses = [press(one), press(two)];
             self.press_together([one, two], presses, a, b);
