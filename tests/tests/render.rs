@@ -209,7 +209,8 @@ fn what_cannot_be_shown_is_told_in_one_line_and_leaves_nothing() {
 #[test]
 fn a_run_that_fails_ends_the_film_with_what_it_has_to_say() {
     let folder = tempdir().unwrap();
-    let wild = [&WORLD[..], &["--set", "gravity=[0.0, -3e38]", "--ranks", "2", "--every", "1"]].concat();
+    let wild =
+        [&WORLD[..], &["--set", "hertz=1", "--set", "gravity=[0.0, -3e38]", "--ranks", "2", "--every", "1"]].concat();
     let ended = render(&wild, &folder.path().join("a.gif"), &[]);
     assert_eq!((ended.code, ended.complaints().len()), (Some(4), 1), "{ended}");
     assert!(ended.stderr.contains("is no longer finite"), "{ended}");

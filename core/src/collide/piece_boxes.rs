@@ -53,8 +53,8 @@ impl PieceBox {
         all.iter().fold(nothing, |one, two| Self { low: one.low.min(two.low), high: one.high.max(two.high) })
     }
 
-    /// Whether another, of a body at `offset` from this one's, is further than so far along one of the four directions. Who is apart from one that holds
-    /// others is apart from these, rounded as all is.
+    /// Whether another, of a body at `offset` from this one's, is further than so far along one of the four directions. Who is apart from one
+    /// that holds others is apart from these, rounded as all is.
     #[inline(always)]
     fn is_apart(&self, other: &Self, offset: Vec4, far: Vec4) -> bool {
         let gap = (offset + other.low - self.high).max(self.low - (offset + other.high));
