@@ -21,9 +21,13 @@ fn boxes_slide_where_the_slope_is_steeper_than_friction_holds() {
             let found = run("slope", &keys).mean_half_v2;
             let (angle, friction): (f64, f64) = (angle.parse().unwrap(), friction.parse().unwrap());
             let (sin, cos) = angle.to_radians().sin_cos();
-            let speed = 2.0 * 10.0 * (sin - friction * cos).max(0.0);
-            let expected = 0.5 * speed * speed;
-            assert!((found - expected).abs() < 0.03 * expected + 1e-5, "{keys:?}: {found}, not {expected}");
+            let (found, expected) = ((2.0 * found).sqrt(), 2.0 * 10.0 * (sin - friction * cos).max(0.0));
+            // As the contact begins, half of what friction does in a substep may be missing, if it slides.
+            let begins = if expected > 0.0 { 0.5 * friction * cos * 10.0 / 240.0 } else { 0.0 };
+            assert!(
+                (found - expected).abs() < 0.002 * expected + begins + 1e-4,
+                "{keys:?}: {found}, not {expected} m/s"
+            );
         }
     }
 }
