@@ -67,7 +67,7 @@ impl Pass for Iterate {
             normals.part(group, bodies, &a, &b);
         }
         let friction = V::load(&group.sides.friction);
-        normals.push(
+        normals.push::<N, false>(
             &mut group.points,
             friction,
             &mut a,

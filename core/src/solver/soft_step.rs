@@ -67,7 +67,7 @@ impl Pass for Solve {
             (either(|s| s.bias_rate), either(|s| s.mass_scale), either(|s| s.impulse_scale));
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let friction = V::load(&group.sides.friction);
-        normals.rub_and_push(
+        normals.push::<N, true>(
             &mut group.points,
             friction,
             &mut a,

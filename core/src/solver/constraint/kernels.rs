@@ -104,12 +104,16 @@ impl<V: Wide> Normals<V> {
         }
     }
 
-    /// Sets the relative velocities right, in relax and in all passes of `pgs`: along the normals, and then along the tangents, within the
-    /// cones that the normal impulses of this moment allow. `press` tells what the normal impulse at a point is to be.
+    /// Sets the relative velocities right: along the normals and along the tangents, within the cones that the normal impulses of this
+    /// moment allow; at two points one after the other. `press` tells what the normal impulse at a point is to be.
     ///
-    /// Returns how fast, in m/s, friction at two points then has them part or meet, which the normals had stopped.
+    /// In solve friction goes first, in relax and in all passes of `pgs` last. With friction last in solve, too, pyramids of boxes sway for
+    /// ever where contacts are as stiff as substeps allow (1,275 boxes at 30 Hz); with friction first in both, who lands flat and slides comes
+    /// off the ground. With friction in relax alone, piles over a tile border jitter a hundred times more.
+    ///
+    /// Returns how fast, in m/s, friction that goes last at two points then has them part or meet, which the normals had stopped.
     #[inline(always)]
-    pub(crate) fn push<const N: usize>(
+    pub(crate) fn push<const N: usize, const FRICTION_FIRST: bool>(
         &self,
         points: &mut [PointRows; N],
         friction: V,
@@ -117,57 +121,29 @@ impl<V: Wide> Normals<V> {
         b: &mut [V; 4],
         press: impl Fn(&PointRows) -> Press<V>,
     ) -> V {
+        let zero = V::splat(0.0);
         if let [rows] = &mut points[..] {
             let press = press(rows);
             self.push_at_once(rows, friction, a, b, press);
-            return V::splat(0.0);
+            return zero;
         }
-        self.press_points(points, a, b, press);
+        if FRICTION_FIRST {
+            self.rub(points, friction, a, b);
+        }
+        if let [one, two] = &mut points[..] {
+            let presses = [press(one), press(two)];
+            self.press_together([one, two], presses, a, b);
+        }
+        if FRICTION_FIRST {
+            return zero;
+        }
         let [turning_a, turning_b] = self.rub(points, friction, a, b);
-        let zero = V::splat(0.0);
         let mut turned = zero;
         for rows in points {
             let speed = V::load(&rows.normal_a).mul(turning_a).add(V::load(&rows.normal_b).mul(turning_b));
             turned = turned.max(speed).max(zero.sub(speed));
         }
         turned
-    }
-
-    /// The other way around: along the tangents first, within the cones of the normal impulses so far.
-    ///
-    /// Solve goes this way and relax the other. With friction last in both, pyramids of boxes sway for ever where contacts are as stiff as
-    /// substeps allow (1,275 boxes at 30 Hz); with friction first in both, who lands flat and slides comes off the ground. With friction in
-    /// relax alone, piles over a tile border jitter a hundred times more.
-    #[inline(always)]
-    pub(crate) fn rub_and_push<const N: usize>(
-        &self,
-        points: &mut [PointRows; N],
-        friction: V,
-        a: &mut [V; 4],
-        b: &mut [V; 4],
-        press: impl Fn(&PointRows) -> Press<V>,
-    ) {
-        if let [rows] = &mut points[..] {
-            let press = press(rows);
-            return self.push_at_once(rows, friction, a, b, press);
-        }
-        self.rub(points, friction, a, b);
-        self.press_points(points, a, b, press);
-    }
-
-    /// Sets the relative velocities at two points right along the normals.
-    #[inline(always)]
-    fn press_points(
-        &self,
-        points: &mut [PointRows],
-        a: &mut [V; 4],
-        b: &mut [V; 4],
-        press: impl Fn(&PointRows) -> Press<V>,
-    ) {
-        if let [one, two] = points {
-            let presses = [press(one), press(two)];
-            self.press_together([one, two], presses, a, b);
-        }
     }
 
     /// Sets the relative velocities at some points right along the tangents, within the cones that the normal impulses of this moment
@@ -202,7 +178,7 @@ impl<V: Wide> Normals<V> {
         /// In m/s.
         const SLIGHT: f32 = 0.1;
         const TIMES: usize = 8;
-        let mut turned = self.push(points, friction, a, b, press);
+        let mut turned = self.push::<N, false>(points, friction, a, b, press);
         if N == 1 {
             return;
         }
@@ -212,7 +188,7 @@ impl<V: Wide> Normals<V> {
                 return;
             }
             let before = (points.clone(), *a, *b);
-            turned = moves.if_positive(self.push(points, friction, a, b, press), V::splat(0.0));
+            turned = moves.if_positive(self.push::<N, false>(points, friction, a, b, press), V::splat(0.0));
             for (rows, before) in points.iter_mut().zip(&before.0) {
                 pick(moves, &mut rows.normal_impulse, &before.normal_impulse);
                 pick(moves, &mut rows.tangent_impulse, &before.tangent_impulse);
