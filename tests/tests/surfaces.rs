@@ -1,6 +1,6 @@
 //! Ground of several pieces bears what slides, rolls and comes down upon it as one piece does.
 
-use atoll_core::{Body, Exchange, GlobalId, Material, Part, Rot, Shape};
+use atoll_core::{Body, Exchange, GlobalId, Material, Part, Path, Rot, Shape};
 use atoll_tests::world::{Scene, Sim, noise};
 use glam::{DVec2, Vec2};
 use std::f32::consts::TAU;
@@ -406,5 +406,38 @@ fn nobody_is_pressed_through_a_chain() {
         };
         let out: Vec<_> = sim.bodies().iter().filter(out).map(|body| (body.id, body.position - MIDDLE)).collect();
         assert!(out.is_empty(), "room {seed}: {out:?}");
+    }
+}
+
+/// Defect: discs at rest on the inside of a ring that turns came out slower than it, as each step led them along the tangent, and friction made
+/// spin of that: twelve times as much as the ring's in five seconds.
+#[test]
+fn a_disc_goes_around_with_a_ring_that_turns() {
+    const COUNT: u8 = 32;
+    let (inner, radius, spin) = (4.0_f32, 0.3_f32, 8.0_f32);
+    let middle = inner + 0.25;
+    let parts = (0..COUNT).map(|k| {
+        let angle = TAU * f32::from(k) / f32::from(COUNT);
+        let length = 2.0 * (inner + 0.5) * (TAU / 2.0 / f32::from(COUNT)).tan();
+        let position = middle * Vec2::new(angle.sin(), angle.cos());
+        Part { position, rotation: Rot::from_angle(-angle), ..part([0.0, 0.0, length, 0.5]) }
+    });
+    let material = Material { friction: 0.9, ..Material::default() };
+    let mut scene = Scene { half: DVec2::splat(20.0), ..Scene::new(MIDDLE, 0.0) };
+    scene.fixed(Shape::compound(parts.collect()).unwrap(), MIDDLE, material);
+    scene.statics[0].path = Some(Path { turning: f64::from(spin), ..Path::default() });
+    let disc = scene.kind(Shape::circle(radius), material);
+    for k in (0..COUNT).step_by(4) {
+        let angle = TAU * f32::from(k) / f32::from(COUNT);
+        let arm = (inner - radius) * Vec2::new(angle.sin(), angle.cos());
+        scene.body(disc, MIDDLE + arm.as_dvec2(), spin * arm.perp());
+        scene.last().angular_velocity = spin;
+    }
+    let mut sim = scene.start_on((2, 2), Exchange::Substep);
+    sim.run(300);
+    for body in sim.bodies() {
+        let speed = body.velocity.length() / (spin * (inner - radius));
+        assert!((speed - 1.0).abs() < 0.03, "{speed} times as fast as the ring carries it");
+        assert!((body.angular_velocity / spin - 1.0).abs() < 0.5, "{} rad/s", body.angular_velocity);
     }
 }

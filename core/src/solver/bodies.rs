@@ -5,8 +5,10 @@ use super::index::{GraphNode, SolverIndex, forget};
 use crate::collide::broad_phase::Pair;
 use crate::collide::narrow_phase::Contacts;
 use crate::exchange::record::{GhostRefresh, Unseen};
+use crate::model::body::Bodies;
+use crate::model::contact::Contact;
 use crate::model::kind::KindRow;
-use crate::model::math::{Rot, max, right_perp};
+use crate::model::math::{Rot, max, right_perp, turn};
 use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad};
 use crate::parallel::team::Team;
@@ -130,6 +132,29 @@ const CARRIER: f32 = (1_u64 << 50) as f32;
 pub(crate) const LIGHTEST: f32 = 2.0 / CARRIER;
 
 const ZERO: Quad = [0.0; 4];
+
+/// What is added to the velocity of a static that turns, in m/s, for a disc that goes around with it as on its surface, so that it leads
+/// along the chord of the step's arc and not along the tangent. On the tangent the disc comes out slower than what carries it, and friction
+/// makes spin of that. The corners of others tell how a static turns. Of two bodies the static is the first; the arm leads from its
+/// center to the disc's.
+fn drawn_in(bodies: &Bodies, [of, disc]: [usize; 2], arm: Vec2, setup: &Setup) -> Option<Vec2> {
+    /// What it goes besides, as a part of how fast it is carried; and how far a static may turn in a step, in rad.
+    const MOST: f32 = 0.25;
+    let spin = bodies.angular_velocity[of];
+    let angle = spin * setup.params.dt;
+    let [from, around] = [of, disc].map(|body| setup.kind(bodies.kind[body]));
+    if spin == 0.0 || angle.abs() > MOST || around.not_round > 0.0 || from.not_round == 0.0 {
+        return None;
+    }
+    let carried = turn(spin, arm);
+    let besides = bodies.velocity[disc] - bodies.velocity[of] - carried;
+    if besides.length_squared() > MOST * MOST * carried.length_squared() {
+        return None;
+    }
+    // (1 - cos)/angle and sin/angle - 1, as far as it matters.
+    let (inward, back) = (angle * (0.5 - angle * angle / 24.0), -angle * angle / 6.0);
+    Some(carried * back - arm * (spin * inward))
+}
 
 /// The root of a body's inverse mass, less than zero for a round one.
 fn marked(root_inv_mass: f32, kind: &KindRow) -> f32 {
@@ -283,9 +308,9 @@ impl SolverBodies {
             if place == SolverIndex::NOT_SOLVED {
                 continue;
             }
-            let [first, _] = contacts.bodies[contact as usize];
-            let normal = tile.contacts.contacts[contact as usize].normal;
-            let outward = if first == body { normal } else { -normal };
+            let [first, second] = contacts.bodies[contact as usize];
+            let Contact { normal, offset, .. } = tile.contacts.contacts[contact as usize];
+            let (outward, arm) = if first == body { (normal, offset) } else { (-normal, -offset) };
             let i = body as usize;
             let kind = setup.kind(bodies.kind[i]);
             let runs = right_perp(outward) * kind.material.surface_speed;
@@ -294,9 +319,13 @@ impl SolverBodies {
             let row = row.or_else(|| setup.row_of_going(bodies.id[i]));
             let faster = row.map_or(Vec2::ZERO, |row| setup.acceleration_at(row, step)) * setup.params.substep();
             let velocity = if faster == Vec2::ZERO { velocity } else { velocity - faster * later };
+            let other = if first == body { second } else { first };
+            let drawn_in = drawn_in(bodies, [i, other as usize], arm, setup);
+            let velocity = drawn_in.map_or(velocity, |more| velocity + more);
             let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
             let gain = [faster.x, faster.y, 0.0].map(|speed| speed * CARRIER);
-            self.velocity[place.get()] = [given[0], given[1], given[2], marked(1.0 / CARRIER, kind)];
+            let root_inv_mass = if drawn_in.is_some() { -1.0 / CARRIER } else { marked(1.0 / CARRIER, kind) };
+            self.velocity[place.get()] = [given[0], given[1], given[2], root_inv_mass];
             self.weight[place.get()] = [CARRIER, CARRIER, 1.0 / CARRIER, 1.0 / CARRIER];
             self.ghosts.push(Ghost { place, given, gain, held: true });
         }
