@@ -136,8 +136,8 @@ pub(crate) struct Setup {
     driving: Vec<bool>,
     /// Where they stand.
     pub(crate) terrain: Arc<Terrain>,
-    /// Their names, sorted.
-    static_names: Vec<GlobalId>,
+    /// Their names, sorted, and the row of each.
+    static_names: Vec<(GlobalId, u32)>,
     /// Bodies this near a tile's region may matter to it, in meters.
     pub(crate) halo_width: f64,
     /// Large bodies this near may; as wide where there are none.
@@ -198,10 +198,10 @@ impl Setup {
         let drives = |fixed: &StaticBody| fixed.path.is_some() || fixed.kind.material.surface_speed != 0.0;
         let any_drives = blueprint.statics.iter().any(drives);
         let driving = if any_drives { blueprint.statics.iter().map(drives).collect() } else { Vec::new() };
-        let mut static_names: Vec<_> = statics.iter().map(|body| body.id).collect();
+        let mut static_names: Vec<_> = statics.iter().map(|body| body.id).zip(0..).collect();
         static_names.sort_unstable();
-        if let Some(pair) = static_names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(SetupError::BadStatic { id: pair[0] });
+        if let Some(pair) = static_names.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return Err(SetupError::BadStatic { id: pair[0].0 });
         }
         let halo_width = halo_width(&blueprint.kinds, &params);
         let boxes = blueprint.statics.iter().zip(&statics);
@@ -297,7 +297,13 @@ impl Setup {
 
     /// Whether a static has this name.
     pub(crate) fn is_static(&self, id: GlobalId) -> bool {
-        self.static_names.binary_search(&id).is_ok()
+        self.row_named(id).is_some()
+    }
+
+    /// The row of the static of this name.
+    pub(crate) fn row_named(&self, id: GlobalId) -> Option<u32> {
+        let found = self.static_names.binary_search_by_key(&id, |&(name, _)| name).ok()?;
+        Some(self.static_names[found].1)
     }
 
     /// Whether a dynamic body may be one of this world: its kind is in the table, its name no static's.
@@ -434,7 +440,7 @@ impl Setup {
 
     /// The row of a static on a path.
     pub(crate) fn row_of_going(&self, id: GlobalId) -> Option<u32> {
-        self.going.iter().copied().find(|&row| self.statics[row as usize].id == id)
+        self.row_named(id).filter(|&row| self.path(row).is_some())
     }
 
     /// The low and the high corner of all that a static sweeps in a step.

@@ -108,8 +108,7 @@ impl Part {
             Question::Point(point) => Self::Names(names(world.at_point(*point))),
             Question::Inside(sensor) => {
                 let is_there = world.is_static(*sensor) || world.get(*sensor).is_some();
-                let pairs = world.inside_sensors(sensors).into_iter();
-                let inside: Vec<u64> = pairs.filter(|(other, _)| other == sensor).map(|(_, body)| body.0).collect();
+                let inside = names(world.inside_sensor(*sensor, sensors));
                 // A rank that does not hold the sensor may hold who is inside.
                 Self::Inside((is_there || !inside.is_empty()).then_some(inside))
             }

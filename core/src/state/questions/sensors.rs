@@ -25,22 +25,33 @@ impl World {
         let is_sensor = |body: &&Body| setup.has_kind(body.kind) && setup.kind(body.kind).sensor;
         let mut sensors: Vec<Body> = fixed.chain(moving.iter().filter(is_sensor).copied()).collect();
         sensors.sort_unstable_by_key(|sensor| sensor.id);
+        sensors.iter().flat_map(|sensor| self.inside(sensor).into_iter().map(|body| (sensor.id, body))).collect()
+    }
+
+    /// Who of this world's bodies is inside one sensor, as [`inside_sensors`](Self::inside_sensors) tells it; nobody in what is none.
+    pub fn inside_sensor(&self, sensor: GlobalId, moving: &[Body]) -> Vec<GlobalId> {
+        let setup = &self.setup;
+        let fixed = setup.row_named(sensor).map(|row| setup.static_at(row, self.step));
+        let found =
+            fixed.or_else(|| moving.iter().find(|body| body.id == sensor && setup.has_kind(body.kind)).copied());
+        found.filter(|found| setup.kind(found.kind).sensor).map_or_else(Vec::new, |found| self.inside(&found))
+    }
+
+    fn inside(&self, sensor: &Body) -> Vec<GlobalId> {
+        let (setup, kind) = (&self.setup, self.setup.kind(sensor.kind));
         let mut found = Vec::new();
-        for sensor in sensors {
-            let (kind, first) = (setup.kind(sensor.kind), found.len());
-            self.visit_bodies(bounds(&sensor, setup), |body| {
-                let other = setup.kind(body.kind);
-                if other.sensor || !kind.filter.admits(&other.filter) {
-                    return;
-                }
-                let offset = (body.position - sensor.position).as_vec2();
-                let manifold = nearest(kind, sensor.rotation, other, body.rotation, offset, 0.0);
-                if manifold.nearest().is_some_and(|point| point.separation <= 0.0) {
-                    found.push((sensor.id, body.id));
-                }
-            });
-            found[first..].sort_unstable();
-        }
+        self.visit_bodies(bounds(sensor, setup), |body| {
+            let other = setup.kind(body.kind);
+            if other.sensor || !kind.filter.admits(&other.filter) {
+                return;
+            }
+            let offset = (body.position - sensor.position).as_vec2();
+            let manifold = nearest(kind, sensor.rotation, other, body.rotation, offset, 0.0);
+            if manifold.nearest().is_some_and(|point| point.separation <= 0.0) {
+                found.push(body.id);
+            }
+        });
+        found.sort_unstable();
         found
     }
 }
