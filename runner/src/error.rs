@@ -325,6 +325,7 @@ impl RunError {
         match self {
             Self::Recording(RecordingError::Write { .. })
             | Self::Output { .. }
+            | Self::Folder(FolderError::Full { .. })
             | Self::Gone { .. }
             | Self::StoppedWriting { .. }
             | Self::StoppedLogging { .. } => Exit::Output,

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Stdout, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 /// A file of answers, or standard output.
@@ -35,32 +35,38 @@ impl AnswersFile {
         if path == Path::new("-") {
             return Ok(Self { path: PathBuf::from("standard output"), to: To::Stdout(io::stdout()) });
         }
-        let kept = if from > 0 { Self::kept(path, from, is_begun)? } else { String::new() };
-        let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
-        file.write_all(kept.as_bytes())?;
+        let kept = if from > 0 { Self::kept(path, from, is_begun)? } else { 0 };
+        // Cut and not written anew, so that nothing is lost whenever that ends.
+        let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
+        if file.metadata()?.is_file() {
+            file.set_len(kept)?;
+            file.seek(SeekFrom::End(0))?;
+        }
         Ok(Self { path: path.to_owned(), to: To::File(file) })
     }
 
-    fn kept(path: &Path, from: u64, is_begun: bool) -> io::Result<String> {
+    /// How many bytes stay.
+    fn kept(path: &Path, from: u64, is_begun: bool) -> io::Result<u64> {
         if !path.metadata().is_ok_and(|metadata| metadata.is_file()) {
-            return Ok(String::new());
+            return Ok(0);
         }
-        let text = match std::fs::read_to_string(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(String::new()),
-            text => text?,
-        };
-        let mut kept = String::new();
-        for (line, number) in text.split_inclusive('\n').zip(1..) {
+        let mut lines = BufReader::new(File::open(path)?);
+        let (mut kept, mut line) = (0, String::new());
+        for number in 1.. {
+            line.clear();
+            let length = lines.read_line(&mut line)?;
             // A run that was killed may have been writing the last one.
-            let head = match serde_json::from_str::<Head>(line) {
+            let head = match serde_json::from_str::<Head>(&line) {
                 Ok(head) => head,
                 Err(error) if error.is_eof() && !line.ends_with('\n') => break,
                 Err(_) => return Err(io::Error::new(ErrorKind::InvalidData, format!("line {number} is no answer"))),
             };
             let is_event = head.began.is_some() || head.entered.is_some();
-            if line.ends_with('\n') && (head.step < from || head.step == from && (is_begun || is_event)) {
-                kept.push_str(line);
+            let stays = head.step < from || head.step == from && (is_begun || is_event);
+            if !(stays && line.ends_with('\n')) {
+                break;
             }
+            kept += length as u64;
         }
         Ok(kept)
     }

@@ -17,6 +17,16 @@ pub enum FolderError {
         /// What is wrong with it, and what to do.
         reason: String,
     },
+    /// There is no room left for what is to be written there.
+    #[error("{option} {}: {reason}; make room, and do the same again", .path.display())]
+    Full {
+        /// What it was given with.
+        option: &'static str,
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
     /// The configuration that a run left there.
     #[error(transparent)]
     Config(Box<ConfigError>),

@@ -32,7 +32,7 @@ pub(crate) fn agree<T>(
                 error,
                 RunError::BadOutput { .. }
                     | RunError::TakenOutput { .. }
-                    | RunError::Folder(FolderError::Unusable { .. })
+                    | RunError::Folder(FolderError::Unusable { .. } | FolderError::Full { .. })
             );
             let name = if of_one { COMMON_ERROR } else { ERROR };
             vec![(name.to_owned(), in_words(error))]
