@@ -19,7 +19,8 @@ pub enum Way {
 }
 
 impl Way {
-    /// Those that are built into the program, as the features of this package say.
+    /// Those that are built into the program, as the features of this package say; with the environment variable `ATOLL_WAYS=mpi` only one
+    /// rank alone and those of MPI.
     pub fn all() -> Vec<Self> {
         let mut ways = vec![Self::Local, Self::Channel];
         if cfg!(feature = "iceoryx2") {
@@ -27,6 +28,9 @@ impl Way {
         }
         if cfg!(feature = "mpi") {
             ways.extend([Self::Mpi("alltoallv"), Self::Mpi("sparse")]);
+        }
+        if std::env::var("ATOLL_WAYS").is_ok_and(|chosen| chosen == "mpi") {
+            ways.retain(|way| matches!(way, Self::Local | Self::Mpi(_)));
         }
         ways
     }
