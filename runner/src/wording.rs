@@ -83,10 +83,16 @@ pub(crate) fn did_you_mean(suggestion: &Option<String>) -> String {
 
 /// So many of something.
 pub(crate) fn plural(count: u64, word: &str) -> String {
+    format!("{count} {}", form_for(count, word))
+}
+
+/// The form of a word that stands behind such a number.
+pub(crate) fn form_for(count: u64, word: &str) -> String {
     match (count, word.strip_suffix('y')) {
-        (1, _) => format!("1 {word}"),
-        (_, Some(stem)) => format!("{count} {stem}ies"),
-        _ => format!("{count} {word}s"),
+        (1, _) => word.to_owned(),
+        (_, Some(stem)) => format!("{stem}ies"),
+        _ if word.ends_with('x') => format!("{word}es"),
+        _ => format!("{word}s"),
     }
 }
 

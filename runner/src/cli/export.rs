@@ -9,7 +9,7 @@ use crate::error::{Exit, RunError};
 use crate::look::recorded::Recorded;
 use crate::look::source::records;
 use crate::look::vtk;
-use crate::wording::between;
+use crate::wording::{between, plural};
 use std::io::{self, IsTerminal};
 
 /// Does it.
@@ -38,12 +38,11 @@ pub(super) fn run(args: &ExportArgs) -> Result<Exit, RunError> {
         return Ok(Exit::Interrupted);
     };
     let (first, last) = (steps.first().copied().unwrap_or(0), steps.last().copied().unwrap_or(0));
-    let records = if steps.len() == 1 { "record" } else { "records" };
     output::show(&format!(
-        "{} {records} of {}, steps {first} to {last}, and {} statics, {:.2} MB: open {} in ParaView\n",
-        steps.len(),
+        "{} of {}, steps {first} to {last}, and {}, {:.2} MB: open {} in ParaView\n",
+        plural(steps.len() as u64, "record"),
         between(fewest as u64, most as u64, "body"),
-        recorded.setting().statics.len(),
+        plural(recorded.setting().statics.len() as u64, "static"),
         bytes as f64 * 1e-6,
         collection.display()
     ))?;

@@ -137,7 +137,11 @@ fn recording(folder: &Path, every: Option<u64>) -> Result<String, String> {
     let last = steps.last().copied().unwrap_or_default();
     let (count, size) = (steps.len(), megabytes(files.iter().map(|file| file.as_path())));
     let shapes = recording.stage().map_or("no shapes".to_owned(), shapes);
-    Ok(format!("{count} records, steps 0 to {last}, every {every}; {shapes}; {size} in {} files", files.len()))
+    let records = plural(count as u64, "record");
+    Ok(format!(
+        "{records}, steps 0 to {last}, every {every}; {shapes}; {size} in {}",
+        plural(files.len() as u64, "file")
+    ))
 }
 
 fn shapes(stage: &Stage) -> String {
@@ -168,8 +172,12 @@ fn commands(folder: &RunFolder) -> Option<Result<String, String>> {
 fn of_snapshot(snapshot: &Snapshot) -> Result<String, SnapshotError> {
     snapshot.check()?;
     let (files, facts) = (&snapshot.files, &snapshot.files[0].facts);
-    let mut text =
-        format!("snapshot after step {}, written by {} ranks of atoll {}\n", facts.step, facts.ranks, facts.version);
+    let mut text = format!(
+        "snapshot after step {}, written by {} of atoll {}\n",
+        facts.step,
+        plural(facts.ranks.into(), "rank"),
+        facts.version
+    );
     blocks(&mut text, files.iter());
     Ok(text)
 }
@@ -189,7 +197,11 @@ fn blocks<'a>(text: &mut String, files: impl Iterator<Item = &'a SnapshotFile> +
     let all = || files.clone().flat_map(|file| &file.blocks);
     let hashes = files.clone().map(SnapshotFile::hashes).fold(Default::default(), atoll_core::Hashes::merge);
     let [bodies, contacts] = [all().map(|block| block.bodies).sum::<u64>(), all().map(|block| block.contacts).sum()];
-    row(text, "tiles", &format!("{} with {bodies} bodies and {contacts} contacts", all().count()));
+    row(
+        text,
+        "tiles",
+        &format!("{} with {} and {}", all().count(), plural(bodies, "body"), plural(contacts, "contact")),
+    );
     row(text, "size", &megabytes(files.map(|file| file.path.as_path())));
     row(text, "state hash", &format!("{:032x}", hashes.state));
     row(text, "contact hash", &format!("{:032x}", hashes.contact));

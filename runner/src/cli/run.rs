@@ -19,6 +19,7 @@ use crate::plan::{Commands, Plan};
 use crate::rank::StopFlag;
 use crate::rank::{Host, Observer, TraceSteps, check_commands, check_logs};
 use crate::summary::{Summary, timings, trace};
+use crate::wording::plural;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
@@ -330,9 +331,9 @@ fn conclude(summary: &Summary, outputs: &Outputs) -> Result<Exit, RunError> {
     let trace = outputs.trace.as_ref().map_or(Ok(()), |file| write_trace(summary, file));
     folder.and(json).and(timings).and(trace).and(shown)?;
     if summary.escaped > 0 {
-        let (escaped, bodies) = (summary.escaped, summary.bodies);
+        let (escaped, bodies) = (summary.escaped, plural(summary.bodies, "body"));
         complain(&format!(
-            "{escaped} of {bodies} bodies escaped: they ended outside of the domain, or of their room, where nothing holds \
+            "{escaped} of {bodies} escaped: they ended outside of the domain, or of their room, where nothing holds \
              them; a higher physics.hertz, or a limit such as physics.max_linear_speed, may help"
         ));
     }

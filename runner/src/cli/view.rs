@@ -46,7 +46,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Exit, RunError> {
     recorded.iter().filter_map(|(_, recorded)| recorded.recording().damage()).for_each(|damage| complain(&damage));
     let desk = Arc::new(Desk::new(args.speed));
     let player = Player::new(recorded, Arc::clone(&desk))
-        .ok_or_else(|| unsuitable("SOURCE", "there is no step that all of these have a record of; name others"))?;
+        .ok_or_else(|| unsuitable("SOURCE", "there is no time of which all of these have a record; name others"))?;
     let server = serve(desk, args.port, args.bind)?;
     let stop = stop_on_signals(false, || std::process::exit(Exit::Interrupted as i32));
     tell(&server, args.bind, args.open);

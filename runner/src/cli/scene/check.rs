@@ -9,7 +9,7 @@ use crate::plan::Plan;
 use crate::rank::{not_crowded, part_of_scene};
 use crate::scene::SceneFile;
 use crate::scene::file::Found;
-use crate::wording::{Figure, OneLine, plural};
+use crate::wording::{Figure, OneLine, form_for, plural};
 use atoll_core::{Facts, Loopback, Shape};
 use atoll_transport::Rank;
 use std::fmt::Write as _;
@@ -85,8 +85,8 @@ fn in_words(scene: &SceneFile, found: &Found) -> String {
         let name = scene.kind_names()[number].as_deref();
         let name = name.map(|name| format!(" ({})", OneLine(name))).unwrap_or_default();
         let shape = match &kind.shape {
-            Shape::Box { half } => format!("boxes of {} x {} m", 2.0 * half.x, 2.0 * half.y),
-            Shape::Circle { radius } => format!("circles of {radius} m around their center"),
+            Shape::Box { half } => format!("{} of {} x {} m", form_for(*bodies, "box"), 2.0 * half.x, 2.0 * half.y),
+            Shape::Circle { radius } => format!("{} of {radius} m radius", form_for(*bodies, "circle")),
             other => format!("of a {}", crate::wording::shape(other)),
         };
         row(&mut text, "kind", &format!("{number}{name}: {bodies} {shape}"));

@@ -25,6 +25,8 @@ const PATIENCE: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 struct Track {
     recorded: Recorded,
+    /// The steps of what is shown: each at the same time as that of every other recording.
+    steps: Vec<u64>,
     frame: Frame,
     ranges: [Range; 2],
 }
@@ -34,12 +36,10 @@ struct Track {
 pub(crate) struct Player {
     tracks: Vec<Track>,
     desk: Arc<Desk>,
-    /// The steps that all of them have records of.
-    steps: Vec<u64>,
-    /// Where time is, in steps; between two records the earlier is shown.
+    /// Where time is, in steps of the first; between two records the earlier is shown.
     time: f64,
-    /// What the frames hold.
-    shown: Option<u64>,
+    /// Which records the frames hold.
+    shown: Option<usize>,
     /// Of each world, as pages know them.
     tiles: Vec<Tiles>,
     /// The body that pages were told of, and after which step.
@@ -49,27 +49,23 @@ pub(crate) struct Player {
 }
 
 impl Player {
-    /// Of recordings, each with a name. None if they have no step in common.
+    /// Of recordings, each with a name. None if they have no time in common.
     pub(crate) fn new(recorded: Vec<(String, Recorded)>, desk: Arc<Desk>) -> Option<Self> {
-        let steps = |recorded: &Recorded| recorded.recording().steps().to_vec();
-        let others = recorded.iter().skip(1);
-        let mut common = steps(&recorded.first()?.1);
-        others.for_each(|(_, other)| common.retain(|step| other.recording().steps().binary_search(step).is_ok()));
-        let last = *common.last()?;
         let mut tracks = Vec::new();
         let mut sources = Vec::new();
-        for (name, recorded) in recorded {
+        let together = at_same_times(&recorded);
+        for ((name, recorded), steps) in recorded.into_iter().zip(together) {
             let records = recorded.recording().steps().len();
             sources.push(Source { records, ..scenery::source(name, recorded.setting(), Vec::new()) });
-            tracks.push(Track { recorded, frame: Frame::default(), ranges: [Range::default(); 2] });
+            tracks.push(Track { recorded, steps, frame: Frame::default(), ranges: [Range::default(); 2] });
         }
-        desk.greet(Say::Hello(scenery::hello(sources, true, common.clone(), last)));
-        let time = common[0] as f64;
+        let common = tracks.first()?.steps.clone();
+        let (&first, &last) = common.first().zip(common.last())?;
+        desk.greet(Say::Hello(scenery::hello(sources, true, common, last)));
         Some(Self {
             tracks,
             desk,
-            steps: common,
-            time,
+            time: first as f64,
             shown: None,
             tiles: Vec::new(),
             told: None,
@@ -85,7 +81,9 @@ impl Player {
     pub(crate) fn play(mut self, stop: &StopFlag) -> Result<(), RecordingError> {
         thread::scope(|scope| {
             let (desk, ended) = (Arc::clone(&self.desk), StopFlag::default());
-            if let [one, other] = &self.tracks[..] {
+            if let [one, other] = &self.tracks[..]
+                && one.hertz() == other.hertz()
+            {
                 let folders = [one, other].map(|track| track.recorded.recording().folder().to_owned());
                 let (stop, ended) = (stop.clone(), ended.clone());
                 let find = move || {
@@ -126,35 +124,40 @@ impl Player {
 
     /// The index of the record that is shown.
     fn index(&self) -> usize {
-        self.steps.partition_point(|step| *step as f64 <= self.time + 1e-6).max(1) - 1
+        self.steps().partition_point(|step| *step as f64 <= self.time + 1e-6).max(1) - 1
+    }
+
+    /// Those of the first.
+    fn steps(&self) -> &[u64] {
+        &self.tracks[0].steps
     }
 
     fn step(&self) -> u64 {
-        self.steps[self.index()]
+        self.steps()[self.index()]
     }
 
     /// Lets time pass, and says how long it is until the next record, if time goes on.
     fn advance(&mut self, pace: &Pace, passed: Duration) -> Option<Duration> {
-        let last = self.steps.len() - 1;
+        let last = self.steps().len() - 1;
         if let Some(step) = pace.seek {
-            self.time = (step as f64).clamp(self.steps[0] as f64, self.steps[last] as f64);
+            self.time = (step as f64).clamp(self.steps()[0] as f64, self.steps()[last] as f64);
         }
         if pace.by != 0 {
             let index = (self.index() as i64).saturating_add(pace.by).clamp(0, last as i64) as usize;
-            self.time = self.steps[index] as f64;
+            self.time = self.steps()[index] as f64;
         }
         // Nobody is to miss the beginning.
         if !pace.playing || !self.desk.is_wanted() || self.shown.is_none() {
             return None;
         }
-        let hertz = self.tracks[0].recorded.setting().hertz;
+        let hertz = self.tracks[0].hertz();
         if pace.times > 0.0 {
             self.time += passed.as_secs_f64() * hertz * pace.times;
         } else if pace.seek.is_none() && self.desk.rests(u64::MAX).is_some_and(|rest| rest.is_zero()) {
-            self.time = self.steps[(self.index() + 1).min(last)] as f64;
+            self.time = self.steps()[(self.index() + 1).min(last)] as f64;
         }
-        let Some(&next) = self.steps.get(self.index() + 1) else {
-            self.time = self.steps[last] as f64;
+        let Some(&next) = self.steps().get(self.index() + 1) else {
+            self.time = self.steps()[last] as f64;
             self.desk.pause();
             return None;
         };
@@ -164,12 +167,12 @@ impl Player {
 
     /// Reads the records that are to be shown.
     fn read(&mut self) -> Result<(), RecordingError> {
-        let step = self.step();
-        if self.shown != Some(step) {
+        let index = self.index();
+        if self.shown != Some(index) {
             for track in &mut self.tracks {
-                track.recorded.read(step, &mut track.frame)?;
+                track.recorded.read(track.steps[index], &mut track.frame)?;
             }
-            self.shown = Some(step);
+            self.shown = Some(index);
             if self.tracks.iter().any(|track| track.frame.tiling.is_some()) {
                 self.tell_of_tiles();
             }
@@ -250,9 +253,9 @@ impl Player {
 
     /// Tells pages how it goes.
     fn tell(&self) {
-        let hertz = self.tracks[0].recorded.setting().hertz;
-        let mut all = vec![("record", format!("{} of {}", self.index() + 1, self.steps.len()))];
-        if let (Some(first), Some(last)) = (self.steps.first(), self.steps.last()) {
+        let hertz = self.tracks[0].hertz();
+        let mut all = vec![("record", format!("{} of {}", self.index() + 1, self.steps().len()))];
+        if let (Some(first), Some(last)) = (self.steps().first(), self.steps().last()) {
             all.push(("recorded", format!("{} s", figures::digits((last - first) as f64 / hertz))));
         }
         let bodies = |track: &Track| track.frame.bodies.len();
@@ -293,7 +296,28 @@ fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range:
     sketch.finish()
 }
 
+/// For each recording the steps of those records that all of them have one at the same time as: as many for each.
+fn at_same_times(recorded: &[(String, Recorded)]) -> Vec<Vec<u64>> {
+    let Some((_, first)) = recorded.first() else { return Vec::new() };
+    let at_time_of = |step: u64, other: &Recorded| {
+        let exact = step as f64 * (other.setting().hertz / first.setting().hertz);
+        let same = exact.round();
+        let is_one = (exact - same).abs() <= 1e-6 && other.recording().steps().binary_search(&(same as u64)).is_ok();
+        is_one.then_some(same as u64)
+    };
+    let mut all = vec![Vec::new(); recorded.len()];
+    for &step in first.recording().steps() {
+        let each: Option<Vec<u64>> = recorded.iter().map(|(_, other)| at_time_of(step, other)).collect();
+        each.into_iter().flatten().zip(&mut all).for_each(|(step, of)| of.push(step));
+    }
+    all
+}
+
 impl Track {
+    fn hertz(&self) -> f64 {
+        self.recorded.setting().hertz
+    }
+
     /// A body, and the rank that has it.
     fn find(&self, pick: Pick) -> Option<(Found, u32)> {
         let (setting, frame) = (self.recorded.setting(), &self.frame);

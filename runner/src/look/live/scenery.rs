@@ -78,10 +78,11 @@ pub(super) fn legend(by: ColorBy, setting: &Setting, ranks: u32, range: Range) -
     });
     let sign = |(sign, text): &(Sign, String)| -> Value {
         let (color, is_round) = match sign {
-            Sign::Square(color) => (color, false),
-            Sign::Disc(color) | Sign::Ring(color) => (color, true),
+            Sign::Square(color) => (Some(color.0), false),
+            Sign::Disc(color) | Sign::Ring(color) => (Some(color.0), true),
+            Sign::None => (None, false),
         };
-        json!([text, color.0, is_round])
+        json!([text, color, is_round])
     };
     let rows: Vec<_> = legend.rows.iter().map(sign).collect();
     json!({ "title": legend.title, "scale": scale, "rows": rows }).to_string()

@@ -181,6 +181,7 @@ impl<'a> Labels<'a> {
                 Sign::Ring(color) => {
                     canvas.draw_ring(&Form::Disc { center, radius: 0.44 * size }, 0.16 * size, color, 1.0);
                 }
+                Sign::None => {}
             }
             write(canvas, text, [x + 1.5 * size, y], colors::INK);
         }

@@ -60,7 +60,7 @@ impl Range {
         if values.is_empty() {
             return;
         }
-        let at = (values.len() - 1) * 99 / 100;
+        let at = values.len() - 1 - values.len() / 100;
         let high = *values.select_nth_unstable_by(at, f32::total_cmp).1;
         self.most = self.most.max(round_up(f64::from(high.max(1e-3))) as f32);
     }

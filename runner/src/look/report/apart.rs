@@ -17,7 +17,7 @@ const LINES: [(&str, &str, Quantity); 4] = [
 
 /// What their recordings say, nothing for one run alone.
 pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String {
-    let [a, _] = sources else { return String::new() };
+    let [a, b] = sources else { return String::new() };
     let heading = "<h2>How they part</h2>\n";
     let Some(comparison) = comparison else {
         return format!("{heading}<p class=\"note\">Not both runs are recorded, so how they part is unknown.</p>\n");
@@ -35,24 +35,30 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
             format!("They first differ at step {}, in body {}{columns}.", first.step, first.id)
         }
     };
+    // Of runs with steps of other lengths each step is at two times.
+    let (x, at): (_, fn(&Source, u64) -> f64) = if a.time(1.0) == b.time(1.0) {
+        ("time, s", |a, step| a.time(step as f64))
+    } else {
+        ("step", |_, step| step as f64)
+    };
     let series = |(name, color, quantity): (&str, &str, Quantity)| Series {
         name: name.to_owned(),
         color: color.to_owned(),
         dashed: false,
-        points: comparison.steps.iter().map(|step| (a.time(step.step as f64), quantity(step))).collect(),
+        points: comparison.steps.iter().map(|step| (at(a, step.step), quantity(step))).collect(),
     };
     let share = Series {
         name: "bodies that differ".to_owned(),
         color: "s5".to_owned(),
         dashed: false,
-        points: comparison.steps.iter().map(|step| (a.time(step.step as f64), step.differing as f64)).collect(),
+        points: comparison.steps.iter().map(|step| (at(a, step.step), step.differing as f64)).collect(),
     };
     let title = "Greatest deviation of any body";
-    let axes = Axes { title, x: "time, s", y: "deviation", scale: Scale::Decades, wide: false };
+    let axes = Axes { title, x, y: "deviation", scale: Scale::Decades, wide: false };
     let about = "On a scale of powers of ten; the lower edge stands for none at all.";
     let deviation = figure("deviation", false, title, about, &lines(axes, &LINES.map(series)));
     let title = "Bodies that differ";
-    let axes = Axes { title, x: "time, s", y: "bodies", scale: Scale::FromZero, wide: false };
+    let axes = Axes { title, x, y: "bodies", scale: Scale::FromZero, wide: false };
     let differing = figure("differing", false, title, "In any bit of what is recorded.", &lines(axes, &[share]));
     format!("{heading}<p>{}</p>\n<div class=\"grid\">\n{deviation}{differing}</div>\n", Text(&verdict))
 }

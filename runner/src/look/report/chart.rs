@@ -113,11 +113,19 @@ pub(super) fn areas(axes: Axes<'_>, all: &[Series]) -> String {
         )
         .expect("a string takes any text");
     }
-    let share = |one: &Series| {
-        let own = values(one);
-        (!own.is_empty()).then(|| Unit(mean(&own) * 1e-3, "s").to_string())
-    };
+    let share = |one: &Series| over_all(&one.points).map(|mean| Unit(mean * 1e-3, "s").to_string());
     legend(all, true, share) + &drawn(axes, HEIGHT, &drawing)
+}
+
+/// The mean of what each point says of all since the one before; of a single point that says something, that.
+fn over_all(points: &[(f64, f64)]) -> Option<f64> {
+    let (first, last) = points.first().zip(points.last())?;
+    let length = last.0 - first.0;
+    if length <= 0.0 {
+        return Some(last.1);
+    }
+    let parts = points.windows(2).map(|pair| (pair[1].0 - pair[0].0) * pair[1].1);
+    Some(parts.filter(|part| part.is_finite()).sum::<f64>() / length)
 }
 
 /// A part of a bar: its color, name and length.
@@ -335,4 +343,18 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         ends
     });
     few.chain(points.last().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_over_a_run_counts_each_line_for_the_steps_that_it_tells_of() {
+        // After 10, 30 and 31 steps.
+        let mean = over_all(&[(0.0, 1.0), (10.0, 1.0), (30.0, 4.0), (31.0, 60.0)]).unwrap();
+        assert!((mean - 150.0 / 31.0).abs() < 1e-12, "{mean}");
+        assert_eq!(over_all(&[(0.5, 3.0)]), Some(3.0));
+        assert_eq!(over_all(&[]), None);
+    }
 }

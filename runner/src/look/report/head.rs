@@ -1,17 +1,18 @@
 //! What was run, and on what; how it ended; its configuration.
 
-use super::html::{Short, Text, Unit, Whole, table};
+use super::html::{Short, Text, Unit, Whole, table, whole};
 use super::letter;
 use super::source::Source;
 use crate::config;
 use crate::plan::tiles;
-use crate::wording::plural;
+use crate::wording::{form_for, plural};
 use std::fmt::Write as _;
 
 /// What the page is called.
 pub(super) fn title(sources: &[Source]) -> String {
-    let scene =
-        |source: &Source| format!("{}, {} bodies", source.config.scene.kind.title(), Whole(source.config.scene.bodies));
+    let scene = |source: &Source| {
+        format!("{}, {}", source.config.scene.kind.title(), whole(source.config.scene.bodies, "body"))
+    };
     match sources {
         [a, b] if scene(a) == scene(b) => format!("Two runs of {}", scene(a)),
         [a, b] => format!("{} and {}", scene(a), scene(b)),
@@ -52,11 +53,14 @@ pub(super) fn of(sources: &[Source]) -> String {
 /// How it ended, in a few words.
 fn ended(source: &Source) -> String {
     let all = source.config.run.steps;
-    let made = source.steps().map_or("an unknown number".to_owned(), |steps| Whole(steps).to_string());
+    let made = source.steps();
+    let number = made.map_or("an unknown number".to_owned(), |steps| Whole(steps).to_string());
     match &source.summary {
-        None => format!("under way or killed: {made} of {} steps are known", Whole(all)),
-        Some(summary) if summary["interrupted"] == true => format!("interrupted after {made} of {} steps", Whole(all)),
-        Some(_) => format!("complete: {made} steps"),
+        None => format!("under way or killed: {number} of {} are known", whole(all, "step")),
+        Some(summary) if summary["interrupted"] == true => {
+            format!("interrupted after {number} of {}", whole(all, "step"))
+        }
+        Some(_) => format!("complete: {number} {}", form_for(made.unwrap_or_default(), "step")),
     }
 }
 
@@ -105,7 +109,7 @@ fn key_figures(source: &Source) -> String {
     }
     if let (Some(ms), bodies) = (number("ms_per_step"), source.config.scene.bodies as f64) {
         let rate = bodies * 1e3 / ms;
-        tile("Bodies stepped", format!("{}/s", Short(rate)), format!("{} bodies", Whole(bodies as u64)));
+        tile("Bodies stepped", format!("{}/s", Short(rate)), whole(bodies as u64, "body"));
     }
     if let Some((contacts, border)) = number("contacts").zip(number("border_contact_fraction")) {
         tile("Contacts", Whole(contacts as u64).to_string(), format!("{:.2} % across tiles", 100.0 * border));

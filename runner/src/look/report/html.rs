@@ -1,5 +1,6 @@
 //! Pieces of the page. Whatever comes from a file goes through [`Text`].
 
+use crate::wording::form_for;
 use std::fmt::{self, Display, Formatter, Write as _};
 
 /// A text as it is shown, whatever characters are in it.
@@ -79,6 +80,11 @@ impl Short {
 
 /// A whole number, its thousands apart.
 pub(super) struct Whole(pub u64);
+
+/// So many of something.
+pub(super) fn whole(count: u64, word: &str) -> String {
+    format!("{} {}", Whole(count), form_for(count, word))
+}
 
 impl Display for Whole {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {

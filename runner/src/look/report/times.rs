@@ -69,7 +69,12 @@ fn over_run(sources: &[Source]) -> String {
         let Some((log, at)) = source.log.as_ref().and_then(|log| Some((log, times(source, log)?))) else { continue };
         let phase = |column: &str| {
             let name = column.strip_prefix(PREFIX).filter(|name| *name != "per_step")?;
-            Some((name.to_owned(), at.iter().copied().zip(log.get(column)?.iter().copied()).collect::<Vec<_>>()))
+            let mut points: Vec<_> = at.iter().copied().zip(log.get(column)?.iter().copied()).collect();
+            // Each line tells of the steps since the one before; of what was before the first step, the one after.
+            if let [first, second, ..] = &mut points[..] {
+                first.1 = second.1;
+            }
+            Some((name.to_owned(), points))
         };
         let series: Vec<Series> = log
             .names_with(PREFIX)

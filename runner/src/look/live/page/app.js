@@ -62,7 +62,8 @@ function tiles({ worlds }) {
 function show(frame) {
   if (!state.drawing) return;
   state.drawing.load(state.sources[frame.source], frame);
-  state.step = frame.step;
+  // That of another run may be shorter or longer; the time is the same.
+  if (frame.source === 0) state.step = frame.step;
   state.time = frame.time;
   if (state.following && frame.followed && frame.source === state.body?.source) {
     [state.camera.x, state.camera.y] = frame.followed;

@@ -113,7 +113,7 @@ export function legend(source, meaning) {
     for (const [name, color, is_round] of rows) {
       const entry = add("span");
       const swatch = document.createElement("i");
-      swatch.style.background = css(color);
+      if (color) swatch.style.background = css(color);
       if (is_round) swatch.style.borderRadius = "50%";
       entry.append(swatch, name);
     }

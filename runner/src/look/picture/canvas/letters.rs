@@ -3,9 +3,9 @@
 use super::{Canvas, Rgb};
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 
-/// The letters of Inter in a medium weight, its digits of one width: what is written in English, and some signs. Its license
-/// is beside it.
-const INTER: &[u8] = include_bytes!("font/Inter-Medium.ttf");
+/// The Latin, Greek and Cyrillic letters of Inter 4.0 in a medium weight, its digits of one width, and some signs; another letter is an empty
+/// box. Its license is beside it.
+const INTER: &[u8] = include_bytes!("font/Inter-Medium.otf");
 
 /// A typeface.
 #[derive(Debug)]
