@@ -8,7 +8,7 @@ use crate::exchange::record::{GhostRefresh, Unseen};
 use crate::model::body::Bodies;
 use crate::model::contact::Contact;
 use crate::model::kind::KindRow;
-use crate::model::math::{Rot, max, right_perp, turn};
+use crate::model::math::{Rot, dot, max, right_perp, turn};
 use crate::model::params::{Ghosts, Parallel};
 use crate::parallel::lanes::{Kernel, LANES, LaneSet, Lanes, Quad};
 use crate::parallel::team::Team;
@@ -133,27 +133,34 @@ pub(crate) const LIGHTEST: f32 = 2.0 / CARRIER;
 
 const ZERO: Quad = [0.0; 4];
 
-/// What is added to the velocity of a static that turns, in m/s, for a disc that goes around with it as on its surface, so that it leads
-/// along the chord of the step's arc and not along the tangent. On the tangent the disc comes out slower than what carries it, and friction
-/// makes spin of that. The corners of others tell how a static turns. Of two bodies the static is the first; the arm leads from its
-/// center to the disc's.
-fn drawn_in(bodies: &Bodies, [of, disc]: [usize; 2], arm: Vec2, setup: &Setup) -> Option<Vec2> {
-    /// What it goes besides, as a part of how fast it is carried; and how far a static may turn in a step, in rad.
-    const MOST: f32 = 0.25;
+/// What is added to the velocity of a static that turns, in m/s, for a disc that lies on it and goes around with it, so that it leads along
+/// the chord of the step's arc and not along the tangent. On the tangent the disc comes out slower than what carries it, and friction makes
+/// spin of that. Bodies that are not round turn with what they lie on, and need none of it; what is round itself stays where it is as it
+/// turns. Of two bodies the static is the first; the arm leads from its center to the disc's, `outward` out of its surface.
+fn drawn_in(bodies: &Bodies, [of, disc]: [usize; 2], arm: Vec2, outward: Vec2, setup: &Setup) -> Option<Vec2> {
+    /// How fast the disc goes along the static, as a part of how fast it is carried.
+    const MOST_SLIP: f32 = 0.25;
+    /// How far the static may turn in a step, in rad.
+    const MOST_ANGLE: f32 = 0.25;
     let spin = bodies.angular_velocity[of];
     let angle = spin * setup.params.dt;
     let [from, around] = [of, disc].map(|body| setup.kind(bodies.kind[body]));
-    if spin == 0.0 || angle.abs() > MOST || around.not_round > 0.0 || from.not_round == 0.0 {
+    if spin == 0.0 || angle.abs() > MOST_ANGLE || around.not_round > 0.0 || from.not_round == 0.0 {
         return None;
     }
     let carried = turn(spin, arm);
-    let besides = bodies.velocity[disc] - bodies.velocity[of] - carried;
-    if besides.length_squared() > MOST * MOST * carried.length_squared() {
+    let slip = bodies.velocity[disc] - bodies.velocity[of] - carried;
+    // Who lies comes nearer by half of what the surface turns away by, or, before he was drawn in, by all of it or nothing.
+    let (nearer, away) = (-dot(slip, outward), 1.1 * carried.length() * angle.abs());
+    let lies = (-0.1 * away..=away).contains(&nearer);
+    let may_bounce =
+        away > setup.params.restitution_threshold && [from, around].iter().any(|kind| kind.material.restitution > 0.0);
+    if may_bounce || !lies || slip.length_squared() > MOST_SLIP * MOST_SLIP * carried.length_squared() {
         return None;
     }
-    // (1 - cos)/angle and sin/angle - 1, as far as it matters.
-    let (inward, back) = (angle * (0.5 - angle * angle / 24.0), -angle * angle / 6.0);
-    Some(carried * back - arm * (spin * inward))
+    // (1 - cos)/angle and sin/angle - 1, as far as it matters. Separations know of the sine.
+    let (inward, back) = (angle * (0.5 - angle * angle / 24.0), carried * (-angle * angle / 6.0));
+    Some(back - outward * dot(back, outward) - arm * (spin * inward))
 }
 
 /// The root of a body's inverse mass, less than zero for a round one.
@@ -310,7 +317,8 @@ impl SolverBodies {
             }
             let [first, second] = contacts.bodies[contact as usize];
             let Contact { normal, offset, .. } = tile.contacts.contacts[contact as usize];
-            let (outward, arm) = if first == body { (normal, offset) } else { (-normal, -offset) };
+            let (outward, arm, other) =
+                if first == body { (normal, offset, second) } else { (-normal, -offset, first) };
             let i = body as usize;
             let kind = setup.kind(bodies.kind[i]);
             let runs = right_perp(outward) * kind.material.surface_speed;
@@ -319,8 +327,7 @@ impl SolverBodies {
             let row = row.or_else(|| setup.row_of_going(bodies.id[i]));
             let faster = row.map_or(Vec2::ZERO, |row| setup.acceleration_at(row, step)) * setup.params.substep();
             let velocity = if faster == Vec2::ZERO { velocity } else { velocity - faster * later };
-            let other = if first == body { second } else { first };
-            let drawn_in = drawn_in(bodies, [i, other as usize], arm, setup);
+            let drawn_in = drawn_in(bodies, [i, other as usize], arm, outward, setup);
             let velocity = drawn_in.map_or(velocity, |more| velocity + more);
             let given = [velocity.x, velocity.y, bodies.angular_velocity[i]].map(|speed| speed * CARRIER);
             let gain = [faster.x, faster.y, 0.0].map(|speed| speed * CARRIER);

@@ -1,7 +1,8 @@
 //! What is wrong with the folder of a run.
 
 use crate::config::ConfigError;
-use std::path::PathBuf;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// A folder that cannot be that of a run.
@@ -18,7 +19,7 @@ pub enum FolderError {
         reason: String,
     },
     /// There is no room left for what is to be written there.
-    #[error("{option} {}: {reason}; make room, and do the same again", .path.display())]
+    #[error("{option} {}: {reason}; free some space and run the command again", .path.display())]
     Full {
         /// What it was given with.
         option: &'static str,
@@ -30,6 +31,17 @@ pub enum FolderError {
     /// The configuration that a run left there.
     #[error(transparent)]
     Config(Box<ConfigError>),
+}
+
+impl FolderError {
+    /// That nothing can be written or removed there.
+    pub(crate) fn not_writable(option: &'static str, path: &Path, error: &io::Error) -> Self {
+        let (path, reason) = (path.to_owned(), error.to_string());
+        match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { option, path, reason },
+            _ => Self::Unusable { option, path, reason: format!("{reason}; name a folder that can be written to") },
+        }
+    }
 }
 
 impl From<ConfigError> for FolderError {

@@ -241,12 +241,7 @@ impl RunFolder {
 
     /// That nothing can be written or removed here.
     pub fn not_writable(&self, error: &io::Error) -> FolderError {
-        match error.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-                FolderError::Full { option: self.option, path: self.path.clone(), reason: error.to_string() }
-            }
-            _ => self.refusal(format!("{error}; name a folder that can be written to")),
-        }
+        FolderError::not_writable(self.option, &self.path, error)
     }
 
     /// Removes what a run left after `step`, as it goes on from there, but for the log, which only loses rows; everything but

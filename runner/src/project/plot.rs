@@ -28,11 +28,8 @@ fn draw(
     let most = predictions.iter().map(hands).fold(2.0, f64::max);
     let least = predictions.iter().map(|one| one.speedup).fold(1.0, f64::min).max(1e-3);
     area.fill(&WHITE)?;
-    let title = format!(
-        "{}, {}: projected speedup over one thread",
-        projection.scene,
-        plural(projection.bodies, "body")
-    );
+    let title =
+        format!("{}, {}: projected speedup over one thread", projection.scene, plural(projection.bodies, "body"));
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 20))
         .margin(16)

@@ -28,7 +28,7 @@ impl World {
         sensors.iter().flat_map(|sensor| self.inside(sensor).into_iter().map(|body| (sensor.id, body))).collect()
     }
 
-    /// Who of this world's bodies is inside one sensor, as [`inside_sensors`](Self::inside_sensors) tells it; nobody in what is none.
+    /// Who of this world's bodies is inside one sensor, as [`inside_sensors`](Self::inside_sensors) tells it; nobody if it is no sensor.
     pub fn inside_sensor(&self, sensor: GlobalId, moving: &[Body]) -> Vec<GlobalId> {
         let setup = &self.setup;
         let fixed = setup.row_named(sensor).map(|row| setup.static_at(row, self.step));

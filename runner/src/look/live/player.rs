@@ -53,7 +53,10 @@ impl Player {
     pub(crate) fn new(recorded: Vec<(String, Recorded)>, desk: Arc<Desk>) -> Option<Self> {
         let mut tracks = Vec::new();
         let mut sources = Vec::new();
-        let together = at_same_times(&recorded);
+        let together = {
+            let records = recorded.iter().map(|(_, of)| (of.setting().hertz, of.recording().steps()));
+            at_same_times(&records.collect::<Vec<_>>())
+        };
         for ((name, recorded), steps) in recorded.into_iter().zip(together) {
             let records = recorded.recording().steps().len();
             sources.push(Source { records, ..scenery::source(name, recorded.setting(), Vec::new()) });
@@ -296,18 +299,18 @@ fn draw(paper: &mut Paper, setting: &Setting, frame: &Frame, gaze: &Gaze, range:
     sketch.finish()
 }
 
-/// For each recording the steps of those records that all of them have one at the same time as: as many for each.
-fn at_same_times(recorded: &[(String, Recorded)]) -> Vec<Vec<u64>> {
-    let Some((_, first)) = recorded.first() else { return Vec::new() };
-    let at_time_of = |step: u64, other: &Recorded| {
-        let exact = step as f64 * (other.setting().hertz / first.setting().hertz);
-        let same = exact.round();
-        let is_one = (exact - same).abs() <= 1e-6 && other.recording().steps().binary_search(&(same as u64)).is_ok();
-        is_one.then_some(same as u64)
-    };
-    let mut all = vec![Vec::new(); recorded.len()];
-    for &step in first.recording().steps() {
-        let each: Option<Vec<u64>> = recorded.iter().map(|(_, other)| at_time_of(step, other)).collect();
+/// Of recordings with steps of so many a second, each of which has records of some: the steps of those records that all others have one at the
+/// same time as, as many for each.
+fn at_same_times(recordings: &[(f64, &[u64])]) -> Vec<Vec<u64>> {
+    let Some(&(first, steps)) = recordings.first() else { return Vec::new() };
+    let mut all = vec![Vec::new(); recordings.len()];
+    for &step in steps {
+        let at_the_time = |&(hertz, steps): &(f64, &[u64])| {
+            let exact = step as f64 * (hertz / first);
+            let near = exact.round();
+            ((exact - near).abs() <= 1e-6 && steps.binary_search(&(near as u64)).is_ok()).then_some(near as u64)
+        };
+        let each: Option<Vec<u64>> = recordings.iter().map(at_the_time).collect();
         each.into_iter().flatten().zip(&mut all).for_each(|(step, of)| of.push(step));
     }
     all
@@ -349,5 +352,20 @@ fn body(row: &Row) -> Body {
         rotation: Rot::from_angle(row.angle),
         velocity: Vec2::new(row.vx, row.vy),
         angular_velocity: row.omega,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_are_shown_together_that_are_of_one_time() {
+        let (some, all, thirds) = ([0, 6, 8, 12], [0, 1, 2, 3, 4, 5, 6], [0, 3, 4, 6, 8, 100]);
+        assert_eq!(at_same_times(&[(60.0, &some[..]), (60.0, &thirds[..])]), [[0, 6, 8], [0, 6, 8]]);
+        assert_eq!(at_same_times(&[(60.0, &some[..]), (30.0, &all[..])]), [[0, 6, 8, 12], [0, 3, 4, 6]]);
+        assert_eq!(at_same_times(&[(30.0, &all[..]), (20.0, &thirds[..])]), [[0, 6], [0, 4]]);
+        assert_eq!(at_same_times(&[(60.0, &some[..])]), [some]);
+        assert_eq!(at_same_times(&[(60.0, &[1][..]), (59.0, &[1][..])]), [[0_u64; 0]; 2]);
     }
 }

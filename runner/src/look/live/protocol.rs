@@ -197,6 +197,8 @@ pub(crate) struct Source {
     pub name: String,
     /// How many records there are of it, also those of steps that the other world has none of.
     pub records: usize,
+    /// Steps a second.
+    pub hertz: f64,
     /// Low x, low y, high x, high y, in m.
     pub domain: [f64; 4],
     /// Columns and rows of tiles, or of the squares that they are cut from.

@@ -34,6 +34,7 @@ pub(super) fn source(name: String, setting: &Setting, rank_of_tile: Vec<u32>) ->
     Source {
         name,
         records: 0,
+        hertz: setting.hertz,
         domain: [low.x, low.y, high.x, high.y],
         tiles: setting.partition.roots(),
         held: Tiles::new(&setting.partition, rank_of_tile),

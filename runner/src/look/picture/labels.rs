@@ -78,6 +78,16 @@ impl Layout {
     }
 }
 
+/// Leaves of a long text its beginning and its end, so that it leaves room for the world.
+fn clip(text: &mut String) {
+    const MOST: usize = 32;
+    let letters: Vec<char> = text.chars().collect();
+    if letters.len() > MOST {
+        let (head, tail) = (&letters[..MOST / 2], &letters[letters.len() + 1 - MOST / 2..]);
+        *text = head.iter().chain(&['…']).chain(tail).collect();
+    }
+}
+
 /// What is written upon a picture.
 #[derive(Debug)]
 pub(super) struct Labels<'a> {
@@ -89,7 +99,8 @@ pub(super) struct Labels<'a> {
 }
 
 impl<'a> Labels<'a> {
-    pub(super) fn new(letters: &'a Letters, legend: Legend, frame: &Frame, hertz: f64) -> Self {
+    pub(super) fn new(letters: &'a Letters, mut legend: Legend, frame: &Frame, hertz: f64) -> Self {
+        legend.rows.iter_mut().for_each(|(_, text)| clip(text));
         let plural = if frame.bodies.len() == 1 { "body" } else { "bodies" };
         Self {
             letters,

@@ -94,19 +94,13 @@ impl Legend {
 
 /// A kind, told by its name or its shape.
 fn shape(kind: usize, setting: &Setting) -> (Sign, String) {
-    let (color, name) = (colors::distinct(kind as u32), clipped(setting.name_of(kind)));
+    let (color, name) = (colors::distinct(kind as u32), setting.name_of(kind));
     let is_named = setting.names.get(kind).is_some_and(Option::is_some);
     match setting.kinds[kind].shape {
         Shape::Circle { .. } if is_named => (Sign::Disc(color), name),
         Shape::Circle { .. } => (Sign::Disc(color), format!("{name} wide")),
         _ => (Sign::Square(color), name),
     }
-}
-
-/// A name as far as there is room for it beside a world.
-fn clipped(name: String) -> String {
-    const MOST: usize = 32;
-    if name.chars().count() > MOST { name.chars().take(MOST - 1).chain(['…']).collect() } else { name }
 }
 
 /// A length in the unit that suits it.

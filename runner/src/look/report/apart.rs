@@ -35,7 +35,7 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
             format!("They first differ at step {}, in body {}{columns}.", first.step, first.id)
         }
     };
-    // Of runs with steps of other lengths each step is at two times.
+    // Where their steps have not one length, a step is at a different time in each.
     let (x, at): (_, fn(&Source, u64) -> f64) = if a.time(1.0) == b.time(1.0) {
         ("time, s", |a, step| a.time(step as f64))
     } else {

@@ -71,7 +71,9 @@ fn over_run(sources: &[Source]) -> String {
             let name = column.strip_prefix(PREFIX).filter(|name| *name != "per_step")?;
             let mut points: Vec<_> = at.iter().copied().zip(log.get(column)?.iter().copied()).collect();
             // Each line tells of the steps since the one before; of what was before the first step, the one after.
-            if let [first, second, ..] = &mut points[..] {
+            if let [first, second, ..] = &mut points[..]
+                && first.0 == 0.0
+            {
                 first.1 = second.1;
             }
             Some((name.to_owned(), points))

@@ -31,8 +31,7 @@ impl Target {
             Err(error) if error.kind() == ErrorKind::NotFound => true,
             Err(error) => return Err(refuse(format!("{error}; name a new folder")).into()),
         };
-        let not_writable = |error: io::Error| refuse(format!("{error}; name a folder that can be written to"));
-        fs::create_dir_all(folder).map_err(not_writable)?;
+        fs::create_dir_all(folder).map_err(|error| FolderError::not_writable("--vtk", folder, &error))?;
         Ok(Self { folder: folder.to_owned(), made, written: Vec::new(), bytes: 0, finished: false })
     }
 

@@ -35,7 +35,8 @@ function hello(message) {
   state.difference = null;
   at("compared").hidden = message.sources.length < 2;
   at("difference").disabled = true;
-  at("difference").textContent = "Comparing…";
+  const is_compared = message.sources.every(({ hertz }) => hertz === message.sources[0].hertz);
+  at("difference").textContent = is_compared ? "Comparing…" : "Not compared: steps of other lengths";
   at("apart").hidden = true;
   beyond();
   state.asked = "";

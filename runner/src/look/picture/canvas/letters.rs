@@ -3,8 +3,8 @@
 use super::{Canvas, Rgb};
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 
-/// The Latin, Greek and Cyrillic letters of Inter 4.0 in a medium weight, its digits of one width, and some signs; another letter is an empty
-/// box. Its license is beside it.
+/// The Latin, Greek and Cyrillic letters of Inter 3.19 in a medium weight, its digits of one width, and some signs; whatever else is an empty
+/// box, also accents that are characters of their own. Its license is beside it.
 const INTER: &[u8] = include_bytes!("font/Inter-Medium.otf");
 
 /// A typeface.
