@@ -438,13 +438,13 @@ fn a_disc_goes_around_with_a_ring_that_turns() {
         }
         let mut sim = scene.start_on((2, 2), Exchange::Substep);
         sim.run(300);
-        for body in sim.bodies() {
-            let speed = body.velocity.length() / (spin * distance).hypot(outward);
-            let turns = body.angular_velocity / spin;
-            println!("friction {friction}, restitution {restitution}: {speed:.3} of the speed, {turns:.2} of the spin");
-            assert!((speed - 1.0).abs() < 0.04, "{speed} times as fast as the ring carries it");
-            // They roll to and fro in their corners, as they would without steps.
-            assert!((turns - 1.0).abs() < 0.6, "{turns} times the ring's spin");
-        }
+        // They roll to and fro in their corners, as they would without steps: their mean tells.
+        let bodies = sim.bodies();
+        let mean = |of: fn(&Body) -> f32| bodies.iter().map(of).sum::<f32>() / bodies.len() as f32;
+        let speed = mean(|body| body.velocity.length()) / (spin * distance).hypot(outward);
+        let turns = mean(|body| body.angular_velocity) / spin;
+        println!("friction {friction}, restitution {restitution}: {speed:.3} of the speed, {turns:.2} of the spin");
+        assert!((speed - 1.0).abs() < 0.03, "{speed} times as fast as the ring carries them");
+        assert!((turns - 1.0).abs() < 0.2, "{turns} times the ring's spin");
     }
 }
