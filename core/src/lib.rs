@@ -43,7 +43,8 @@
 //! [`step`], [`measure`], [`World::save`] and [`World::hashes`] work on the threads of the rayon pool they are called in:
 //! outside of any pool, the global one, which has a thread for each core unless `RAYON_NUM_THREADS` says otherwise. A pool
 //! of one's own sets their number: `ThreadPoolBuilder::new().num_threads(4).build()?.install(|| step(…))`. How many there
-//! are changes no bit of a result.
+//! are changes no bit of a result. Outside of a pool a world of some hundred bodies is stepped by the calling thread alone, as
+//! others would have to be woken in each stage of a step; within one they help.
 //!
 //! # Several ranks
 //!

@@ -73,6 +73,11 @@ impl Schedule {
         }
     }
 
+    /// To how many threads jobs were shared out.
+    pub(crate) fn threads(&self) -> usize {
+        self.shares.len()
+    }
+
     /// Whether there is a job for more threads than one.
     pub(crate) fn helps(&self) -> bool {
         self.teams.iter().any(|&threads| threads > 1)
@@ -96,7 +101,7 @@ impl Schedule {
             let thread = rayon::current_thread_index().unwrap_or(0);
             let Ok(mut seat) = seats[thread].try_lock() else { return };
             let mut results = Vec::new();
-            let (others, own) = shares.split_at(thread);
+            let (others, own) = shares.split_at(thread.min(shares.len()));
             for share in own.iter().chain(others) {
                 while let Some(number) = share.take() {
                     let job = jobs[number].lock().expect("nobody panics with it").take().expect("taken once");
@@ -166,9 +171,10 @@ mod tests {
     #[test]
     fn every_job_is_done_once_also_where_threads_help() {
         let pool = ThreadPoolBuilder::new().num_threads(4).build().expect("threads");
-        for count in [0, 1, 3, 4, 50] {
+        // Also of those that were shared out to one thread, whichever runs them.
+        for (count, threads) in [(0, 4), (1, 4), (3, 4), (4, 4), (50, 4), (50, 1)] {
             let seats: Vec<_> = (0..4).map(|_| Mutex::new(0)).collect();
-            let mut schedule = shared_out(&vec![1; count], 4);
+            let mut schedule = shared_out(&vec![1; count], threads);
             for _ in 0..20 {
                 let results = pool.install(|| {
                     schedule.run(0..count, &seats, |team, job, seat| {

@@ -14,6 +14,10 @@ use crate::step::stage::{Bench, Hand, Shop, Work};
 use crate::tiling::tile::{Fault, Tile, TileCounts};
 use std::sync::Mutex;
 
+/// Steps with less to do, in what bodies without contacts take, are one thread's where the caller is no thread of the pool: to wake these
+/// in every stage, and to be woken by them, takes longer than what they do.
+const LITTLE: u64 = 1000;
+
 impl World {
     /// Starts a step: no sync point passed, nothing counted.
     pub(crate) fn begin_step(&mut self) {
@@ -39,13 +43,15 @@ impl World {
     /// Shares out the busy tiles to threads.
     fn share_out(&mut self) {
         let work = self.busy.iter().map(|&place| self.tiles[place as usize].work());
-        self.schedule.share_out(work, rayon::current_num_threads());
+        let is_little = || rayon::current_thread_index().is_none() && work.clone().sum::<u64>() < LITTLE;
+        let threads = if is_little() { 1 } else { rayon::current_num_threads() };
+        self.schedule.share_out(work, threads);
         self.schedule.begin_with(self.first);
     }
 
     /// Ends a step, in which so many bodies outran their tiles: the clock, and the lowest body whose state is not finite.
     pub(crate) fn end_step(&mut self, leaps: u64, not_finite: Option<GlobalId>) {
-        let threads = self.busy.len().clamp(1, rayon::current_num_threads()) as u32;
+        let threads = self.busy.len().clamp(1, self.schedule.threads()) as u32;
         self.figures = std::mem::take(&mut self.takes_figures).then(Box::default);
         for hand in &mut self.hands {
             let hand = hand.get_mut().expect("no stage panicked");

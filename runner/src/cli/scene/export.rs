@@ -10,6 +10,7 @@ use crate::folder::recording::Row;
 use crate::look::frame::Frame;
 use crate::look::recorded::Recorded;
 use crate::plan::{check_held, check_list};
+use crate::scene::file::FARTHEST;
 use crate::scene::file::write::World;
 use crate::scene::{Scene, SceneFile};
 use atoll_core::{Body, Command, GlobalId, KindId, Rot};
@@ -66,6 +67,11 @@ fn of_run(args: &SceneExportArgs, step: u64, target: &Target<'_>) -> Result<(), 
     check_held(&format!("{rows} bodies"), rows.saturating_mul(each as u64))?;
     let mut frame = Frame::default();
     recorded.read(step, &mut frame)?;
+    if let Some(row) = frame.bodies.iter().find(|row| row.x.abs().max(row.y.abs()) > FARTHEST) {
+        let reason =
+            format!("body {} is more than 1e9 m out there, where no scene has any; name an earlier step", row.id);
+        return Err(unsuitable(&format!("--step {step}"), &reason));
+    }
     let (setting, [low, high]) = (recorded.setting(), recorded.recording().facts().domain);
     let name = format!("{}, step {step}", config.scene.kind.title());
     let statics: Vec<_> = setting.statics.iter().map(|fixed| fixed.begun_at(step, config.params.dt)).collect();
