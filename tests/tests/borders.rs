@@ -421,7 +421,7 @@ fn stacks_rest_while_the_borders_of_tiles_move() {
 
 /// The last row of the table of ghost rules: a heap of 20,000 bodies over the borders of 4 x 4 tiles comes to rest.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "long, and no different in release")]
+#[cfg_attr(debug_assertions, ignore = "long; tests in release run it")]
 fn a_large_pile_comes_to_rest_over_its_borders() {
     let scene = scenes::pile(200, 100);
     let mut sim = scene.start_on((4, 4), Exchange::Substep);

@@ -15,6 +15,7 @@ use crate::look::recorded::Recorded;
 use crate::look::source::{End, Live, Shown, records, show_recorded, what_is_recorded};
 use crate::plan::Plan;
 use crate::rank::{Listener, Observer};
+use crate::wording::plural;
 use atoll_core::GlobalId;
 use glam::DVec2;
 use std::sync::Arc;
@@ -86,7 +87,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Exit, RunError> {
     }
     film.finish()?;
     let (frames, [width, height]) = (shown.count(), args.size);
-    let frames = if frames == 1 { "1 picture".to_owned() } else { format!("{frames} pictures") };
+    let frames = plural(frames as u64, "picture");
     let steps = if shown.count() == 1 {
         format!("step {}", shown.first)
     } else {

@@ -8,6 +8,7 @@ use super::legend::{Legend, Sign, grouped, length};
 use super::paint::round_up;
 use super::view::{Fit, View};
 use crate::look::frame::Frame;
+use crate::wording::form_for;
 
 /// Letters are this part of the image's height.
 const PART: f64 = 1.0 / 50.0;
@@ -101,13 +102,13 @@ pub(super) struct Labels<'a> {
 impl<'a> Labels<'a> {
     pub(super) fn new(letters: &'a Letters, mut legend: Legend, frame: &Frame, hertz: f64) -> Self {
         legend.rows.iter_mut().for_each(|(_, text)| clip(text));
-        let plural = if frame.bodies.len() == 1 { "body" } else { "bodies" };
+        let bodies = frame.bodies.len();
         Self {
             letters,
             legend,
             time: format!("{:.*} s", if hertz > 100.0 { 3 } else { 2 }, frame.step as f64 / hertz),
             step: format!("step {}", frame.step),
-            bodies: format!("{} {plural}", grouped(frame.bodies.len())),
+            bodies: format!("{} {}", grouped(bodies), form_for(bodies as u64, "body")),
         }
     }
 

@@ -36,22 +36,19 @@ pub(super) fn of(sources: &[Source], comparison: Option<&Comparison>) -> String 
         }
     };
     // Where their steps have not one length, a step is at a different time in each.
-    let (x, at): (_, fn(&Source, u64) -> f64) = if a.time(1.0) == b.time(1.0) {
-        ("time, s", |a, step| a.time(step as f64))
-    } else {
-        ("step", |_, step| step as f64)
-    };
+    let (x, unit) = if a.time(1.0) == b.time(1.0) { ("time, s", a.time(1.0)) } else { ("step", 1.0) };
+    let at = |step: u64| step as f64 * unit;
     let series = |(name, color, quantity): (&str, &str, Quantity)| Series {
         name: name.to_owned(),
         color: color.to_owned(),
         dashed: false,
-        points: comparison.steps.iter().map(|step| (at(a, step.step), quantity(step))).collect(),
+        points: comparison.steps.iter().map(|step| (at(step.step), quantity(step))).collect(),
     };
     let share = Series {
         name: "bodies that differ".to_owned(),
         color: "s5".to_owned(),
         dashed: false,
-        points: comparison.steps.iter().map(|step| (at(a, step.step), step.differing as f64)).collect(),
+        points: comparison.steps.iter().map(|step| (at(step.step), step.differing as f64)).collect(),
     };
     let title = "Greatest deviation of any body";
     let axes = Axes { title, x, y: "deviation", scale: Scale::Decades, wide: false };
