@@ -130,9 +130,9 @@ await_aarch64() {
     return "$code"
 }
 
-# Where nobody will look into the programs, less is compiled into them: lines for backtraces in one profile, nothing in the other.
+# Where nobody will look into the programs, nothing is compiled into them for that: an eighth of the time.
 if [[ -n ${CI:-} ]]; then
-    export CARGO_PROFILE_DEV_DEBUG=line-tables-only CARGO_PROFILE_RELEASE_DEBUG=none CARGO_INCREMENTAL=0
+    export CARGO_PROFILE_DEV_DEBUG=none CARGO_PROFILE_RELEASE_DEBUG=none CARGO_INCREMENTAL=0
 fi
 
 provide
