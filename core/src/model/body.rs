@@ -38,6 +38,13 @@ impl Body {
             && self.velocity.is_finite()
             && self.angular_velocity.is_finite()
     }
+
+    /// Whether it is so far out that single precision has no number for that.
+    pub(crate) fn is_too_far(&self) -> bool {
+        /// In m along an axis.
+        const FARTHEST: f64 = 1e30;
+        self.position.abs().max_element() > FARTHEST
+    }
 }
 
 /// A body that never moves, or moves as its path has it, whatever it meets: every rank knows all of them.

@@ -29,7 +29,7 @@ pub enum SetupError {
     },
     /// A static body.
     #[error(
-        "static body {id}: its name must be its own, its position finite, its rotation of length one, its sizes and \
+        "static body {id}: its name must be its own, its position finite and within 1e30 m, its rotation of length one, its sizes and \
          density positive and finite, friction at least 0, restitution within 0 to 1, its speed at most 1e9 m/s"
     )]
     BadStatic {
@@ -126,6 +126,9 @@ pub enum BodyFault {
     /// Its state has numbers that are none.
     #[error("its position, rotation and velocities must be finite numbers")]
     NotFinite,
+    /// It is where nobody can be told apart.
+    #[error("its position must be within 1e30 m along each axis")]
+    TooFar,
     /// Its rotation is none.
     #[error("its rotation must be of length one: a cosine and a sine whose squares add up to 1")]
     NoRotation,

@@ -29,7 +29,7 @@ impl Rot {
         Self { c: libm::cosf(angle), s: libm::sinf(angle) }
     }
 
-    /// The angle in radians, in (-pi, pi].
+    /// The angle in radians, in [-pi, pi].
     pub fn angle(self) -> f32 {
         libm::atan2f(self.s, self.c)
     }

@@ -185,7 +185,8 @@ impl Setup {
                 angular_velocity: 0.0,
                 kind: KindId(kinds.len() as u32),
             };
-            if !body.is_finite() || !is_turn(body.rotation) || fixed.path.is_some_and(|path| !path.is_valid()) {
+            let is_somewhere = body.is_finite() && !body.is_too_far();
+            if !is_somewhere || !is_turn(body.rotation) || fixed.path.is_some_and(|path| !path.is_valid()) {
                 return Err(refuse);
             }
             kinds.push(row);
@@ -287,6 +288,7 @@ impl Setup {
     pub(crate) fn check_body(&self, body: &Body) -> Result<(), SetupError> {
         let fault = match body {
             _ if !body.is_finite() => BodyFault::NotFinite,
+            _ if body.is_too_far() => BodyFault::TooFar,
             _ if !is_turn(body.rotation) => BodyFault::NoRotation,
             _ if !self.has_kind(body.kind) => BodyFault::NoKind(body.kind),
             _ if self.is_static(body.id) => BodyFault::NameOfStatic,

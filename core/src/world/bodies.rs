@@ -13,12 +13,13 @@ use std::sync::Arc;
 
 impl World {
     /// Adds a body if one of this world's tiles owns it, and says whether. Give every rank every body, in the same
-    /// order, or each its own. Takes the same time however many bodies there are.
+    /// order, or each its own. Takes the same time however many bodies there are; under the name of one that was just removed,
+    /// as long as removing one from a world that may sleep.
     ///
     /// # Errors
-    /// If its state is not finite, its rotation not of length one, its kind unknown, or its name taken: by a static, or
-    /// by a body that was added to this world or is there. That bodies of different ranks have different names is for the
-    /// caller to see to.
+    /// If its state is not finite, its position beyond 1e30 m, its rotation not of length one, its kind unknown, or its name
+    /// taken: by a static, or by a body that was added to this world or is there. That bodies of different ranks have different
+    /// names is for the caller to see to.
     pub fn add(&mut self, body: Body) -> Result<bool, SetupError> {
         self.setup.check_body(&body)?;
         self.greatest_name = self.greatest_name.max(body.id);
@@ -78,7 +79,8 @@ impl World {
     }
 
     /// Removes the body of that name, with the forces upon it, and says whether it was one of this world's; a static stays. Tell every
-    /// rank. Takes as long as [`get`](Self::get).
+    /// rank. Takes as long as [`get`](Self::get); where bodies may [`sleep`](crate::Params::sleep), also that of a look at each tile, for
+    /// those that rest on it there.
     pub fn remove(&mut self, id: GlobalId) -> bool {
         if self.is_static(id) {
             return false;

@@ -119,7 +119,8 @@ impl World {
     /// Whether a command can be done at all; the same on every rank, as it asks for no body that there must be.
     ///
     /// # Errors
-    /// If a number in it is not finite, it names a kind that there is not, or a body or kind that it adds is none.
+    /// If a number in it is not finite, a speed or gravity is beyond 1e9, it names a kind that there is not, or a body or kind that it adds
+    /// is none.
     pub fn check(&self, command: &Command) -> Result<(), SetupError> {
         let finite = |id: GlobalId, are: bool| if are { Ok(()) } else { Err(SetupError::NotFinite { id }) };
         match *command {
@@ -161,6 +162,9 @@ impl World {
     ///
     /// # Errors
     /// If the velocities that it leads to, a force within one step, are beyond [`Path::FASTEST`].
+    ///
+    /// # Panics
+    /// If there is no kind as that of the body, or the one that it is to become: [`check`](Self::check) tells.
     pub fn outcome(&self, command: &Command, body: Body) -> Result<Body, SetupError> {
         let kind = self.setup.kind(body.kind);
         let mut after = body;

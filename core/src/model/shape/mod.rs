@@ -96,7 +96,7 @@ impl Shape {
     /// What is within a radius of a line along the x axis of the body, of the given length, in meters.
     ///
     /// # Errors
-    /// If a size is not positive and finite.
+    /// If a size is not positive and finite, or the radius next to nothing beside the length.
     pub fn capsule(length: f32, radius: f32) -> Result<Self, ShapeError> {
         if !(length > 0.0 && length.is_finite()) {
             return Err(ShapeError::NotFinite);
@@ -113,7 +113,8 @@ impl Shape {
         Compound::new(parts).map(|(compound, _)| Self::Compound(compound))
     }
 
-    /// Radius of the smallest circle around the center that holds the shape, in meters.
+    /// Radius of a circle around the center that holds the shape, in meters: the smallest, but for compounds, of which it holds the
+    /// circles around their parts.
     pub fn bounding_radius(&self) -> f32 {
         let length = |v: Vec2| (v.x * v.x + v.y * v.y).sqrt();
         match self {

@@ -48,12 +48,13 @@ impl RayHit {
 }
 
 impl World {
-    /// The first body or static on the straight way from one point to another, in m; none if one of these is not finite. One around the
-    /// first point is met at once.
+    /// The first body or static on the straight way from one point to another, in m; none if one of these, or how far it is between them,
+    /// is not finite. One around the first point is met at once.
     ///
     /// The first question after a step takes the time of looking at where each body is, and the first few that come near a tile that of
     /// looking at each of its bodies. Where there are more, these are sorted by place; each one after that takes time that grows with the
-    /// logarithm of their number, and with how much lies near the way.
+    /// logarithm of their number, and with how much lies near the way. After bodies came or went it is so again, of the tiles where they
+    /// did, and the tiles are looked at as well: do first what is to be done, and ask then.
     pub fn cast_ray(&self, from: DVec2, to: DVec2) -> Option<RayHit> {
         self.cast_ray_among(from, to, |_| true)
     }
@@ -61,12 +62,25 @@ impl World {
     /// The same among those bodies and statics of which `counts` says so: to look past whom the ray belongs to, or past sensors, which are
     /// met as all others are. It is asked of those that the ray meets, and of whom else it is does not matter.
     pub fn cast_ray_among(&self, from: DVec2, to: DVec2, counts: impl Fn(&Body) -> bool) -> Option<RayHit> {
-        (from.is_finite() && (to - from).is_finite()).then(|| self.first_hit((from, to), counts))?
+        let way = to - from;
+        if !(from.is_finite() && way.is_finite()) {
+            return None;
+        }
+        let length = way.abs().max_element();
+        if length <= FAR {
+            return self.first_hit((from, to), counts);
+        }
+        let part = FAR / length;
+        let hit = self.first_hit((from, from + way * part), counts)?;
+        Some(RayHit { fraction: hit.fraction * part, ..hit })
     }
 
-    /// The bodies and statics that have a point in common with a rectangle between two corners, in m, which may be infinite: their names,
-    /// ascending. Sensors count.
+    /// The bodies and statics that have a point in common with a rectangle between its lower left and its upper right corner, in m, which
+    /// may be infinite: their names, ascending; none where these are not such corners. Sensors count.
     pub fn in_rectangle(&self, low: DVec2, high: DVec2) -> Vec<GlobalId> {
+        if !low.cmple(high).all() {
+            return Vec::new();
+        }
         let [low, high] = [low, high].map(|corner| corner.clamp(DVec2::splat(-FAR), DVec2::splat(FAR)));
         self.found(Bounds { low, high }, |outline| outline.meets_rectangle(low, high))
     }

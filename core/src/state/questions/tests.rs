@@ -61,6 +61,34 @@ fn outlines(world: &World) -> Vec<Outline<'_>> {
 }
 
 #[test]
+fn rays_may_end_and_bodies_be_as_far_away_as_numbers_go() {
+    let mut world = World::whole(&blueprint(4, 3, DVec2::ZERO)).unwrap();
+    let from = DVec2::new(3.0, 5.0);
+    for kind in 0..3 {
+        let id = GlobalId(10 + u64::from(kind));
+        let at = from + DVec2::new(4.0, 3.0 * f64::from(kind));
+        world.add(Body::at_rest(id, KindId(kind), at)).unwrap();
+        for lonely in [DVec2::new(1e30, -1e30), DVec2::new(-1e30, 7.0)] {
+            let hermit = world.insert(Body::at_rest(id, KindId(0), lonely)).unwrap();
+            for far in [1e37, 1e155, 1e308, f64::MAX] {
+                let begin = DVec2::new(from.x, at.y);
+                let near = world.cast_ray(begin, begin + DVec2::X * 8.0).unwrap();
+                let hit = world.cast_ray(begin, begin + DVec2::X * far).unwrap();
+                let off = hit.point.distance(near.point) + hit.normal.distance(near.normal);
+                assert!(hit.id == id && off < 1e-9 && hit.fraction > 0.0, "{far}: {hit:?}");
+            }
+            assert_eq!(world.at_point(at), [id]);
+            assert!(world.remove(hermit));
+        }
+    }
+    // Corners that are none.
+    let around = [from - DVec2::ONE, from + DVec2::splat(9.0)];
+    assert_eq!(world.in_rectangle(around[0], around[1]).len(), 3);
+    assert_eq!(world.in_rectangle(around[1], around[0]), []);
+    assert_eq!(world.in_rectangle(DVec2::NAN, around[1]), []);
+}
+
+#[test]
 fn answers_are_those_of_looking_at_each_body() {
     for far in [DVec2::ZERO, DVec2::new(-3e8, 7e8)] {
         let mut any = Any(7);

@@ -60,7 +60,7 @@ impl Grid {
             return Err(refuse("there must be at least one column and one row"));
         }
         if u64::from(columns) * u64::from(rows) > u64::from(u32::MAX) {
-            return Err(refuse("at most 2^32 tiles can be named"));
+            return Err(refuse("fewer than 2^32 tiles can be named"));
         }
         let grid = Self { x: Axis::new(min.x, max.x, columns), y: Axis::new(min.y, max.y, rows) };
         let rising = |axis: &Axis| axis.edges.windows(2).all(|pair| pair[0] < pair[1]);

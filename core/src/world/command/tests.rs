@@ -300,6 +300,10 @@ fn what_cannot_be_done_changes_nothing() {
     for (command, expected) in [
         (Command::Add(bad), SetupError::BadBody { id: bad.id, fault: BodyFault::NotFinite }),
         (
+            Command::Add(Body { position: DVec2::new(0.0, -1e31), ..bad }),
+            SetupError::BadBody { id: bad.id, fault: BodyFault::TooFar },
+        ),
+        (
             Command::Add(Body { position: DVec2::ONE, rotation: Rot { c: 2.0, s: 0.0 }, ..bad }),
             SetupError::BadBody { id: bad.id, fault: BodyFault::NoRotation },
         ),
