@@ -39,7 +39,7 @@ impl Body {
             && self.angular_velocity.is_finite()
     }
 
-    /// Whether it is so far out that single precision has no number for that.
+    /// Whether it is so far out that single precision may have no number for what follows from that.
     pub(crate) fn is_too_far(&self) -> bool {
         /// In m along an axis.
         const FARTHEST: f64 = 1e30;

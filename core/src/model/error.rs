@@ -29,8 +29,9 @@ pub enum SetupError {
     },
     /// A static body.
     #[error(
-        "static body {id}: its name must be its own, its position finite and within 1e30 m, its rotation of length one, its sizes and \
-         density positive and finite, friction at least 0, restitution within 0 to 1, its speed at most 1e9 m/s"
+        "static body {id}: its name must be its own, its position finite and within 1e30 m, its rotation of \
+         length one, its sizes and density positive and finite, friction at least 0, restitution within 0 to 1, its speed \
+         at most 1e9 m/s"
     )]
     BadStatic {
         /// Its name.
@@ -126,7 +127,7 @@ pub enum BodyFault {
     /// Its state has numbers that are none.
     #[error("its position, rotation and velocities must be finite numbers")]
     NotFinite,
-    /// It is where nobody can be told apart.
+    /// It is farther out than can be reckoned with.
     #[error("its position must be within 1e30 m along each axis")]
     TooFar,
     /// Its rotation is none.
